@@ -1,0 +1,3 @@
+//! The `relume` command.
+
+fn main() {}

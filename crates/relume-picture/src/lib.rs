@@ -1,0 +1,3 @@
+//! Pictures and exports of Relume solutions: a snapshot in, pixels and files out.
+//!
+//! Nothing here is ever written back into the solution.

@@ -1,0 +1,18 @@
+//! Relume: diffuse interreflection (radiosity) in scenes whose objects and lights move.
+//!
+//! The rooms, from the ground up; each may use those above it in this list and no other
+//! (`tests/layers.rs` checks it):
+//!
+//! | room | one sentence |
+//! |---|---|
+//! | [`geometry`] | polygons, bounds, shafts, rigid motion: pure functions |
+//! | [`scene`] | glTF in; bodies, patches, materials, motion: validated, then immutable |
+//! | [`element`] | the element forest: clusters, patches and their quadtrees |
+//! | [`transport`] | exchange area and visibility of two elements: pure queries |
+//! | [`pair`] | the pair tree, oracles and verdicts |
+//! | [`solver`] | gather, push, pull, residual |
+//! | [`session`] | owns all state; runs the phases of a frame; snapshots out |
+
+pub mod geometry;
+pub mod scene;
+pub mod session;

@@ -1,0 +1,253 @@
+//! What is lit: bodies, patches, materials, lights, cameras and their motion.
+//!
+//! A [`Scene`] is validated when it is made and immutable afterwards; every pose is a pure
+//! function of time. This room reads files and nothing else does. It must not know elements,
+//! pairs or light transport.
+
+use glam::{DVec2, DVec3};
+
+use crate::geometry::Pose;
+
+mod motion;
+
+pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
+
+/// Index of a [`Body`] in [`Scene::bodies`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct BodyId(pub u32);
+
+/// Index of a [`Patch`] in [`Scene::patches`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PatchId(pub u32);
+
+/// Index of a [`Material`] in [`Scene::materials`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct MaterialId(pub u32);
+
+/// Index of a [`Surface`] in [`Scene::surfaces`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SurfaceId(pub u32);
+
+/// Everything that is lit, as read and validated. Immutable.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Name of the scene (the file's stem, or the name given in code).
+    pub name: String,
+    /// Rigid groups; names are unique.
+    pub bodies: Vec<Body>,
+    /// Named parts of bodies: one for each mesh primitive that an object instantiates.
+    pub surfaces: Vec<Surface>,
+    /// All patches, sorted by body (then by surface): [`Body::patches`] is a range of them.
+    pub patches: Vec<Patch>,
+    /// Materials; every patch names one.
+    pub materials: Vec<Material>,
+    /// Punctual lights (KHR_lights_punctual).
+    pub lights: Vec<Light>,
+    /// Cameras, in file order.
+    pub cameras: Vec<Camera>,
+    /// The node tree and its animation.
+    pub motion: Motion,
+    /// What was noticed while reading, for `info` and `check`.
+    pub notes: Vec<Note>,
+}
+
+/// Everything that moves rigidly together: an animated node with what hangs rigidly below it,
+/// or one object that never moves.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// Unique name, from the node.
+    pub name: String,
+    /// The node whose rigid motion the body follows.
+    pub node: NodeId,
+    /// The patches of this body, a range of [`Scene::patches`].
+    pub patches: std::ops::Range<u32>,
+}
+
+/// A named part of a body: one mesh primitive of one object (node with a mesh).
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// Name of the object (glTF node), then of the material where an object has several
+    /// primitives; unique in the scene.
+    pub name: String,
+    /// Name of the object (glTF node) the surface belongs to.
+    pub object: String,
+    /// The body it rides on.
+    pub body: BodyId,
+    /// Its material.
+    pub material: MaterialId,
+}
+
+/// A planar convex polygon of the input, one-sided: it reflects and emits on the side its
+/// normal points to and is black on the other, but blocks light on both.
+///
+/// A double-sided polygon is two patches, each the other's [`Patch::twin`].
+#[derive(Clone, Debug)]
+pub struct Patch {
+    /// The body it rides on.
+    pub body: BodyId,
+    /// The named surface it belongs to.
+    pub surface: SurfaceId,
+    /// Its material.
+    pub material: MaterialId,
+    /// Its plane's frame in the body's frame.
+    pub frame: Frame,
+    /// Corners in the plane's frame, counter-clockwise seen from the front, convex, three or
+    /// more, no three successive ones collinear (up to rounding), metres.
+    pub corners: Vec<DVec2>,
+    /// The same polygon seen from behind, if the material is double-sided.
+    pub twin: Option<PatchId>,
+}
+
+/// An orthonormal frame of a plane, in the body's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Origin, a point of the plane, metres.
+    pub origin: DVec3,
+    /// First axis in the plane, unit length.
+    pub u: DVec3,
+    /// Second axis in the plane, unit length.
+    pub v: DVec3,
+    /// Unit normal, `u x v`: the side that reflects.
+    pub normal: DVec3,
+}
+
+impl Frame {
+    /// The point of the body's frame at plane coordinates `p`.
+    pub fn point(&self, p: DVec2) -> DVec3 {
+        self.origin + self.u * p.x + self.v * p.y
+    }
+}
+
+/// A diffuse material; linear RGB.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Unique name.
+    pub name: String,
+    /// Diffuse reflectance rho, each channel in [0, 1).
+    pub reflectance: [f64; 3],
+    /// Exitance M = pi x emitted radiance, W/m2.
+    pub exitance: [f64; 3],
+    /// Whether both sides of its polygons reflect and emit.
+    pub double_sided: bool,
+}
+
+/// A punctual light: a direct source without area.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Light {
+    /// Unique name, from the node.
+    pub name: String,
+    /// The node it hangs on; it shines along the node's -Z axis.
+    pub node: NodeId,
+    /// What it is.
+    pub kind: LightKind,
+    /// Point and spot: radiant intensity, W/sr. Directional: irradiance at normal incidence, W/m2.
+    /// Linear RGB.
+    pub intensity: [f64; 3],
+    /// The statement of what the file said and how it was converted, for `info`.
+    pub conversion: String,
+}
+
+/// The kinds of punctual light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightKind {
+    /// Shines equally in all directions.
+    Point,
+    /// Shines in a cone around -Z; full inside `inner`, nothing outside `outer` (radians from the
+    /// axis), and the glTF falloff between.
+    Spot {
+        /// Half angle of the full cone, radians.
+        inner: f64,
+        /// Half angle where nothing is left, radians.
+        outer: f64,
+    },
+    /// Parallel light along -Z.
+    Directional,
+}
+
+/// A camera that hangs on a node and looks along the node's -Z, +Y up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Unique name.
+    pub name: String,
+    /// The node it hangs on.
+    pub node: NodeId,
+    /// How it projects.
+    pub projection: Projection,
+}
+
+/// Camera projections of glTF.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// Perspective with a vertical field of view in radians and, if the file gives one, a width to
+    /// height ratio.
+    Perspective {
+        /// Vertical field of view, radians.
+        yfov: f64,
+        /// Width : height, if given.
+        aspect: Option<f64>,
+    },
+    /// Orthographic with half extents in metres.
+    Orthographic {
+        /// Half width, metres.
+        xmag: f64,
+        /// Half height, metres.
+        ymag: f64,
+    },
+}
+
+/// Something worth telling about the input.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Note {
+    /// How serious it is.
+    pub severity: Severity,
+    /// Short stable identifier, such as `degenerate` or `light-units`.
+    pub code: &'static str,
+    /// The node, mesh, material or extension it is about.
+    pub subject: String,
+    /// How many items it concerns.
+    pub count: usize,
+    /// One sentence: what was found, and what was done or what to do about it.
+    pub message: String,
+}
+
+/// How serious a [`Note`] is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// Worth knowing.
+    Info,
+    /// The result is likely not what was meant.
+    Warning,
+    /// The result will be wrong.
+    Error,
+}
+
+impl Scene {
+    /// Where a body is at `time_s`, or `None` while it is absent (scale 0).
+    pub fn pose(&self, body: BodyId, time_s: f64) -> Option<Pose> {
+        self.motion.pose(self.bodies[body.0 as usize].node, time_s)
+    }
+
+    /// The patches of a body with their ids.
+    pub fn patches_of(&self, body: BodyId) -> impl Iterator<Item = (PatchId, &Patch)> {
+        let range = self.bodies[body.0 as usize].patches.clone();
+        range.map(|i| (PatchId(i), &self.patches[i as usize]))
+    }
+
+    /// Sum of the areas of all patches, m2 (a double-sided polygon counts twice).
+    pub fn area_m2(&self) -> f64 {
+        self.patches.iter().map(Patch::area_m2).sum()
+    }
+}
+
+impl Patch {
+    /// Area by the shoelace formula, m2; exact up to rounding.
+    pub fn area_m2(&self) -> f64 {
+        let n = self.corners.len();
+        (0..n).map(|i| self.corners[i].perp_dot(self.corners[(i + 1) % n])).sum::<f64>() / 2.0
+    }
+
+    /// Corners in the body's frame, counter-clockwise seen from the front.
+    pub fn corners_in_body(&self) -> impl Iterator<Item = DVec3> + '_ {
+        self.corners.iter().map(|&c| self.frame.point(c))
+    }
+}

@@ -1,0 +1,101 @@
+//! What happened in a frame: exact counters, energies, seconds.
+
+use serde::Serialize;
+
+/// One entry of `frames` in a report of schema `relume-report/1`.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct FrameReport {
+    /// Frame number.
+    pub frame: u32,
+    /// Time in the animation, seconds.
+    pub time_s: f64,
+    /// Names of the bodies whose pose differs from the frame before.
+    pub moved: Vec<String>,
+    /// Elements alive: every node of the forest that can carry radiosity.
+    pub elements: u64,
+    /// Active pairs: links, each used in both directions.
+    pub links: u64,
+    /// Links with a moved end.
+    pub dynamic_links: u64,
+    /// Nodes of the pair tree by state.
+    pub pairs: PairCounts,
+    /// Pairs looked at.
+    pub examined: u64,
+    /// Pairs whose exchange area was evaluated again.
+    pub reevaluated: u64,
+    /// Pairs of which only the visibility was evaluated again.
+    pub visibility_only: u64,
+    /// Links that moved up the hierarchy.
+    pub promoted: u64,
+    /// Links that moved down the hierarchy.
+    pub demoted: u64,
+    /// Links whose visibility changed.
+    pub occlusion_changed: u64,
+    /// Visibility segments traced.
+    pub segments: u64,
+    /// Elements made.
+    pub elements_made: u64,
+    /// Elements reaped.
+    pub elements_reaped: u64,
+    /// Gather sweeps of the solver.
+    pub sweeps: u32,
+    /// Largest change of radiosity in the last sweep, relative to the mean radiosity.
+    pub residual: f64,
+    /// How far the row sums of the form factors are from 1.
+    pub row_sum_error: RowSumError,
+    /// Where the flux goes, summed over the three channels.
+    pub energy: Energy,
+    /// Hash over the active pairs with their exchange areas and visibilities, in key order.
+    pub hash: String,
+    /// Wall-clock seconds by phase.
+    pub seconds: Seconds,
+}
+
+/// Nodes of the pair tree by state.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct PairCounts {
+    /// Links.
+    pub active: u64,
+    /// Pairs whose children carry the transport.
+    pub refined: u64,
+    /// Pairs that exchange nothing.
+    pub culled: u64,
+}
+
+/// |1 - row sum| over the leaf elements of one frame.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct RowSumError {
+    /// Area-weighted root mean square.
+    pub rms: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+/// Flux balance of a frame, watts, summed over the channels.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Energy {
+    /// Emitted by surfaces and punctual lights.
+    pub emitted_w: f64,
+    /// Absorbed by surfaces.
+    pub absorbed_w: f64,
+    /// Left the scene.
+    pub escaped_w: f64,
+}
+
+/// Wall-clock seconds by phase.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Seconds {
+    /// Poses and bounds.
+    #[serde(rename = "move")]
+    pub moving: f64,
+    /// Which pairs are affected.
+    pub predict: f64,
+    /// Exchange areas and visibilities.
+    pub evaluate: f64,
+    /// Verdicts and edits.
+    pub judge: f64,
+    /// Gather, push, pull.
+    pub solve: f64,
+    /// The whole step.
+    pub total: f64,
+}

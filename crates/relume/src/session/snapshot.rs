@@ -1,0 +1,42 @@
+//! An immutable picture of the solution at one instant: what pictures and exports read.
+
+use std::sync::Arc;
+
+use glam::DVec2;
+
+use crate::geometry::Pose;
+use crate::scene::{PatchId, Scene};
+
+/// The solution at one instant.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// The scene that was solved.
+    pub scene: Arc<Scene>,
+    /// Time in the animation, seconds.
+    pub time_s: f64,
+    /// World pose of each body, `None` while absent; indexed by `BodyId`.
+    pub poses: Vec<Option<Pose>>,
+    /// Leaf elements of all patches, grouped by patch.
+    pub leaves: Vec<Leaf>,
+    /// For each patch the range of its leaves; indexed by `PatchId`, one entry more than patches.
+    pub leaf_offsets: Vec<u32>,
+}
+
+/// A leaf of the element forest: a convex piece of a patch with constant radiosity.
+#[derive(Clone, Copy, Debug)]
+pub struct Leaf {
+    /// Corners in the patch's frame, counter-clockwise, metres; a triangle repeats its last corner.
+    pub corners: [DVec2; 4],
+    /// Irradiance H, W/m2, linear RGB.
+    pub irradiance: [f32; 3],
+    /// Radiosity B = M + rho H, W/m2, linear RGB.
+    pub radiosity: [f32; 3],
+}
+
+impl Snapshot {
+    /// The leaves of one patch; empty if its body is absent.
+    pub fn leaves_of(&self, patch: PatchId) -> &[Leaf] {
+        let i = patch.0 as usize;
+        &self.leaves[self.leaf_offsets[i] as usize..self.leaf_offsets[i + 1] as usize]
+    }
+}

@@ -13,6 +13,8 @@
 //! | [`solver`] | gather, push, pull, residual |
 //! | [`session`] | owns all state; runs the phases of a frame; snapshots out |
 
+pub mod element;
 pub mod geometry;
 pub mod scene;
 pub mod session;
+pub mod transport;

@@ -15,6 +15,8 @@
 
 pub mod element;
 pub mod geometry;
+pub mod pair;
 pub mod scene;
 pub mod session;
+pub mod solver;
 pub mod transport;

@@ -62,6 +62,7 @@ fn a_room_without_a_wall_is_seen_through_the_opening() {
             _ => eye.x > 3.0,
         };
         assert!(through, "{without:?}: {eye}");
+        assert_eq!(View::automatic(&double_sided(&scene)), view, "{without:?}, double-sided");
     }
 }
 
@@ -72,6 +73,18 @@ fn a_room_of_three_walls_without_a_ceiling_is_seen_from_its_open_side() {
     let (front, back) = fronts_and_backs(&scene, &view);
     assert!(front > 0.5 && back < 0.05, "{front} {back} {view:?}");
     assert!(view.world_from_camera.translation.z > 4.0);
+}
+
+#[test]
+fn a_double_sided_object_is_no_room() {
+    let mut scene = empty();
+    let grey = material(&mut scene, [0.5; 3], 0.0);
+    solid(&mut scene, v(-1.0, -1.0, -1.0), v(1.0, 1.0, 1.0), grey);
+    solid(&mut scene, v(-6.0, -0.5, -0.01), v(-1.0, 0.5, 0.01), grey);
+    solid(&mut scene, v(1.0, -0.5, -0.01), v(6.0, 0.5, 0.01), grey);
+    let scene = double_sided(&scene);
+    let eye = View::automatic(&scene).world_from_camera.translation;
+    assert!(eye.length() > 6.0, "{eye}");
 }
 
 #[test]

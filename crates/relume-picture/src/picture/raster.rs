@@ -234,7 +234,7 @@ impl<'a> TileBuffer<'a> {
                 let slots = self.nearness[first..first + samples].iter_mut();
                 let slots = slots.zip(&mut self.seen[first..first + samples]);
                 for (s, (slot, slot_seen)) in slots.enumerate() {
-                    let k = (nearness + steps[s]).clamp(low, high);
+                    let k = (nearness + steps[s]).max(low).min(high);
                     if mask >> s & 1 == 1 && k > *slot {
                         *slot = k;
                         *slot_seen = seen;

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec2, DVec3};
 use relume::scene::{
-    Body, BodyId, Camera, Frame, Material, MaterialId, Motion, Node, NodeId, Patch, Scene, Surface,
-    SurfaceId,
+    Body, BodyId, Camera, Frame, Material, MaterialId, Motion, Node, NodeId, Patch, PatchId, Scene,
+    Surface, SurfaceId,
 };
 use relume::session::{Leaf, Snapshot};
 
@@ -103,6 +103,26 @@ pub(crate) fn body(scene: &mut Scene, polygons: &[(Vec<DVec3>, MaterialId)]) -> 
     let patches = first..scene.patches.len() as u32;
     scene.bodies.push(Body { name: format!("body {}", body.0), node, patches });
     body
+}
+
+/// The same scene with every polygon double-sided.
+pub(crate) fn double_sided(scene: &Scene) -> Scene {
+    let mut two = Scene { patches: Vec::new(), ..scene.clone() };
+    for body in &mut two.bodies {
+        let start = two.patches.len() as u32;
+        for front in &scene.patches[body.patches.start as usize..body.patches.end as usize] {
+            let id = two.patches.len() as u32;
+            let Frame { origin, u, v, normal } = front.frame;
+            let mirrored = front.corners.iter().rev().map(|c| DVec2::new(c.x, -c.y)).collect();
+            let frame = Frame { origin, u, v: -v, normal: -normal };
+            let twin = Some(PatchId(id));
+            let back = Patch { frame, corners: mirrored, twin, ..front.clone() };
+            two.patches.push(Patch { twin: Some(PatchId(id + 1)), ..front.clone() });
+            two.patches.push(back);
+        }
+        body.patches = start..two.patches.len() as u32;
+    }
+    two
 }
 
 /// One side of the box from `a` to `b`, seen from outside.

@@ -67,6 +67,21 @@ fn a_room_without_a_wall_is_seen_through_the_opening() {
 }
 
 #[test]
+fn a_room_with_a_window_is_seen_from_inside_although_its_walls_have_outsides() {
+    let mut scene = room(&[Side::Front]);
+    let white = scene.patches[1].material;
+    let [mut left, mut right] =
+        [(0.0, 1.5), (2.5, 4.0)].map(|(a, b)| side(v(a, 0.0, 0.0), v(b, 3.0, 5.0), Side::Front));
+    left.reverse();
+    right.reverse();
+    body(&mut scene, &[(left, white), (right, white)]);
+    for scene in [scene.clone(), double_sided(&scene)] {
+        let eye = View::automatic(&scene).world_from_camera.translation;
+        assert!(eye.cmpgt(DVec3::ZERO).all() && eye.cmplt(v(4.0, 3.0, 5.0)).all(), "{eye}");
+    }
+}
+
+#[test]
 fn a_room_of_three_walls_without_a_ceiling_is_seen_from_its_open_side() {
     let scene = room(&[Side::Front, Side::Ceiling]);
     let view = View::automatic(&scene);

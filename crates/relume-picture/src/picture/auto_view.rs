@@ -13,8 +13,7 @@
 //! where `seen` is the share of the scene's area that the picture shows from the front, `front` and
 //! `back` are the shares of pixels that meet a front or a back first, `lamps` is the seen share of
 //! the emitting area, and `close` the share of pixels that meet something right in front of the
-//! camera. In a room, what cannot be seen from its middle counts as a back: the outside of its
-//! walls, where they are double-sided. The first best candidate wins.
+//! camera. The first best candidate wins.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -52,7 +51,7 @@ pub(crate) fn choose(scene: &Scene) -> View {
         return View::look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, YFOV_OUTSIDE);
     };
     let duration = scene.motion.duration_s;
-    let mut stages: Vec<Stage> = (0..if duration > 0.0 { 3 } else { 1 })
+    let stages: Vec<Stage> = (0..if duration > 0.0 { 3 } else { 1 })
         .map(|i| Stage::new(scene, duration * f64::from(i) / 3.0, bounds.diagonal()))
         .collect();
     let middle = Middle::new(&stages[0], &bounds);
@@ -62,7 +61,6 @@ pub(crate) fn choose(scene: &Scene) -> View {
     }
     if middle.enclosure > ROOM {
         candidates.extend(inside(&bounds));
-        stages.iter_mut().for_each(|stage| stage.restrict(&middle.seen));
     }
     let scores: Vec<f64> = candidates
         .par_iter()
@@ -185,7 +183,7 @@ struct Middle {
 
 impl Middle {
     fn new(stage: &Stage, bounds: &Bounds) -> Middle {
-        let mut middle = Middle { enclosure: 0.0, seen: vec![false; stage.worth.len()] };
+        let mut middle = Middle { enclosure: 0.0, seen: vec![false; stage.areas.len()] };
         for (x, z) in [(0.5, 0.5), (0.3, 0.3), (0.7, 0.3), (0.3, 0.7), (0.7, 0.7)] {
             for y in [0.5, 0.75] {
                 middle.look_around(stage, bounds.at(x, y, z));
@@ -193,7 +191,7 @@ impl Middle {
         }
         let emits = |index: usize| stage.emits(&stage.scene.patches[index]);
         let mut emitters =
-            (0..stage.worth.len()).filter(|&i| stage.worth[i] > 0.0 && emits(i)).peekable();
+            (0..stage.areas.len()).filter(|&i| stage.areas[i] > 0.0 && emits(i)).peekable();
         // A dark inside, while something shines outside: an object.
         if emitters.peek().is_some() && !emitters.any(|i| middle.seen[i]) {
             middle.enclosure = 0.0;
@@ -222,8 +220,8 @@ struct Stage<'a> {
     scene: &'a Scene,
     poses: Vec<Option<Pose>>,
     diagonal: f64,
-    /// Area of each patch that is worth seeing, m2; indexed by patch.
-    worth: Vec<f64>,
+    /// Area of each patch, 0 while it is absent, m2; indexed by patch.
+    areas: Vec<f64>,
 }
 
 /// What a pixel of a scored picture meets.
@@ -244,15 +242,8 @@ impl<'a> Stage<'a> {
         let poses: Vec<_> =
             scene.bodies.iter().map(|b| scene.motion.pose(b.node, time_s)).collect();
         let area = |patch: &Patch| poses[patch.body.0 as usize].map_or(0.0, |_| patch.area_m2());
-        let worth = scene.patches.iter().map(area).collect();
-        Stage { scene, poses, diagonal, worth }
-    }
-
-    /// Nothing but what is marked is worth seeing.
-    fn restrict(&mut self, marked: &[bool]) {
-        for (worth, &marked) in self.worth.iter_mut().zip(marked) {
-            *worth = if marked { *worth } else { 0.0 };
-        }
+        let areas = scene.patches.iter().map(area).collect();
+        Stage { scene, poses, diagonal, areas }
     }
 
     fn pose(&self, patch: &Patch) -> Option<&Pose> {
@@ -265,14 +256,14 @@ impl<'a> Stage<'a> {
 
     fn score(&self, view: &View) -> f64 {
         let met = self.look(view, (f64::from(ROWS) * ASPECT) as u32, ROWS);
-        let mut seen = vec![0.0; self.worth.len()];
+        let mut seen = vec![0.0; self.areas.len()];
         let (mut front, mut back, mut close) = (0.0, 0.0, 0.0);
         for m in &met {
             let Some(patch) = m.patch else { continue };
             if m.distance < 0.06 * self.diagonal {
                 close += 1.0;
             }
-            if m.front && self.worth[patch] > 0.0 {
+            if m.front {
                 front += 1.0;
                 seen[patch] += m.area;
             } else {
@@ -282,8 +273,8 @@ impl<'a> Stage<'a> {
         // (seen, worth seeing), of all patches and of those that emit.
         let (mut all, mut lamps) = ([0.0; 2], [0.0; 2]);
         for (index, patch) in self.scene.patches.iter().enumerate() {
-            let worth = self.worth[index];
-            for (sum, area) in [seen[index].min(worth), worth].into_iter().enumerate() {
+            let whole = self.areas[index];
+            for (sum, area) in [seen[index].min(whole), whole].into_iter().enumerate() {
                 all[sum] += area;
                 lamps[sum] += if self.emits(patch) { area } else { 0.0 };
             }

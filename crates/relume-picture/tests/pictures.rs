@@ -252,3 +252,26 @@ fn a_rotated_camera_looks_where_it_points() {
     let pixel = view.project(v(-3.0, 0.0, 0.0), 640, 480).unwrap();
     assert!(pixel.distance(DVec2::new(320.0, 240.0)) < 1e-9);
 }
+
+#[test]
+fn wild_values_and_places_do_not_panic() {
+    let scene = room(&[]);
+    for value in [f32::NAN, f32::INFINITY, -1.0, f32::MAX, f32::MIN_POSITIVE] {
+        let snapshot =
+            snapshot(&scene, uneven, |p, _, _| if p.x > 2.0 { [value; 3] } else { GREY });
+        for eye in [DVec3::ZERO, v(4.0, 3.0, 5.0), v(2.0, 0.0, 2.5), v(1e9, 0.0, 0.0)] {
+            for exposure in [Exposure::Automatic, Exposure::Fixed(1.0)] {
+                let view = View::look_at(eye, v(2.0, 1.5, 2.5), 1.0);
+                render(
+                    &snapshot,
+                    &view,
+                    &Settings { exposure, mesh: true, ..settings(Shading::Gouraud) },
+                );
+            }
+        }
+        let view = View::look_at(v(2.0, 1.5, 2.5), v(2.0, 1.5, 2.5), 3.1);
+        for (width, height) in [(0, 0), (1, 1), (1, 300)] {
+            render(&snapshot, &view, &Settings { width, height, ..settings(Shading::Gouraud) });
+        }
+    }
+}

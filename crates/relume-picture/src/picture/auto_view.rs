@@ -270,7 +270,7 @@ impl<'a> Stage<'a> {
                 back += 1.0;
             }
         }
-        // (seen, worth seeing), of all patches and of those that emit.
+        // (seen, whole), of all patches and of those that emit.
         let (mut all, mut lamps) = ([0.0; 2], [0.0; 2]);
         for (index, patch) in self.scene.patches.iter().enumerate() {
             let whole = self.areas[index];

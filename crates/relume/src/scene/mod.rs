@@ -13,12 +13,15 @@ mod builder;
 mod draft;
 mod error;
 mod flatten;
+mod import;
+mod merge;
 mod motion;
 mod names;
 mod rigid;
 
 pub use builder::SceneBuilder;
 pub use error::SceneError;
+pub use import::{ImportOptions, import};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
 
 /// Index of a [`Body`] in [`Scene::bodies`].

@@ -33,6 +33,32 @@ impl Shape {
         (c[2] - c[0]).perp_dot(c[3] - c[1]) * 0.5
     }
 
+    /// Centroid, metres.
+    pub fn centroid(&self) -> DVec2 {
+        let [a, b, c, d] = self.corners;
+        let (one, two) = ((b - a).perp_dot(c - a), (c - a).perp_dot(d - a));
+        a + ((b - a) + (c - a)) * (one / (3.0 * (one + two)))
+            + ((c - a) + (d - a)) * (two / (3.0 * (one + two)))
+    }
+
+    /// Mean of (x x, x y, y y) about the centroid, m2: exact for parallelograms and triangles.
+    pub fn second_moment(&self) -> [f64; 3] {
+        let [a, b, c, d] = self.corners;
+        if self.len == 3 {
+            let m = self.centroid();
+            let sum = |f: fn(DVec2) -> f64| (f(a - m) + f(b - m) + f(c - m)) / 12.0;
+            return [sum(|v| v.x * v.x), sum(|v| v.x * v.y), sum(|v| v.y * v.y)];
+        }
+        let (e, f) = ((b + c - a - d) * 0.5, (c + d - a - b) * 0.5);
+        [e.x * e.x + f.x * f.x, e.x * e.y + f.x * f.y, e.y * e.y + f.y * f.y].map(|v| v / 12.0)
+    }
+
+    /// Largest distance of a corner from the centroid, metres.
+    pub fn radius(&self) -> f64 {
+        let m = self.centroid();
+        self.corners.iter().map(|c| (*c - m).length_squared()).fold(0.0, f64::max).sqrt()
+    }
+
     /// The two or four children, tiling this shape, in canonical order.
     pub fn children(&self) -> Vec<Shape> {
         if self.len == 3 { self.triangle_children() } else { self.quad_children() }

@@ -227,7 +227,9 @@ pub struct WorldElement {
     pub len: usize,
     /// Its plane.
     pub plane: Plane,
-    /// Mean of the corners.
+    /// Axes of the patch's frame in the plane.
+    pub axes: [DVec3; 2],
+    /// Centroid.
     pub centre: DVec3,
     /// Largest distance of a corner from the centre, metres.
     pub radius: f64,
@@ -252,16 +254,13 @@ impl WorldElement {
         let shape = forest.shape(id);
         let place = |p: DVec2| frame.point(p);
         let corners = shape.corners.map(place);
-        let centre = if shape.len == 3 {
-            (corners[0] + corners[1] + corners[2]) * (1.0 / 3.0)
-        } else {
-            ((corners[0] + corners[1]) + (corners[2] + corners[3])) * 0.25
-        };
+        let centre = place(shape.centroid());
         let reach2 = corners.iter().map(|c| (*c - centre).length_squared()).fold(0.0, f64::max);
         WorldElement {
             corners,
             len: shape.len,
             plane: Plane::through(frame.origin, frame.normal),
+            axes: [frame.u, frame.v],
             centre,
             radius: reach2.sqrt(),
             area: shape.area(),
@@ -274,6 +273,13 @@ impl WorldElement {
     #[inline]
     pub fn point(&self, s: f64, t: f64) -> DVec3 {
         bilinear(&self.corners, s, t)
+    }
+
+    /// Plane coordinates of a point relative to the centroid, metres.
+    #[inline]
+    pub fn offset(&self, p: DVec3) -> DVec2 {
+        let d = p - self.centre;
+        DVec2::new(d.dot(self.axes[0]), d.dot(self.axes[1]))
     }
 
     /// Signed distances of the corners from a plane: smallest and largest, metres.

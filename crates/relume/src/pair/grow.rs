@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::element::ElementId;
 
 use super::oracle::Side;
-use super::tree::{CullReason, PairId, PairTree, State};
+use super::tree::{CullReason, Gradients, PairId, PairTree, State};
 
 /// What is decided on a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +36,8 @@ pub struct Judgement {
     pub exchange_area_m2: f32,
     /// Visibility.
     pub visibility: f32,
+    /// How what arrives varies over both ends.
+    pub gradients: Gradients,
     /// Visibility segments traced.
     pub segments: u32,
 }
@@ -205,6 +207,7 @@ fn apply<J: Judge>(
         let pair = tree.pair_mut(item.pair);
         pair.exchange_area_m2 = judgement.exchange_area_m2;
         pair.visibility = judgement.visibility;
+        pair.gradients = judgement.gradients;
         let (a, b) = (pair.a, pair.b);
         let list = &chunk.candidates[range.clone()];
         let first = match judgement.verdict {

@@ -56,7 +56,9 @@ fn hash_of(forest: &Forest, pair: &Pair) -> u128 {
     let key = pair_key(forest.key(pair.a), forest.key(pair.b));
     let x = u64::from(pair.exchange_area_m2.to_bits());
     let v = u64::from(pair.visibility.to_bits());
-    let low = mix(key ^ mix(x << 32 | v));
+    let [[au, av], [bu, bv]] = [pair.gradients.over_a, pair.gradients.over_b];
+    let gradients = [au, av, bu, bv].iter().fold(0, |sum, &g| sum << 16 | u64::from(g as u16));
+    let low = mix(key ^ mix(x << 32 | v) ^ mix(gradients).rotate_left(7));
     let high = mix(low ^ key.rotate_left(31));
     u128::from(high) << 64 | u128::from(low)
 }

@@ -16,7 +16,7 @@ use super::brightness::Brightness;
 use super::grow::{Hierarchy, Judge, Judgement, Verdict};
 use super::hash::pair_key;
 use super::oracle::{End, Oracle, Side, estimate};
-use super::tree::CullReason;
+use super::tree::{CullReason, Gradients};
 
 /// How far pairs are decided.
 #[derive(Clone, Copy, Debug)]
@@ -76,12 +76,38 @@ impl Judge for Placed<'_> {
     }
 }
 
-fn decided(verdict: Verdict, x: f64, v: f64, segments: u32) -> Judgement {
-    Judgement { verdict, exchange_area_m2: x as f32, visibility: v as f32, segments }
+/// A verdict of which the numbers do not matter.
+fn passing(verdict: Verdict, segments: u32) -> Judgement {
+    Judgement {
+        verdict,
+        exchange_area_m2: 0.0,
+        visibility: 0.0,
+        gradients: Gradients::default(),
+        segments,
+    }
 }
 
 fn culled(reason: CullReason) -> Judgement {
-    decided(Verdict::Cull(reason), 0.0, 0.0, 0)
+    passing(Verdict::Cull(reason), 0)
+}
+
+/// A verdict to link or to hold, with what the link carries.
+fn carrying(
+    verdict: Verdict,
+    x: &Exchange,
+    v: &Visibility,
+    (a, b): (&WorldElement, &WorldElement),
+) -> Judgement {
+    Judgement {
+        verdict,
+        exchange_area_m2: x.area_m2 as f32,
+        visibility: v.value as f32,
+        gradients: Gradients::new(
+            (x.over_a.gradient + v.gradient_a, a.radius),
+            (x.over_b.gradient + v.gradient_b, b.radius),
+        ),
+        segments: v.segments,
+    }
 }
 
 impl Placed<'_> {
@@ -102,12 +128,12 @@ impl Placed<'_> {
                 return culled(CullReason::FacingAway);
             }
             narrowed.extend_from_slice(candidates);
-            return decided(Verdict::RefineSelf, 0.0, 0.0, 0);
+            return passing(Verdict::RefineSelf, 0);
         }
         if lit(a) || lit(b) {
             narrowed.extend_from_slice(candidates);
             let side = if lit(a) { Side::B } else { Side::A };
-            return decided(Verdict::Refine(side), 0.0, 0.0, 0);
+            return passing(Verdict::Refine(side), 0);
         }
         if self.box_is_behind(a, box_b) || self.box_is_behind(b, box_a) {
             return culled(CullReason::FacingAway);
@@ -118,7 +144,7 @@ impl Placed<'_> {
             _ => bounds.diagonal(),
         };
         let side = if size(a, box_a) >= size(b, box_b) { Side::A } else { Side::B };
-        decided(Verdict::Refine(side), 0.0, 0.0, 0)
+        passing(Verdict::Refine(side), 0)
     }
 
     /// Whether a box is wholly behind the plane of a polygon or element.
@@ -189,7 +215,7 @@ impl Placed<'_> {
         if let Stage::Coarse = self.stage
             && let Some(side) = self.above_coarse(a, b)
         {
-            return decided(Verdict::Refine(side), 0.0, 0.0, 0);
+            return passing(Verdict::Refine(side), 0);
         }
         let key = pair_key(self.forest.key(a), self.forest.key(b));
         let x = exchange(self.simd, place_a, place_b, met);
@@ -200,7 +226,7 @@ impl Placed<'_> {
             if x.area_m2 / areas.0.min(areas.1) > epsilon
                 && let Some(side) = self.larger((a, b), areas, min_area_m2)
             {
-                return decided(Verdict::Refine(side), x.area_m2, 0.0, 0);
+                return passing(Verdict::Refine(side), 0);
             }
         }
         let v = visibility(self.simd, shaft, blockers, key, 4);
@@ -210,7 +236,7 @@ impl Placed<'_> {
                 Stage::Coarse => Verdict::Hold,
                 Stage::Fine(_) => Verdict::Link,
             };
-            return decided(verdict, x.area_m2, v.value, v.segments);
+            return carrying(verdict, &x, &v, (place_a, place_b));
         };
         let end = |id, area| End { area, light: brightness.of(self.forest, id) };
         let ends = (end(a, place_a.area), end(b, place_b.area));
@@ -218,10 +244,10 @@ impl Placed<'_> {
         if e.error > threshold
             && let Some(side) = self.splittable((a, b), e.side(&ends.0, &ends.1))
         {
-            return decided(Verdict::Refine(side), x.area_m2, v.value, v.segments);
+            return passing(Verdict::Refine(side), v.segments);
         }
         let v = self.settle(v, shaft, blockers, key);
-        decided(Verdict::Link, x.area_m2, v.value, v.segments)
+        carrying(Verdict::Link, &x, &v, (place_a, place_b))
     }
 
     /// A link that is partly blocked gets more segments.
@@ -286,11 +312,10 @@ impl Placed<'_> {
             && self.forest.coarse(element).is_none()
         {
             narrowed.extend_from_slice(candidates);
-            return decided(Verdict::Refine(side), 0.0, 0.0, 0);
+            return passing(Verdict::Refine(side), 0);
         }
         let e = WorldElement::new(self.view, self.forest, element, false);
         let x = light_exchange(lamp, &e);
-        let x = Exchange { spread_a: x.spread_b, spread_b: 0.0, ..x };
         if x.area_m2 <= 0.0 {
             return culled(CullReason::FacingAway);
         }
@@ -300,7 +325,6 @@ impl Placed<'_> {
         let key = pair_key(self.forest.key(element), self.forest.key(light));
         let segments = place.segments(lamp, &e, key);
         let v = light_visibility(self.simd, &shaft, narrowed, &segments);
-        let v = Visibility { spread_b: 0.0, ..v };
         let verdict = match (self.stage, self.oracle) {
             (Stage::Coarse, _) => Verdict::Hold,
             (Stage::Fine(brightness), Oracle::Error { threshold }) => {
@@ -312,12 +336,12 @@ impl Placed<'_> {
                 self.refine_if(est.error > threshold && self.forest.can_split(element), side)
             }
             (Stage::Fine(_), Oracle::FormFactor { epsilon, min_area_m2 }) => {
-                let uneven = x.spread_a.max(v.spread_a) > epsilon;
+                let uneven = x.over_a.slope.max(v.spread_a) > epsilon;
                 let room = e.area > min_area_m2 && self.forest.can_split(element);
                 self.refine_if(uneven && room, side)
             }
         };
-        decided(verdict, x.area_m2, v.value, v.segments)
+        carrying(verdict, &x, &v, (&e, &place.stand_in))
     }
 
     fn refine_if(&self, wanted: bool, side: Side) -> Verdict {
@@ -345,6 +369,7 @@ impl LightPlace {
             len: 4,
             // Nothing is behind a light.
             plane: Plane { normal: DVec3::ZERO, offset: -1.0 },
+            axes: [DVec3::ZERO; 2],
             centre,
             radius: corners.iter().map(|c| c.distance(centre)).fold(0.0, f64::max),
             area: 0.0,

@@ -15,4 +15,4 @@ pub use grow::{Frontier, Hierarchy, Judge, Judgement, Verdict, Work, grow, resum
 pub use hash::{PairHash, pair_key};
 pub use judge::{Placed, Stage};
 pub use oracle::{Oracle, Side};
-pub use tree::{CullReason, Pair, PairId, PairTree, State};
+pub use tree::{CullReason, Gradients, Pair, PairId, PairTree, State};

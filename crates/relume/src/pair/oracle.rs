@@ -1,6 +1,6 @@
 //! Oracles: whether a pair of elements is good enough as a link, and if not which side to refine.
 
-use crate::transport::{Exchange, Visibility};
+use crate::transport::{Exchange, Variation, Visibility};
 
 use super::brightness::Light;
 
@@ -37,8 +37,9 @@ pub(super) struct End {
     pub(super) light: Light,
 }
 
-/// Share of a source's reflected radiosity by which it may vary over a coarse element.
-const SOURCE_VARIATION: f64 = 0.3;
+/// Share of a source's reflected radiosity by which it may vary over a reference-sized element
+/// beyond its gradient.
+const SOURCE_VARIATION: f64 = 0.1;
 
 /// Errors of a link, each relative to its threshold's unit.
 #[derive(Clone, Copy, Debug)]
@@ -56,13 +57,17 @@ impl Estimate {
     }
 }
 
-/// The errors that a link of constant exchange and visibility makes on both its receivers.
+/// Share of the variation of visibility over an end that a straight line does not catch.
+const EDGE: f64 = 0.5;
+
+/// The errors that a link makes on both its receivers.
 ///
-/// The irradiance on a from b is B_b X V / A_a. It errs by (1) its variation over the receiver, of
-/// the kernel and of the visibility; (2) the variation of the source's reflected radiosity, as far
-/// as the kernel weighs it unevenly; (3) the sampling of V. All three are standard deviations and
-/// add in quadrature. Small receivers weigh by the root of their area: equal shares of the total
-/// squared error.
+/// The irradiance on a from b is B_b X V / A_a, with a gradient over a and one over b. It errs by
+/// (1) what the gradient does not catch of its variation over the receiver, of the kernel and of
+/// the visibility; (2) the variation of the source's reflected radiosity beyond its gradient, as
+/// far as the kernel weighs it unevenly; (3) the sampling of V. All three are standard deviations
+/// and add in quadrature. Small receivers weigh by the root of their area: equal shares of the
+/// total squared error.
 pub(super) fn estimate(
     x: &Exchange,
     v: &Visibility,
@@ -74,10 +79,12 @@ pub(super) fn estimate(
     } else {
         ((v.value * (1.0 - v.value) + 0.02) / f64::from(v.segments)).sqrt()
     };
-    let uneven_a = (v.value * x.spread_a).hypot(v.spread_a);
-    let uneven_b = (v.value * x.spread_b).hypot(v.spread_b);
-    let (on_a, by_a, by_b) = one_way(x.area_m2, a, b, (uneven_a, uneven_b, noise), reference_area);
-    let (on_b, cy_b, cy_a) = one_way(x.area_m2, b, a, (uneven_b, uneven_a, noise), reference_area);
+    let receives = |over: &Variation, spread: f64| (v.value * over.bend).hypot(EDGE * spread);
+    let sends = |over: &Variation, spread: f64| (v.value * (over.slope + over.bend)).hypot(spread);
+    let (ra, rb) = (receives(&x.over_a, v.spread_a), receives(&x.over_b, v.spread_b));
+    let (sa, sb) = (sends(&x.over_a, v.spread_a), sends(&x.over_b, v.spread_b));
+    let (on_a, by_a, by_b) = one_way(x.area_m2, a, b, (ra, sb, noise), reference_area);
+    let (on_b, cy_b, cy_a) = one_way(x.area_m2, b, a, (rb, sa, noise), reference_area);
     Estimate { error: on_a.max(on_b), mends: (by_a + cy_a, by_b + cy_b) }
 }
 
@@ -94,7 +101,7 @@ fn one_way(
     }
     let weight = (receiver.area / reference_area).sqrt() / receiver.light.irradiance;
     let per_radiosity = x / receiver.area * weight;
-    let varies = SOURCE_VARIATION * (source.area / reference_area).sqrt().min(1.0);
+    let varies = SOURCE_VARIATION * (source.area / reference_area).min(4.0);
     let by_receiver = per_radiosity * source.light.radiosity * uneven_receiver;
     let by_source = per_radiosity * source.light.reflected * varies * uneven_source;
     let by_noise = per_radiosity * source.light.radiosity * noise;

@@ -1,5 +1,7 @@
 //! The tree of unordered element pairs.
 
+use glam::DVec2;
+
 use crate::element::ElementId;
 
 /// Index of a [`Pair`] in a [`PairTree`].
@@ -28,7 +30,30 @@ pub enum State {
     Culled(CullReason),
 }
 
-/// A node of the pair tree: 28 bytes.
+/// Relative gradients of what arrives over both ends of a pair, in their patches' frames, times the
+/// ends' radii; in steps of 1/4096, at most 8.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Gradients {
+    /// Over the first end.
+    pub over_a: [i16; 2],
+    /// Over the second end.
+    pub over_b: [i16; 2],
+}
+
+impl Gradients {
+    /// Steps in one.
+    pub const STEPS: f32 = 4096.0;
+
+    /// From relative gradients (1/m) and radii (m) of both ends.
+    pub fn new((a, radius_a): (DVec2, f64), (b, radius_b): (DVec2, f64)) -> Gradients {
+        let steps = |g: DVec2, r: f64| {
+            [g.x, g.y].map(|v| (v * r * f64::from(Gradients::STEPS)).round() as i16)
+        };
+        Gradients { over_a: steps(a, radius_a), over_b: steps(b, radius_b) }
+    }
+}
+
+/// A node of the pair tree: 36 bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair {
     /// First end.
@@ -39,6 +64,8 @@ pub struct Pair {
     pub exchange_area_m2: f32,
     /// Visibility V of an active (or coarse) pair, in [0, 1].
     pub visibility: f32,
+    /// How what arrives varies over the ends of an active (or coarse) pair.
+    pub gradients: Gradients,
     first_child: u32,
     child_count: u32,
     /// Link, refined or culled.
@@ -126,6 +153,7 @@ fn unjudged(a: ElementId, b: ElementId) -> Pair {
         b,
         exchange_area_m2: 0.0,
         visibility: 0.0,
+        gradients: Gradients::default(),
         first_child: 0,
         child_count: 0,
         state: State::Culled(CullReason::FacingAway),

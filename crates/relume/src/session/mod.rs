@@ -197,6 +197,24 @@ impl Session {
         snapshot::take(&self.scene, &self.forest, solved)
     }
 
+    /// The pair tree of the present solution, with the forest its elements are in.
+    ///
+    /// # Panics
+    /// Before the first [`Session::step`].
+    pub fn pairs(&self) -> (&PairTree, &Forest) {
+        let solved = self.solved.as_ref().expect("a step comes before a look at the pairs");
+        (&solved.tree, &self.forest)
+    }
+
+    /// Sum of the form factors from a leaf element; 1 in a closed scene, up to the links' errors.
+    ///
+    /// # Panics
+    /// Before the first [`Session::step`].
+    pub fn row_sum(&self, leaf: crate::element::ElementId) -> f64 {
+        let solved = self.solved.as_ref().expect("a step comes before a look at the rows");
+        f64::from(solved.radiosity.row_sum(leaf.0))
+    }
+
     /// Bytes that the engine's structures hold now.
     pub fn memory_bytes(&self) -> u64 {
         let solved = self.solved.as_ref().map_or(0, |s| {

@@ -5,13 +5,14 @@ use std::ops::Range;
 use crate::element::{ElementId, Forest, Kind};
 use crate::pair::Pair;
 use crate::scene::Scene;
-use crate::solver::{Links, LinksBuilder, Lit, Surfaces};
+use crate::solver::{Link, Links, LinksBuilder, Lit, Place, Surfaces};
 
 /// A forest with its materials.
 pub(super) struct LitForest<'a> {
     forest: &'a Forest,
     patch_lit: Vec<Lit>,
     lights: Vec<Lit>,
+    places: Vec<Place>,
 }
 
 impl<'a> LitForest<'a> {
@@ -34,7 +35,21 @@ impl<'a> LitForest<'a> {
             forest,
             patch_lit: scene.patches.iter().map(of_patch).collect(),
             lights: scene.lights.iter().map(of_light).collect(),
+            places: (0..forest.len() as u32).map(|id| place_of(forest, ElementId(id))).collect(),
         }
+    }
+}
+
+fn place_of(forest: &Forest, id: ElementId) -> Place {
+    if forest.kind(id) != Kind::Element {
+        return Place { centroid: [0.0; 2], radius: 1.0, moment: [1.0, 0.0, 1.0] };
+    }
+    let shape = forest.shape(id);
+    let centroid = shape.centroid();
+    Place {
+        centroid: [centroid.x as f32, centroid.y as f32],
+        radius: shape.radius() as f32,
+        moment: shape.second_moment().map(|m| m as f32),
     }
 }
 
@@ -56,6 +71,10 @@ impl Surfaces for LitForest<'_> {
 
     fn area_m2(&self, id: u32) -> f64 {
         self.forest.area_m2(ElementId(id))
+    }
+
+    fn place(&self, id: u32) -> Place {
+        self.places[id as usize]
     }
 
     fn lit(&self, id: u32) -> Option<&Lit> {
@@ -89,9 +108,13 @@ pub(super) fn links_of<'a>(
     builder.fill(|add| {
         for pair in pairs.filter(carries) {
             let exchange = pair.exchange_area_m2 * pair.visibility;
-            for (receiver, source) in [(pair.a, pair.b), (pair.b, pair.a)] {
+            let g = &pair.gradients;
+            let ends = [(pair.a, pair.b, g.over_a, g.over_b), (pair.b, pair.a, g.over_b, g.over_a)];
+            for (receiver, source, over_receiver, over_source) in ends {
                 if receives(receiver) {
-                    add(receiver.0, source.0, exchange / forest.area_m2(receiver) as f32);
+                    let coupling = exchange / forest.area_m2(receiver) as f32;
+                    let source = source.0;
+                    add(receiver.0, Link { source, coupling, over_receiver, over_source });
                 }
             }
         }

@@ -5,5 +5,5 @@
 mod links;
 mod radiosity;
 
-pub use links::{Links, LinksBuilder};
-pub use radiosity::{Lit, Radiosity, Stop, Surfaces};
+pub use links::{Link, Links, LinksBuilder};
+pub use radiosity::{Linear, Lit, Place, Radiosity, Stop, Surfaces};

@@ -4,9 +4,9 @@
 //! closed form from points of the smaller side to the whole of the larger, both clipped to where
 //! they face each other. Derivation and measured errors: docs/exchange.md.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
-use super::kernel::{KernelGrid, Simd, kernel_grid};
+use super::kernel::{GaussPoints, Simd, kernel_grid};
 use super::point::form_factor_from_point;
 use crate::element::{WorldElement, WorldLight, bilinear};
 use crate::geometry::ConvexPolygon;
@@ -23,15 +23,26 @@ pub enum Meeting {
     Cut,
 }
 
+/// How what arrives on one end varies over it, relative to its mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Variation {
+    /// Relative gradient in the patch's frame, 1/m.
+    pub gradient: DVec2,
+    /// Standard deviation of the linear part, relative to the mean.
+    pub slope: f64,
+    /// Standard deviation of what the linear part leaves over, relative to the mean: an estimate.
+    pub bend: f64,
+}
+
 /// The exchange of a pair with how unevenly it falls on both ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exchange {
     /// Exchange area without occlusion, m2.
     pub area_m2: f64,
-    /// Standard deviation over the first end of what arrives there, relative to its mean.
-    pub spread_a: f64,
-    /// The same over the second end.
-    pub spread_b: f64,
+    /// How it varies over the first end.
+    pub over_a: Variation,
+    /// How it varies over the second end.
+    pub over_b: Variation,
 }
 
 /// How two elements face each other; corners within rounding of a plane count as on it.
@@ -54,35 +65,76 @@ const NEAR: f64 = 0.12;
 
 /// Exchange area of two elements that meet as `meeting` says, not [`Meeting::Away`].
 ///
-/// Error: below 0.25 % of the exchange area at worst, 0.05 % typically (see the tests, which sweep decades of distance and
-/// size). Symmetric: both directions of a pair use this one number.
+/// Error: below 0.25 % of the exchange area at worst, 0.05 % typically (see the tests, which sweep
+/// decades of distance and size). Symmetric: both directions of a pair use this one number.
 pub fn exchange(simd: Simd, a: &WorldElement, b: &WorldElement, meeting: Meeting) -> Exchange {
-    let grid = kernel_grid(simd, a, b);
     let reach = a.radius + b.radius;
     let near = reach * reach > NEAR * (b.centre - a.centre).length_squared();
-    let area_m2 = if near || meeting == Meeting::Cut {
-        near_exchange(a, b)
-    } else {
-        a.area * b.area * grid.mean
+    if near || meeting == Meeting::Cut {
+        return near_exchange(a, b);
+    }
+    let grid = kernel_grid(simd, a, b);
+    let area_m2 = a.area * b.area * grid.mean;
+    let over = |e: &WorldElement, points: &GaussPoints, values: &[f64; 4]| {
+        let mut fit = Fit::default();
+        for k in 0..4 {
+            fit.add(e.offset(points.point(k)), points.share[k], values[k]);
+        }
+        fit.variation()
     };
-    let (spread_a, spread_b) = spreads(&grid);
-    Exchange { area_m2, spread_a, spread_b }
+    Exchange {
+        area_m2,
+        over_a: over(a, &grid.points.0, &grid.from_a),
+        over_b: over(b, &grid.points.1, &grid.from_b),
+    }
 }
 
-fn spreads(grid: &KernelGrid) -> (f64, f64) {
-    if grid.mean <= 0.0 {
-        // Nothing at the sample points, but something elsewhere: as uneven as can be.
-        return (1.0, 1.0);
+/// A weighted linear least-squares fit over points of an element.
+#[derive(Clone, Copy, Debug, Default)]
+struct Fit {
+    weight: f64,
+    value: f64,
+    value2: f64,
+    at: DVec2,
+    at_value: DVec2,
+    xx: f64,
+    xy: f64,
+    yy: f64,
+}
+
+/// Second-order variation of the kernel over first-order variation squared: 1/r^n falls by n d to
+/// first order in the relative distance d and by n (n + 1) d^2 / 2 to second.
+const CURVATURE: f64 = 0.4;
+
+impl Fit {
+    #[inline]
+    fn add(&mut self, x: DVec2, weight: f64, value: f64) {
+        self.weight += weight;
+        self.value += weight * value;
+        self.value2 += weight * value * value;
+        self.at += x * weight;
+        self.at_value += x * (weight * value);
+        self.xx += weight * x.x * x.x;
+        self.xy += weight * x.x * x.y;
+        self.yy += weight * x.y * x.y;
     }
-    let spread = |values: &[f64; 4], shares: &[f64; 4]| {
-        let mut sum = 0.0;
-        for k in 0..4 {
-            let off = values[k] - grid.mean;
-            sum += shares[k] * off * off;
+
+    fn variation(&self) -> Variation {
+        if self.value <= 0.0 {
+            // Nothing at the sample points, but something elsewhere: as uneven as can be.
+            return Variation { gradient: DVec2::ZERO, slope: 0.0, bend: 1.0 };
         }
-        sum.sqrt() / grid.mean
-    };
-    (spread(&grid.from_a, &grid.share_a), spread(&grid.from_b, &grid.share_b))
+        let (w, mean, at) = (self.weight, self.value / self.weight, self.at / self.weight);
+        let (xx, xy, yy) =
+            (self.xx / w - at.x * at.x, self.xy / w - at.x * at.y, self.yy / w - at.y * at.y);
+        let r = self.at_value / w - at * mean;
+        let det = (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
+        let gradient = DVec2::new(r.x * yy - r.y * xy, r.y * xx - r.x * xy) / (det * mean);
+        let explained = (gradient.dot(r) / mean).max(0.0);
+        let total = (self.value2 / w / (mean * mean) - 1.0).max(0.0);
+        let rest = (total - explained).max(0.0).sqrt();
+        Variation { gradient, slope: explained.sqrt(), bend: rest + CURVATURE * explained }
+    }
 }
 
 /// Points and weights of Gauss-Legendre on [0, 1] with four points.
@@ -93,22 +145,45 @@ const G4: [(f64, f64); 4] = [
     (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
 ];
 
-/// The closed form from 4 x 4 Gauss points of the smaller side to the larger, in m2.
-fn near_exchange(a: &WorldElement, b: &WorldElement) -> f64 {
+/// The closed form from points of each side to the whole of the other; the area from the smaller.
+fn near_exchange(a: &WorldElement, b: &WorldElement) -> Exchange {
     let slack = a.rounding_m + b.rounding_m;
-    let (small, large) = if a.area <= b.area { (a, b) } else { (b, a) };
-    let seen = ConvexPolygon::new(&large.corners[..large.len]).clipped(&small.plane, slack);
-    let facing = ConvexPolygon::new(&small.corners[..small.len]).clipped(&large.plane, slack);
-    if seen.corners().len() < 3 || facing.corners().len() < 3 {
-        return 0.0;
+    let part =
+        |e: &WorldElement, plane| ConvexPolygon::new(&e.corners[..e.len]).clipped(plane, slack);
+    let (of_a, of_b) = (part(a, &b.plane), part(b, &a.plane));
+    if of_a.corners().len() < 3 || of_b.corners().len() < 3 {
+        let none = Variation::default();
+        return Exchange { area_m2: 0.0, over_a: none, over_b: none };
     }
-    let normal = small.plane.normal;
-    let c = facing.corners();
+    let (from_a, over_a) = integrate_polygon(a, &of_a, of_b.corners());
+    let (from_b, over_b) = integrate_polygon(b, &of_b, of_a.corners());
+    Exchange { area_m2: if a.area <= b.area { from_a } else { from_b }, over_a, over_b }
+}
+
+/// Integral over `part` of `e` of the form factor to `seen`, m2, and its variation over `e`.
+fn integrate_polygon(e: &WorldElement, part: &ConvexPolygon, seen: &[DVec3]) -> (f64, Variation) {
+    let normal = e.plane.normal;
+    let c = part.corners();
+    let mut fit = Fit::default();
+    let mut sum = 0.0;
     if c.len() == 4 {
-        return integrate([c[0], c[1], c[2], c[3]], normal, seen.corners(), DEPTH);
+        sum = integrate([c[0], c[1], c[2], c[3]], e, normal, seen, DEPTH, &mut fit);
+    } else {
+        for k in 1..c.len() - 1 {
+            let fan = [c[0], c[k], c[k + 1], c[k + 1]];
+            sum += integrate(fan, e, normal, seen, DEPTH, &mut fit);
+        }
     }
-    let fan = (1..c.len() - 1).map(|k| [c[0], c[k], c[k + 1], c[k + 1]]);
-    fan.map(|quad| integrate(quad, normal, seen.corners(), DEPTH)).sum()
+    let whole = part.area() >= 0.999 * e.area;
+    let variation = fit.variation();
+    // Where the other's plane cuts the element, a straight line does not fit what arrives.
+    (
+        sum,
+        Variation {
+            bend: if whole { variation.bend } else { variation.bend.max(1.0) },
+            ..variation
+        },
+    )
 }
 
 /// Range of form factors over a quadrilateral above which it is integrated in four parts.
@@ -116,15 +191,25 @@ const STEEP: f64 = 0.5;
 
 /// Integral over a quadrilateral of the form factor from its points to `seen`, m2; in up to 64
 /// parts where the two nearly touch.
-fn integrate(quad: [DVec3; 4], normal: DVec3, seen: &[DVec3], depth: u32) -> f64 {
+fn integrate(
+    quad: [DVec3; 4],
+    e: &WorldElement,
+    normal: DVec3,
+    seen: &[DVec3],
+    depth: u32,
+    fit: &mut Fit,
+) -> f64 {
     let mut sum = 0.0;
+    let before = *fit;
     let (mut lo, mut hi) = (f64::INFINITY, 0.0_f64);
     for (s, ws) in G4 {
         for (t, wt) in G4 {
             let ds = (quad[1] - quad[0]) * (1.0 - t) + (quad[2] - quad[3]) * t;
             let dt = (quad[3] - quad[0]) * (1.0 - s) + (quad[2] - quad[1]) * s;
             let weight = ws * wt * ds.cross(dt).dot(normal);
-            let f = form_factor_from_point(bilinear(&quad, s, t), normal, seen);
+            let point = bilinear(&quad, s, t);
+            let f = form_factor_from_point(point, normal, seen);
+            fit.add(e.offset(point), weight, f);
             (lo, hi) = (lo.min(f), hi.max(f));
             sum += weight * f;
         }
@@ -132,11 +217,12 @@ fn integrate(quad: [DVec3; 4], normal: DVec3, seen: &[DVec3], depth: u32) -> f64
     if hi - lo <= STEEP || depth == 0 {
         return sum;
     }
+    *fit = before;
     let at = |s: f64, t: f64| bilinear(&quad, s, t);
     let part = |s: f64, t: f64| [at(s, t), at(s + 0.5, t), at(s + 0.5, t + 0.5), at(s, t + 0.5)];
     [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)]
         .into_iter()
-        .map(|(s, t)| integrate(part(s, t), normal, seen, depth - 1))
+        .map(|(s, t)| integrate(part(s, t), e, normal, seen, depth - 1, fit))
         .sum()
 }
 
@@ -145,29 +231,23 @@ const DEPTH: u32 = 3;
 
 /// "Exchange area" of a punctual light and an element: the integral over the element of
 /// cos / r^2 (point and spot, with the cone's falloff; sr) or of cos (directional; m2), so that
-/// irradiance = intensity x exchange / area. `spread_b` is the element's; the light's is 0.
+/// irradiance = intensity x exchange / area. `over_a` is the element's; the light's is nothing.
 ///
 /// Error: 4 x 4 Gauss points; uneven elements are refined by the oracle.
 pub fn light_exchange(light: &WorldLight, e: &WorldElement) -> Exchange {
-    let (mut sum, mut sum2, mut area) = (0.0, 0.0, 0.0);
+    let mut fit = Fit::default();
     for (s, ws) in G4 {
         for (t, wt) in G4 {
             let c = &e.corners;
             let ds = (c[1] - c[0]) * (1.0 - t) + (c[2] - c[3]) * t;
             let dt = (c[3] - c[0]) * (1.0 - s) + (c[2] - c[1]) * s;
             let weight = ws * wt * ds.cross(dt).dot(e.plane.normal);
-            let value = light_at(light, e.point(s, t), e.plane.normal);
-            area += weight;
-            sum += weight * value;
-            sum2 += weight * value * value;
+            let point = e.point(s, t);
+            fit.add(e.offset(point), weight, light_at(light, point, e.plane.normal));
         }
     }
-    if sum <= 0.0 {
-        return Exchange { area_m2: 0.0, spread_a: 0.0, spread_b: 0.0 };
-    }
-    let mean = sum / area;
-    let variance = (sum2 / area - mean * mean).max(0.0);
-    Exchange { area_m2: sum, spread_a: 0.0, spread_b: variance.sqrt() / mean }
+    let over_a = if fit.value > 0.0 { fit.variation() } else { Variation::default() };
+    Exchange { area_m2: fit.value, over_a, over_b: Variation::default() }
 }
 
 /// Irradiance at a point with unit `normal` from a light of unit intensity, without occlusion.
@@ -200,7 +280,7 @@ fn falloff(cosine: f64, inner: f64, outer: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::geometry::{Aabb, Plane};
-    use glam::{DMat3, DVec2};
+    use glam::DMat3;
 
     fn quad(corners: [DVec3; 4]) -> WorldElement {
         let n = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
@@ -209,6 +289,10 @@ mod tests {
             corners,
             len: 4,
             plane: Plane::through(corners[0], n.normalize()),
+            axes: [
+                (corners[1] - corners[0]).normalize(),
+                n.normalize().cross((corners[1] - corners[0]).normalize()),
+            ],
             centre,
             radius: corners.iter().map(|c| c.distance(centre)).fold(0.0, f64::max),
             area: ConvexPolygon::new(&corners).area(),
@@ -249,7 +333,8 @@ mod tests {
                     let c = face.corners();
                     for k in 1..c.len() - 1 {
                         let tri = [c[0], c[k], c[k + 1], c[k + 1]];
-                        sum += integrate(tri, a.plane.normal, seen.corners(), 0);
+                        let fit = &mut Fit::default();
+                        sum += integrate(tri, a, a.plane.normal, seen.corners(), 0, fit);
                     }
                 }
             }

@@ -36,10 +36,14 @@ pub(super) struct GaussPoints {
     y: [f64; 4],
     z: [f64; 4],
     /// Shares of the area; they sum to 1.
-    share: [f64; 4],
+    pub(super) share: [f64; 4],
 }
 
 impl GaussPoints {
+    pub(super) fn point(&self, k: usize) -> DVec3 {
+        DVec3::new(self.x[k], self.y[k], self.z[k])
+    }
+
     pub(super) fn of(e: &WorldElement) -> GaussPoints {
         let mut out = GaussPoints { x: [0.0; 4], y: [0.0; 4], z: [0.0; 4], share: [0.25; 4] };
         let c = &e.corners;
@@ -74,20 +78,14 @@ pub(super) struct KernelGrid {
     pub(super) from_b: [f64; 4],
     /// Mean over all, 1/m2.
     pub(super) mean: f64,
-    pub(super) share_a: [f64; 4],
-    pub(super) share_b: [f64; 4],
+    /// Gauss points of both sides.
+    pub(super) points: (GaussPoints, GaussPoints),
 }
 
 /// cos cos / (pi r^2) at all 16 pairs of Gauss points; cosines below 0 count as 0.
 pub(super) fn kernel_grid(simd: Simd, a: &WorldElement, b: &WorldElement) -> KernelGrid {
     let (pa, pb) = (GaussPoints::of(a), GaussPoints::of(b));
-    let mut out = KernelGrid {
-        from_a: [0.0; 4],
-        from_b: [0.0; 4],
-        mean: 0.0,
-        share_a: pa.share,
-        share_b: pb.share,
-    };
+    let mut out = KernelGrid { from_a: [0.0; 4], from_b: [0.0; 4], mean: 0.0, points: (pa, pb) };
     let (na, nb) = (a.plane.normal, b.plane.normal);
     dispatch!(simd.level(), _simd => fill_grid(&pa, &pb, na, nb, &mut out));
     out

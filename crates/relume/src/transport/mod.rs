@@ -8,7 +8,7 @@ mod point;
 mod segments;
 mod visibility;
 
-pub use exchange::{Exchange, Meeting, exchange, light_at, light_exchange, meeting};
+pub use exchange::{Exchange, Meeting, Variation, exchange, light_at, light_exchange, meeting};
 pub use kernel::Simd;
 pub use point::form_factor_from_point;
 pub use segments::{SEGMENTS, SegmentBundle};

@@ -121,6 +121,13 @@ impl SegmentBundle {
         out
     }
 
+    /// Both ends of a segment.
+    #[inline]
+    pub fn ends(&self, k: usize) -> (DVec3, DVec3) {
+        let p = DVec3::new(self.px[k], self.py[k], self.pz[k]);
+        (p, p + DVec3::new(self.dx[k], self.dy[k], self.dz[k]))
+    }
+
     /// One bit for each segment that crosses the polygon, boundary included.
     ///
     /// A segment that comes no closer than `slack_m` to the other side of the plane does not

@@ -1,13 +1,13 @@
 //! Partial visibility of a pair: which bodies stand in its shaft, and which of its fixed
 //! segments they block.
 
-use crate::element::{ElementId, Forest, Kind, WorldElement, WorldView};
+use crate::element::{ElementId, Forest, Kind, Shape, WorldElement, WorldView};
 use crate::geometry::{Aabb, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
 use super::kernel::Simd;
 use super::segments::{SEGMENTS, SegmentBundle};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// Nodes of the forest's fixed part that may stand between the two ends of a pair: clusters and
 /// patch roots. Conservative: what is not below one of them blocks nothing.
@@ -18,6 +18,10 @@ pub type Candidates = [u32];
 pub struct Visibility {
     /// Unoccluded share, in [0, 1].
     pub value: f64,
+    /// What occlusion adds to the relative gradient of what arrives over the first end, 1/m.
+    pub gradient_a: DVec2,
+    /// The same over the second end.
+    pub gradient_b: DVec2,
     /// Standard deviation between the quadrants of the first end, absolute.
     pub spread_a: f64,
     /// Standard deviation between the quadrants of the second end, absolute.
@@ -28,8 +32,14 @@ pub struct Visibility {
 
 impl Visibility {
     /// Nothing in the way.
-    pub const CLEAR: Visibility =
-        Visibility { value: 1.0, spread_a: 0.0, spread_b: 0.0, segments: 0 };
+    pub const CLEAR: Visibility = Visibility {
+        value: 1.0,
+        gradient_a: DVec2::ZERO,
+        gradient_b: DVec2::ZERO,
+        spread_a: 0.0,
+        spread_b: 0.0,
+        segments: 0,
+    };
 }
 
 /// A pair placed for visibility queries.
@@ -152,19 +162,20 @@ pub fn visibility(
     if candidates.is_empty() {
         return Visibility::CLEAR;
     }
+    let (a, b) = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
     let mut tally = Tally::default();
     for block in 0..(1_u32 << log2_count) / SEGMENTS as u32 {
         let world = SegmentBundle::new(shaft.a, shaft.b, key, log2_count, block);
         let own = shaft.own.map(|(_, a, b)| SegmentBundle::new(a, b, key, log2_count, block));
         let mask = shaft.blocked(simd, candidates, &world, own.as_ref());
         // Weights from the body's frame where there is one: they must not follow its motion.
-        tally.add(own.as_ref().unwrap_or(&world), mask);
+        tally.add(own.as_ref().unwrap_or(&world), mask, a, b);
     }
-    tally.finish(1 << log2_count)
+    tally.finish(1 << log2_count, a, b)
 }
 
-/// Visibility of a punctual light from an element; `segments` come from
-/// [`SegmentBundle::to_light`].
+/// Visibility of a punctual light (the second end of the shaft) from an element; `segments` come
+/// from [`SegmentBundle::to_light`].
 pub fn light_visibility(
     simd: Simd,
     shaft: &Shaft<'_>,
@@ -175,50 +186,83 @@ pub fn light_visibility(
         return Visibility::CLEAR;
     }
     let mut tally = Tally::default();
-    tally.add(segments, shaft.blocked(simd, candidates, segments, None));
-    tally.finish(SEGMENTS as u32)
+    tally.add(segments, shaft.blocked(simd, candidates, segments, None), shaft.a, shaft.a);
+    let both = tally.finish(SEGMENTS as u32, shaft.a, shaft.a);
+    Visibility { gradient_b: DVec2::ZERO, spread_b: 0.0, ..both }
+}
+
+/// Weighted sums over segments, of all and of the clear ones.
+#[derive(Default)]
+struct Tally {
+    a: SideTally,
+    b: SideTally,
 }
 
 #[derive(Default)]
-struct Tally {
-    total_a: [f64; 4],
-    clear_a: [f64; 4],
-    total_b: [f64; 4],
-    clear_b: [f64; 4],
+struct SideTally {
+    total: [f64; 4],
+    clear: [f64; 4],
+    moment: DVec2,
+    clear_moment: DVec2,
+}
+
+impl SideTally {
+    fn add(&mut self, quadrant: u8, at: DVec2, weight: f64, clear: f64) {
+        self.total[quadrant as usize] += weight;
+        self.clear[quadrant as usize] += clear;
+        self.moment += at * weight;
+        self.clear_moment += at * clear;
+    }
+
+    /// What occlusion adds to the relative gradient: the shift of the centre of what arrives,
+    /// against the element's own second moment.
+    fn gradient(&self, e: &WorldElement) -> DVec2 {
+        let (total, clear): (f64, f64) = (self.total.iter().sum(), self.clear.iter().sum());
+        if clear <= 0.0 {
+            return DVec2::ZERO;
+        }
+        let shift = self.clear_moment / clear - self.moment / total;
+        let corners = e.corners.map(|c| e.offset(c));
+        let [xx, xy, yy] = Shape { corners, len: e.len }.second_moment();
+        let det = (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
+        DVec2::new(shift.x * yy - shift.y * xy, shift.y * xx - shift.x * xy) / det
+    }
+
+    fn spread(&self, value: f64) -> f64 {
+        let total: f64 = self.total.iter().sum();
+        let mut sum = 0.0;
+        for q in 0..4 {
+            if self.total[q] > 0.0 {
+                let off = self.clear[q] / self.total[q] - value;
+                sum += self.total[q] / total * off * off;
+            }
+        }
+        sum.sqrt()
+    }
 }
 
 impl Tally {
-    fn add(&mut self, bundle: &SegmentBundle, mask: u16) {
+    fn add(&mut self, bundle: &SegmentBundle, mask: u16, a: &WorldElement, b: &WorldElement) {
         let dark = bundle.weight.iter().all(|&w| w <= 0.0);
         for k in 0..SEGMENTS {
             // A pair that hardly faces itself has no weights: all segments count alike.
             let weight = if dark { f64::MIN_POSITIVE } else { bundle.weight[k] };
             let clear = if mask >> k & 1 == 1 { 0.0 } else { weight };
-            let (qa, qb) = (bundle.quadrant_a[k] as usize, bundle.quadrant_b[k] as usize);
-            self.total_a[qa] += weight;
-            self.clear_a[qa] += clear;
-            self.total_b[qb] += weight;
-            self.clear_b[qb] += clear;
+            let (p, q) = bundle.ends(k);
+            self.a.add(bundle.quadrant_a[k], a.offset(p), weight, clear);
+            self.b.add(bundle.quadrant_b[k], b.offset(q), weight, clear);
         }
     }
 
-    fn finish(&self, segments: u32) -> Visibility {
-        let total: f64 = self.total_a.iter().sum();
-        let value = (self.clear_a.iter().sum::<f64>() / total).clamp(0.0, 1.0);
-        let spread = |clear: &[f64; 4], totals: &[f64; 4]| {
-            let mut sum = 0.0;
-            for q in 0..4 {
-                if totals[q] > 0.0 {
-                    let off = clear[q] / totals[q] - value;
-                    sum += totals[q] / total * off * off;
-                }
-            }
-            sum.sqrt()
-        };
+    fn finish(&self, segments: u32, a: &WorldElement, b: &WorldElement) -> Visibility {
+        let (total, clear): (f64, f64) = (self.a.total.iter().sum(), self.a.clear.iter().sum());
+        let value = (clear / total).clamp(0.0, 1.0);
         Visibility {
             value,
-            spread_a: spread(&self.clear_a, &self.total_a),
-            spread_b: spread(&self.clear_b, &self.total_b),
+            gradient_a: self.a.gradient(a),
+            gradient_b: self.b.gradient(b),
+            spread_a: self.a.spread(value),
+            spread_b: self.b.spread(value),
             segments,
         }
     }

@@ -25,7 +25,8 @@ const SUN_HIGH: f64 = 1.4e4;
 /// | code | severity | what |
 /// |---|---|---|
 /// | `nothing-emits` | error | no emitting surface and no light |
-/// | `open-enclosure` | warning, info | sides on which only one polygon ends |
+/// | `open-enclosure` | warning, info | gaps in what encloses the scene; nothing encloses it |
+/// | `open-object` | info | an object within it that is not closed |
 /// | `flipped-normals` | warning | neighbours that face opposite ways; closed objects inside out |
 /// | `duplicate` | warning | polygons that coincide |
 /// | `reflectance` | warning | a reflectance of 0.95 or more |

@@ -41,6 +41,11 @@ impl Part {
         self.bounds.0.distance(self.bounds.1)
     }
 
+    /// Whether the bounds of another part, or its own, lie within its bounds.
+    fn spans(&self, other: &Part) -> bool {
+        other.bounds.0.cmpge(self.bounds.0).all() && other.bounds.1.cmple(self.bounds.1).all()
+    }
+
     fn contains(&self, p: DVec3) -> bool {
         p.cmpgt(self.bounds.0).all() && p.cmplt(self.bounds.1).all()
     }
@@ -102,21 +107,32 @@ fn open(scene: &Scene, topology: &Topology, parts: &[Part], notes: &mut Vec<Note
                 topology.points[side.start as usize].distance(topology.points[side.end as usize]);
         }
     }
+    let gaps = free.keys().any(|&(_, enclosure)| enclosure);
     for ((object, enclosure), (count, length)) in free {
-        let (severity, what) = match enclosure {
+        let (severity, code, what) = match enclosure {
             true => (
                 Severity::Warning,
+                "open-enclosure",
                 "light escapes there into black surroundings; close the gap unless it is meant",
             ),
             false => (
                 Severity::Info,
-                "the object is not closed; its back faces are black and block light",
+                "open-object",
+                "the object is not closed; close it if its back faces (black, blocking light) can be seen",
             ),
         };
         let message = format!(
             "{count} free sides, {length:.4} m in all, where no other polygon joins: {what}"
         );
-        notes.push(note(severity, "open-enclosure", object, count, message));
+        notes.push(note(severity, code, object, count, message));
+    }
+    let around_all = |p: &Part| parts.iter().all(|q| p.spans(q));
+    if !gaps
+        && !parts.iter().any(|p| p.closed() && around_all(p) && (parts.len() > 1 || p.volume < 0.0))
+    {
+        let message = "nothing encloses the scene: light that leaves it is lost in black surroundings; \
+                       put it in a closed room if that is not meant";
+        notes.push(note(Severity::Info, "open-enclosure", &scene.name, 1, message.to_owned()));
     }
 }
 

@@ -109,6 +109,26 @@ fn an_open_room_is_named_with_its_free_sides() {
 }
 
 #[test]
+fn objects_in_the_open_and_open_objects_are_worth_knowing() {
+    let mut b = SceneBuilder::new("space");
+    let m = b.material("m", [0.5; 3], [1.0; 3]);
+    let n = b.node("probe", None, O, DQuat::IDENTITY);
+    b.cuboid(n, "probe", m, O, I);
+    assert_eq!(
+        found(&check(&b.build().unwrap()), "open-enclosure"),
+        [(Severity::Info, "space".into(), 1)]
+    );
+    let lidless = notes(|b, _, grey| {
+        let n = b.node("bin", None, O, DQuat::IDENTITY);
+        for side in &super::super::builder::cuboid_sides(I * 0.5, I * 0.7)[..5] {
+            b.polygon(n, "bin", grey, side);
+        }
+    });
+    assert_eq!(lidless.len(), 1);
+    assert_eq!(found(&lidless, "open-object"), [(Severity::Info, "bin".into(), 4)]);
+}
+
+#[test]
 fn flipped_polygons_and_objects_are_found() {
     let one = notes(|b, _, grey| {
         let n = b.node("patched", None, O, DQuat::IDENTITY);

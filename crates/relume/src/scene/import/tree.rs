@@ -160,7 +160,9 @@ impl Tree<'_> {
             self.note(Severity::Warning, "instancing", index, message.to_owned());
         }
         let morphed = |m: &json::Mesh| m.primitives.iter().any(|p| !p.targets.is_empty());
-        if self.document.root.meshes.get(mesh).is_some_and(morphed) {
+        let name = node_name(self.document, index);
+        let noted = self.draft.notes.iter().any(|n| n.code == "morph" && n.subject == name);
+        if self.document.root.meshes.get(mesh).is_some_and(morphed) && !noted {
             let message =
                 "its morph targets are ignored: the mesh is read in its base shape".to_owned();
             self.note(Severity::Warning, "morph", index, message);
@@ -201,7 +203,7 @@ impl Tree<'_> {
         } else {
             let (count, rho) = (self.without_material, material::REFLECTANCE_MAX);
             let message = format!(
-                "{count} surfaces have no material; they get reflectance {rho}: give them one"
+                "surfaces without a material: {count}; they get reflectance {rho}: give them one"
             );
             self.draft.notes.push(note(
                 Severity::Warning,

@@ -25,7 +25,6 @@ impl Plane {
     }
 }
 
-/// Corners a [`ConvexPolygon`] has room for: a quadrilateral cut by a dozen planes.
 const ROOM: usize = 16;
 
 /// A convex planar polygon in space with up to 16 corners, on the stack.
@@ -36,6 +35,12 @@ pub struct ConvexPolygon {
 }
 
 impl ConvexPolygon {
+    /// Corners there is room for: a quadrilateral cut by a dozen planes.
+    pub const ROOM: usize = ROOM;
+
+    /// Corners a polygon may start with, so that it can still be cut.
+    pub const START_MAX: usize = 12;
+
     /// A polygon from its corners in order.
     ///
     /// # Panics
@@ -67,6 +72,33 @@ impl ConvexPolygon {
             }
         }
         out
+    }
+
+    /// The parts in front of and behind `plane`; either may be empty.
+    pub fn split(&self, plane: &Plane) -> (ConvexPolygon, ConvexPolygon) {
+        let none = ConvexPolygon { corners: [DVec3::ZERO; ROOM], len: 0 };
+        let (mut front, mut back) = (none, none);
+        if self.len < 3 {
+            return (front, back);
+        }
+        let mut p = self.corners[self.len - 1];
+        let mut dp = plane.distance(p);
+        for &q in self.corners() {
+            let dq = plane.distance(q);
+            if (dp > 0.0 && dq < 0.0) || (dp < 0.0 && dq > 0.0) {
+                let x = p + (q - p) * (dp / (dp - dq));
+                front.push(x);
+                back.push(x);
+            }
+            if dq >= 0.0 {
+                front.push(q);
+            }
+            if dq <= 0.0 {
+                back.push(q);
+            }
+            (p, dp) = (q, dq);
+        }
+        (front, back)
     }
 
     fn push(&mut self, p: DVec3) {

@@ -8,8 +8,8 @@ use crate::element::{ElementId, Forest, Kind, WorldElement, WorldLight, WorldVie
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
 use crate::scene::LightKind;
 use crate::transport::{
-    Exchange, Meeting, SegmentBundle, Shaft, Simd, Visibility, exchange, light_at, light_exchange,
-    light_visibility, meeting, visibility,
+    Exchange, Meeting, SEGMENTS, SegmentBundle, Shaft, Simd, Visibility, exact_visibility,
+    exchange, light_at, light_exchange, light_visibility, meeting, visibility,
 };
 
 use super::brightness::Brightness;
@@ -229,7 +229,8 @@ impl Placed<'_> {
                 return passing(Verdict::Refine(side), 0);
             }
         }
-        let v = visibility(self.simd, shaft, blockers, key, 4);
+        let v = exact_visibility(shaft, blockers)
+            .unwrap_or_else(|| visibility(self.simd, shaft, blockers, key, 4));
         let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
         else {
             let verdict = match self.stage {
@@ -250,9 +251,9 @@ impl Placed<'_> {
         carrying(Verdict::Link, &x, &v, (place_a, place_b))
     }
 
-    /// A link that is partly blocked gets more segments.
+    /// A link whose segments are partly blocked gets more of them.
     fn settle(&self, v: Visibility, shaft: &Shaft<'_>, blockers: &[u32], key: u64) -> Visibility {
-        if v.value <= 0.0 || v.value >= 1.0 {
+        if v.segments < SEGMENTS as u32 || v.value <= 0.0 || v.value >= 1.0 {
             return v;
         }
         let fine = visibility(self.simd, shaft, blockers, key, 6);

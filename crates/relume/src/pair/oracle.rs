@@ -1,6 +1,6 @@
 //! Oracles: whether a pair of elements is good enough as a link, and if not which side to refine.
 
-use crate::transport::{Exchange, Variation, Visibility};
+use crate::transport::{Exchange, SEGMENTS, Variation, Visibility};
 
 use super::brightness::Light;
 
@@ -57,8 +57,12 @@ impl Estimate {
     }
 }
 
-/// Share of the variation of visibility over an end that a straight line does not catch.
-const EDGE: f64 = 0.5;
+/// Weight of the variation of visibility over an end: few of a receiver's links have an edge of a
+/// shadow within it, while all have a bend.
+const EDGE: f64 = 0.1;
+
+/// Weight of the sampling error of V: it is independent from link to link and averages out.
+const NOISE: f64 = 0.2;
 
 /// The errors that a link makes on both its receivers.
 ///
@@ -74,10 +78,11 @@ pub(super) fn estimate(
     (a, b): (&End, &End),
     reference_area: f64,
 ) -> Estimate {
-    let noise = if v.segments == 0 {
+    // Fewer than a bundle: clipped, without noise.
+    let noise = if v.segments < SEGMENTS as u32 {
         0.0
     } else {
-        ((v.value * (1.0 - v.value) + 0.02) / f64::from(v.segments)).sqrt()
+        ((v.value * (1.0 - v.value) + 0.02) / f64::from(v.segments)).sqrt() * NOISE
     };
     let receives = |over: &Variation, spread: f64| (v.value * over.bend).hypot(EDGE * spread);
     let sends = |over: &Variation, spread: f64| (v.value * (over.slope + over.bend)).hypot(spread);
@@ -102,7 +107,10 @@ fn one_way(
     let weight = (receiver.area / reference_area).sqrt() / receiver.light.irradiance;
     let per_radiosity = x / receiver.area * weight;
     let varies = SOURCE_VARIATION * (source.area / reference_area).min(4.0);
-    let by_receiver = per_radiosity * source.light.radiosity * uneven_receiver;
+    // What a small source does unevenly its neighbours do too, in the same sense: splitting the
+    // source does not mend it, so it counts as if the source were as large as the receiver.
+    let whole = if source.area > 0.0 { (receiver.area / source.area).max(1.0) } else { 1.0 };
+    let by_receiver = per_radiosity * source.light.radiosity * uneven_receiver * whole;
     let by_source = per_radiosity * source.light.reflected * varies * uneven_source;
     let by_noise = per_radiosity * source.light.radiosity * noise;
     let error = (by_receiver.powi(2) + by_source.powi(2) + by_noise.powi(2)).sqrt();

@@ -3,9 +3,8 @@
 use glam::DVec3;
 
 use crate::element::{ElementId, Forest, Kind, WorldElement};
-use crate::geometry::ConvexPolygon;
-use crate::geometry::Plane;
-use crate::transport::{form_factor_from_point, light_at, segment_is_clear};
+use crate::geometry::{Aabb, ConvexPolygon, Plane, shaft_meets_box};
+use crate::transport::{form_factor_from_point, light_at, segment_is_clear, visible_form_factor};
 
 use super::{Session, Solved};
 
@@ -13,8 +12,8 @@ impl Session {
     /// Irradiance at a point with a unit normal, W/m2, linear RGB: gathered from all elements and
     /// punctual lights, each with visibility of its own from this point.
     ///
-    /// Elements that are large as seen from the point are taken in parts; what one of them sends
-    /// errs by its radiosity's variation within the element.
+    /// Visibility is exact where no more than twelve polygons stand between the point and an
+    /// element; what an element sends errs by its radiosity's variation within it.
     ///
     /// # Panics
     /// Before the first [`Session::step`].
@@ -26,7 +25,7 @@ impl Session {
             let leaf = self.forest.children(element).is_empty();
             match self.forest.kind(element) {
                 Kind::Element if leaf => {
-                    let f = self.visible_form_factor(solved, element, point, normal);
+                    let f = self.from_element(solved, element, point, normal);
                     let b = solved.radiosity.radiosity(id);
                     (0..3).for_each(|c| sum[c] += f * f64::from(b[c]));
                 }
@@ -54,55 +53,102 @@ impl Session {
         self.scene.lights[index].intensity.map(|i| if clear { i * e } else { 0.0 })
     }
 
-    fn visible_form_factor(
-        &self,
-        solved: &Solved,
-        id: ElementId,
-        point: DVec3,
-        normal: DVec3,
-    ) -> f64 {
+    fn from_element(&self, solved: &Solved, id: ElementId, point: DVec3, normal: DVec3) -> f64 {
         let patch = self.forest.patch(id).expect("elements have patches");
-        if !solved.view.is_present(self.scene.patches[patch.0 as usize].body) {
-            return 0.0;
-        }
         let e = WorldElement::new(&solved.view, &self.forest, id, false);
-        if e.plane.distance(point) <= e.rounding_m {
+        let absent = !solved.view.is_present(solved.view.patch(patch).body);
+        if absent || e.plane.distance(point) <= e.rounding_m {
             return 0.0;
         }
-        self.visible_part(solved, &e.corners, &e.plane, point, normal, 0, patch)
+        let look = Look { solved, forest: &self.forest, point, normal, plane: e.plane };
+        look.at(&ConvexPolygon::new(&e.corners[..e.len]), SPLITS)
     }
+}
 
-    #[allow(clippy::too_many_arguments)]
-    fn visible_part(
-        &self,
-        solved: &Solved,
-        corners: &[DVec3; 4],
-        plane: &Plane,
-        point: DVec3,
-        normal: DVec3,
-        depth: u32,
-        patch: crate::scene::PatchId,
-    ) -> f64 {
-        let tangent = Plane::through(point, normal);
-        let seen = ConvexPolygon::new(corners).clipped(&tangent, 0.0);
+/// Polygons in the way up to which a part of an element is clipped exactly.
+const CLIPPED_MAX: usize = 12;
+
+/// Halvings of an element with more polygons in the way; then its middle decides.
+const SPLITS: u32 = 6;
+
+/// A look from a point at one element.
+struct Look<'a> {
+    solved: &'a Solved,
+    forest: &'a Forest,
+    point: DVec3,
+    normal: DVec3,
+    /// The element's.
+    plane: Plane,
+}
+
+impl Look<'_> {
+    /// Form factor to the visible part of a polygon of the element's plane.
+    fn at(&self, polygon: &ConvexPolygon, splits: u32) -> f64 {
+        let tangent = Plane::through(self.point, self.normal);
+        let seen = polygon.clipped(&tangent, 0.0);
         if seen.corners().len() < 3 {
             return 0.0;
         }
-        let f = form_factor_from_point(point, normal, seen.corners());
-        let at = |s: f64, t: f64| crate::element::bilinear(corners, s, t);
-        // Enough parts that none matters much; a part is seen wholly or not at all.
-        if f > 2e-4 && depth < 6 {
-            let part =
-                |s: f64, t: f64| [at(s, t), at(s + 0.5, t), at(s + 0.5, t + 0.5), at(s, t + 0.5)];
-            return [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)]
-                .into_iter()
-                .map(|(s, t)| {
-                    self.visible_part(solved, &part(s, t), plane, point, normal, depth + 1, patch)
-                })
-                .sum();
+        let Some(between) = self.between(&seen, &tangent) else {
+            return self.in_parts(&seen, splits);
+        };
+        visible_form_factor(self.point, self.normal, &seen, &between)
+    }
+
+    /// Occluders between the point and a polygon; `None` if there are many.
+    fn between(&self, seen: &ConvexPolygon, tangent: &Plane) -> Option<Vec<ConvexPolygon>> {
+        let slack = self.slack();
+        let raised = |p: &Plane| Plane { normal: p.normal, offset: p.offset + slack };
+        let (from, to) = (Aabb::of([self.point]), Aabb::of(seen.corners().iter().copied()));
+        let mut out = Vec::new();
+        let mut stack = vec![Forest::ROOT];
+        while let Some(id) = stack.pop() {
+            let bounds = self.solved.view.fixed_box(id);
+            if bounds.is_empty() || !shaft_meets_box(&from, &to, bounds) {
+                continue;
+            }
+            let Some(patch) = self.forest.patch(id) else {
+                stack.extend(self.forest.children(id).map(ElementId));
+                continue;
+            };
+            if self.solved.view.is_hidden_twin(patch) {
+                continue;
+            }
+            let corners = self.solved.view.occluder(patch).corners;
+            let few = &corners[..corners.len().min(ConvexPolygon::START_MAX)];
+            let part = ConvexPolygon::new(few)
+                .clipped(&raised(tangent), 0.0)
+                .clipped(&raised(&self.plane), 0.0);
+            if part.corners().len() >= 3 {
+                out.push(part);
+            }
+            if out.len() > CLIPPED_MAX {
+                return None;
+            }
         }
-        let slack = 1e-9 * solved.view.fixed_box(Forest::ROOT).diagonal();
-        let middle = at(0.5, 0.5);
-        if segment_is_clear(&solved.view, &self.forest, point, middle, slack) { f } else { 0.0 }
+        Some(out)
+    }
+
+    fn slack(&self) -> f64 {
+        1e-9 * self.solved.view.fixed_box(Forest::ROOT).diagonal()
+    }
+
+    fn in_parts(&self, seen: &ConvexPolygon, splits: u32) -> f64 {
+        let c = seen.corners();
+        let middle = c.iter().sum::<DVec3>() / c.len() as f64;
+        if splits == 0 {
+            let clear =
+                segment_is_clear(&self.solved.view, self.forest, self.point, middle, self.slack());
+            let f = form_factor_from_point(self.point, self.normal, c);
+            return if clear { f } else { 0.0 };
+        }
+        // Towards the corners: each part is a quadrilateral.
+        (0..c.len())
+            .map(|k| {
+                let (before, after) = (c[(k + c.len() - 1) % c.len()], c[(k + 1) % c.len()]);
+                let part = [c[k], (c[k] + after) * 0.5, middle, (c[k] + before) * 0.5];
+                self.at(&ConvexPolygon::new(&part), splits - 1)
+            })
+            .sum()
     }
 }

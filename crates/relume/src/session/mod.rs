@@ -65,7 +65,7 @@ struct Solved {
 
 /// Threshold of the error oracle for a link, relative to the tolerance of the whole: the errors of
 /// a receiver's links add up. Measured; see docs/tolerance.md.
-const LINK_SHARE: f64 = 0.1;
+const LINK_SHARE: f64 = 0.25;
 
 /// Residual of the solver relative to the tolerance.
 const RESIDUAL_SHARE: f64 = 0.005;

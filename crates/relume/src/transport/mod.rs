@@ -2,16 +2,18 @@
 //!
 //! Nothing here knows radiosity, time or the pair tree.
 
+mod clip;
 mod exchange;
 mod kernel;
 mod point;
 mod segments;
 mod visibility;
 
+pub use clip::visible_form_factor;
 pub use exchange::{Exchange, Meeting, Variation, exchange, light_at, light_exchange, meeting};
 pub use kernel::Simd;
 pub use point::form_factor_from_point;
 pub use segments::{SEGMENTS, SegmentBundle};
 pub use visibility::{
-    Candidates, Shaft, Visibility, light_visibility, segment_is_clear, visibility,
+    Candidates, Shaft, Visibility, exact_visibility, light_visibility, segment_is_clear, visibility,
 };

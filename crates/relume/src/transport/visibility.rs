@@ -2,9 +2,10 @@
 //! segments they block.
 
 use crate::element::{ElementId, Forest, Kind, Shape, WorldElement, WorldView};
-use crate::geometry::{Aabb, shaft_meets_box};
+use crate::geometry::{Aabb, Pose, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
+use super::clip::clipped_visibility;
 use super::kernel::Simd;
 use super::segments::{SEGMENTS, SegmentBundle};
 use glam::{DVec2, DVec3};
@@ -172,6 +173,45 @@ pub fn visibility(
         tally.add(own.as_ref().unwrap_or(&world), mask, a, b);
     }
     tally.finish(1 << log2_count, a, b)
+}
+
+/// Occluding polygons up to which partial visibility is found by clipping.
+const CLIPPED_MAX: usize = 12;
+
+/// Visibility of a pair by clipping, exact from four points, if at most twelve polygons stand in
+/// its shaft; `None` if there are more.
+pub fn exact_visibility(shaft: &Shaft<'_>, candidates: &Candidates) -> Option<Visibility> {
+    if candidates.is_empty() {
+        return Some(Visibility::CLEAR);
+    }
+    let mut polygons = Vec::new();
+    for &candidate in candidates {
+        shaft.walk(ElementId(candidate), -1.0, &mut |id| {
+            polygons.push(shaft.forest.patch(id).expect("walk ends at patches"));
+        });
+        if polygons.len() > CLIPPED_MAX {
+            return None;
+        }
+    }
+    if polygons.is_empty() {
+        return Some(Visibility::CLEAR);
+    }
+    let (a, b) = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
+    let place = |patch: PatchId| {
+        // Everything in one frame: that of the pair's body if it has one of its own.
+        let body = shaft.view.patch(patch).body;
+        match shaft.own {
+            Some((own, _, _)) if own == body => shaft.view.occluder_in_body(patch).corners.to_vec(),
+            Some((own, _, _)) => {
+                let pose = shaft.view.poses()[own.0 as usize].unwrap_or(Pose::IDENTITY);
+                let corners = shaft.view.occluder(patch).corners;
+                corners.iter().map(|&c| pose.inverse_point(c)).collect()
+            }
+            None => shaft.view.occluder(patch).corners.to_vec(),
+        }
+    };
+    let occluders: Vec<Vec<DVec3>> = polygons.into_iter().map(place).collect();
+    Some(clipped_visibility(a, b, &occluders))
 }
 
 /// Visibility of a punctual light (the second end of the shaft) from an element; `segments` come

@@ -1,0 +1,266 @@
+//! Partial visibility by clipping: exact from each of four points of the smaller end.
+//!
+//! Seen from a point, an occluding polygon hides a pyramid. What is left of the larger end after
+//! all pyramids are cut off is a set of convex fragments, whose form factors are known in closed
+//! form. Overlapping occluders need no special care.
+
+use glam::{DVec2, DVec3};
+
+use super::point::form_factor_from_point;
+use super::visibility::Visibility;
+use crate::element::{Shape, WorldElement};
+use crate::geometry::{ConvexPolygon, Plane};
+
+/// Parameters of the two Gauss-Legendre points on [0, 1].
+const G: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+
+/// Fragments after which what is left is taken as it is: a guard, never met with few occluders.
+const FRAGMENTS_MAX: usize = 256;
+
+/// Visibility of `a` and `b` past convex occluders, all in one frame.
+pub(super) fn clipped_visibility(
+    a: &WorldElement,
+    b: &WorldElement,
+    occluders: &[Vec<DVec3>],
+) -> Visibility {
+    let slack = a.rounding_m + b.rounding_m;
+    let a_looks = a.area <= b.area;
+    let (small, large) = if a_looks { (a, b) } else { (b, a) };
+    let target = ConvexPolygon::new(&large.corners[..large.len]).clipped(&small.plane, slack);
+    let between: Vec<ConvexPolygon> = occluders
+        .iter()
+        .map(|o| clip_between(o, small, large, slack))
+        .filter(|o| o.corners().len() >= 3)
+        .collect();
+    let mut sums = Sums::default();
+    for (s, t) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+        let point = small.point(G[s], G[t]);
+        if large.plane.distance(point) > 0.0 && target.corners().len() >= 3 {
+            sums.look(point, small, large, &target, &between);
+        }
+    }
+    let over_small = gradient(small, sums.at_small, sums.at_small_clear, sums.all, sums.clear);
+    let over_large = gradient(large, sums.at_large, sums.at_large_clear, sums.all, sums.clear);
+    let value = if sums.all > 0.0 { (sums.clear / sums.all).clamp(0.0, 1.0) } else { 0.0 };
+    let (gradient_a, gradient_b) =
+        if a_looks { (over_small, over_large) } else { (over_large, over_small) };
+    let (of_small, of_large) = sums.spreads(value);
+    let (spread_a, spread_b) = if a_looks { (of_small, of_large) } else { (of_large, of_small) };
+    Visibility { value, gradient_a, gradient_b, spread_a, spread_b, segments: POINTS }
+}
+
+/// Form factor from a point to the part of a convex polygon (wholly in front of the point's tangent
+/// plane) that convex occluders leave visible; exact up to rounding. Occluders must have been
+/// clipped to between the two.
+pub fn visible_form_factor(
+    point: DVec3,
+    normal: DVec3,
+    target: &ConvexPolygon,
+    occluders: &[ConvexPolygon],
+) -> f64 {
+    let mut fragments = vec![*target];
+    for occluder in occluders {
+        fragments = without_pyramid(point, occluder, fragments);
+    }
+    fragments.iter().map(|f| form_factor_from_point(point, normal, f.corners())).sum()
+}
+
+/// The part of an occluder in front of both ends' planes.
+fn clip_between(
+    occluder: &[DVec3],
+    a: &WorldElement,
+    b: &WorldElement,
+    slack: f64,
+) -> ConvexPolygon {
+    // Beyond its room a polygon is cut short, which only large n-gons meet.
+    let whole = ConvexPolygon::new(&occluder[..occluder.len().min(ConvexPolygon::START_MAX)]);
+    let raised = |p: &Plane| Plane { normal: p.normal, offset: p.offset + slack };
+    whole.clipped(&raised(&a.plane), 0.0).clipped(&raised(&b.plane), 0.0)
+}
+
+/// Form factors from the points, of all and of what is clear, with first moments on both ends.
+#[derive(Default)]
+struct Sums {
+    all: f64,
+    clear: f64,
+    at_small: DVec2,
+    at_small_clear: DVec2,
+    at_large: DVec2,
+    at_large_clear: DVec2,
+    /// Sum over the points of their clear part squared over all.
+    clear2: f64,
+}
+
+/// Points of the smaller end; each counts as a segment.
+const POINTS: u32 = 4;
+
+impl Sums {
+    fn look(
+        &mut self,
+        point: DVec3,
+        small: &WorldElement,
+        large: &WorldElement,
+        target: &ConvexPolygon,
+        occluders: &[ConvexPolygon],
+    ) {
+        let normal = small.plane.normal;
+        let all = form_factor_from_point(point, normal, target.corners());
+        let mut fragments = vec![*target];
+        for occluder in occluders {
+            fragments = without_pyramid(point, occluder, fragments);
+        }
+        let at = small.offset(point);
+        self.all += all;
+        self.at_small += at * all;
+        self.at_large += large.offset(centroid(target)) * all;
+        let before = self.clear;
+        for fragment in &fragments {
+            let f = form_factor_from_point(point, normal, fragment.corners());
+            self.clear += f;
+            self.at_small_clear += at * f;
+            self.at_large_clear += large.offset(centroid(fragment)) * f;
+        }
+        let clear = self.clear - before;
+        self.clear2 += clear * clear / all.max(f64::MIN_POSITIVE);
+    }
+
+    /// Standard deviations of visibility over the smaller end (between its points) and over the
+    /// larger (within what each point sees: there it is 0 or 1).
+    fn spreads(&self, value: f64) -> (f64, f64) {
+        if self.all <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let mean_square = self.clear2 / self.all;
+        let between = (mean_square - value * value).max(0.0).sqrt();
+        let within = (value - mean_square).max(0.0).sqrt();
+        (between, within)
+    }
+}
+
+/// What occlusion adds to the relative gradient over an element: the shift of the centre of what
+/// passes, against the element's second moment.
+fn gradient(e: &WorldElement, at: DVec2, at_clear: DVec2, all: f64, clear: f64) -> DVec2 {
+    if clear <= 1e-12 * all {
+        return DVec2::ZERO;
+    }
+    let shift = at_clear / clear - at / all;
+    let corners = e.corners.map(|c| e.offset(c));
+    let [xx, xy, yy] = Shape { corners, len: e.len }.second_moment();
+    let det = (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
+    DVec2::new(shift.x * yy - shift.y * xy, shift.y * xx - shift.x * xy) / det
+}
+
+/// The fragments with the pyramid from `point` over `occluder` cut out.
+fn without_pyramid(
+    point: DVec3,
+    occluder: &ConvexPolygon,
+    fragments: Vec<ConvexPolygon>,
+) -> Vec<ConvexPolygon> {
+    let corners = occluder.corners();
+    // The pyramid's inside is in front of all planes, whichever way the polygon is seen.
+    let facing = occluder.area_vector2().dot(corners[0] - point);
+    if facing == 0.0 {
+        return fragments;
+    }
+    let sign = facing.signum();
+    let mut planes = [Plane { normal: DVec3::ZERO, offset: 0.0 }; ConvexPolygon::ROOM];
+    for (k, &p) in corners.iter().enumerate() {
+        let q = corners[(k + 1) % corners.len()];
+        // Unit length does not matter: only signs and ratios are used.
+        planes[k] = Plane::through(point, (p - point).cross(q - point) * sign);
+    }
+    let planes = &planes[..corners.len()];
+    let mut out = Vec::with_capacity(fragments.len() + 4);
+    for fragment in fragments {
+        let outside = |plane: &Plane| fragment.corners().iter().all(|&c| plane.distance(c) <= 0.0);
+        if planes.iter().any(outside) || out.len() > FRAGMENTS_MAX {
+            out.push(fragment);
+            continue;
+        }
+        let mut rest = fragment;
+        for plane in planes {
+            let (inside, beyond) = rest.split(plane);
+            if beyond.corners().len() >= 3 {
+                out.push(beyond);
+            }
+            rest = inside;
+            if rest.corners().len() < 3 {
+                break;
+            }
+        }
+    }
+    out
+}
+
+fn centroid(polygon: &ConvexPolygon) -> DVec3 {
+    let c = polygon.corners();
+    let (mut sum, mut area) = (DVec3::ZERO, 0.0);
+    for k in 1..c.len() - 1 {
+        let twice = (c[k] - c[0]).cross(c[k + 1] - c[0]).length();
+        sum += (c[0] + c[k] + c[k + 1]) * (twice / 3.0);
+        area += twice;
+    }
+    if area > 0.0 { sum / area } else { c[0] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Aabb;
+
+    fn square(z: f64, lo: f64, hi: f64, up: bool) -> WorldElement {
+        let mut corners =
+            [(lo, lo), (hi, lo), (hi, hi), (lo, hi)].map(|(x, y)| DVec3::new(x, y, z));
+        if !up {
+            corners.reverse();
+        }
+        let normal = if up { DVec3::Z } else { DVec3::NEG_Z };
+        let centre = corners.iter().sum::<DVec3>() / 4.0;
+        WorldElement {
+            corners,
+            len: 4,
+            plane: Plane::through(corners[0], normal),
+            axes: [DVec3::X, normal.cross(DVec3::X)],
+            centre,
+            radius: (corners[0] - centre).length(),
+            area: (hi - lo) * (hi - lo),
+            bounds: Aabb::of(corners),
+            rounding_m: 1e-12,
+        }
+    }
+
+    fn blocker(z: f64, lo: f64, hi: f64) -> Vec<DVec3> {
+        square(z, lo, hi, true).corners.to_vec()
+    }
+
+    #[test]
+    fn half_of_a_small_pair_is_hidden_by_a_half_plane() {
+        let (a, b) = (square(0.0, -0.01, 0.01, true), square(1.0, -0.01, 0.01, false));
+        let half: Vec<DVec3> = [(0.0, -9.0), (9.0, -9.0), (9.0, 9.0), (0.0, 9.0)]
+            .map(|(x, y)| DVec3::new(x, y, 0.5))
+            .into();
+        let v = clipped_visibility(&a, &b, &[half]);
+        assert!((v.value - 0.5).abs() < 1e-3, "{v:?}");
+        // Points further from the half plane see more.
+        assert!(v.gradient_a.x < 0.0 && v.gradient_a.y.abs() < 1e-6, "{v:?}");
+    }
+
+    #[test]
+    fn overlapping_occluders_hide_their_union() {
+        let (a, b) = (square(0.0, 0.0, 1.0, true), square(2.0, 0.0, 1.0, false));
+        let one = clipped_visibility(&a, &b, &[blocker(1.0, 0.2, 0.6)]).value;
+        let twice =
+            clipped_visibility(&a, &b, &[blocker(1.0, 0.2, 0.6), blocker(1.0, 0.3, 0.5)]).value;
+        assert!((one - twice).abs() < 1e-12);
+        let more = clipped_visibility(&a, &b, &[blocker(1.0, 0.2, 0.6), blocker(0.5, 0.3, 0.8)]);
+        assert!(more.value < one - 0.01);
+    }
+
+    #[test]
+    fn an_occluder_over_everything_hides_everything_and_one_beside_nothing() {
+        let (a, b) = (square(0.0, 0.0, 1.0, true), square(2.0, 0.0, 1.0, false));
+        assert_eq!(clipped_visibility(&a, &b, &[blocker(1.0, -9.0, 9.0)]).value, 0.0);
+        assert_eq!(clipped_visibility(&a, &b, &[blocker(1.0, 2.0, 3.0)]).value, 1.0);
+        assert_eq!(clipped_visibility(&a, &b, &[blocker(2.5, 0.0, 1.0)]).value, 1.0);
+    }
+}

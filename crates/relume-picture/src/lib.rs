@@ -1,3 +1,5 @@
 //! Pictures and exports of Relume solutions: a snapshot in, pixels and files out.
 //!
 //! Nothing here is ever written back into the solution.
+
+pub mod export;

@@ -37,3 +37,15 @@ impl Pose {
         self.rotation.transpose() * world
     }
 }
+
+impl std::ops::Mul for Pose {
+    type Output = Pose;
+
+    /// First `inner`, then `self`: `world_from_body * body_from_part`.
+    fn mul(self, inner: Pose) -> Pose {
+        Pose {
+            rotation: self.rotation * inner.rotation,
+            translation: self.point(inner.translation),
+        }
+    }
+}

@@ -8,8 +8,17 @@ use glam::{DVec2, DVec3};
 
 use crate::geometry::Pose;
 
+mod assemble;
+mod builder;
+mod draft;
+mod error;
+mod flatten;
 mod motion;
+mod names;
+mod rigid;
 
+pub use builder::SceneBuilder;
+pub use error::SceneError;
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
 
 /// Index of a [`Body`] in [`Scene::bodies`].
@@ -57,7 +66,8 @@ pub struct Scene {
 pub struct Body {
     /// Unique name, from the node.
     pub name: String,
-    /// The node whose rigid motion the body follows.
+    /// The node whose rigid motion the body follows. Where nothing moves it ([`Scene::moves`]) the
+    /// node's placement is already in the patches: use [`Scene::pose`], not [`Motion::pose`].
     pub node: NodeId,
     /// The patches of this body, a range of [`Scene::patches`].
     pub patches: std::ops::Range<u32>,
@@ -222,9 +232,32 @@ pub enum Severity {
 }
 
 impl Scene {
-    /// Where a body is at `time_s`, or `None` while it is absent (scale 0).
+    /// Where a body is at `time_s`, or `None` while it is absent (scale 0). Exactly
+    /// [`Pose::IDENTITY`] for a body that never moves: its patches are placed in the world.
     pub fn pose(&self, body: BodyId, time_s: f64) -> Option<Pose> {
+        if !self.moves(body) {
+            return Some(Pose::IDENTITY);
+        }
         self.motion.pose(self.bodies[body.0 as usize].node, time_s)
+    }
+
+    /// Whether a body moves, or comes and goes, at any time of the animation.
+    pub fn moves(&self, body: BodyId) -> bool {
+        self.motion.moves(self.bodies[body.0 as usize].node)
+    }
+
+    /// The smallest and largest world coordinates of all patches present at `time_s`, metres;
+    /// `None` while none is.
+    pub fn bounds(&self, time_s: f64) -> Option<(DVec3, DVec3)> {
+        let mut bounds: Option<(DVec3, DVec3)> = None;
+        for body in (0..self.bodies.len() as u32).map(BodyId) {
+            let Some(pose) = self.pose(body, time_s) else { continue };
+            for point in self.patches_of(body).flat_map(|(_, p)| p.corners_in_body()) {
+                let p = pose.point(point);
+                bounds = Some(bounds.map_or((p, p), |(min, max)| (min.min(p), max.max(p))));
+            }
+        }
+        bounds
     }
 
     /// The patches of a body with their ids.

@@ -1,0 +1,260 @@
+//! From a draft to a [`Scene`]: objects are grouped into bodies, scales baked into vertices, names
+//! made unique, everything checked.
+//!
+//! The one way in for files and code alike; must not know which of the two it was.
+
+use std::ops::Range;
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::draft::{Draft, DraftSurface};
+use super::flatten::{flatten, seen_from_behind};
+use super::names::Names;
+use super::rigid::without_scales;
+use super::{
+    Body, BodyId, Frame, Material, MaterialId, Motion, NodeId, Note, Patch, PatchId, Scene,
+    SceneError, Severity, Surface, SurfaceId,
+};
+use crate::geometry::Pose;
+
+/// Checks the draft and makes the scene of it.
+pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
+    check_materials(&draft.materials)?;
+    let mut notes = std::mem::take(&mut draft.notes);
+    unique_names(&mut draft, &mut notes);
+    let (nodes, residuals) = without_scales(&draft)?;
+    let motion =
+        Motion { duration_s: duration_s(&nodes), nodes, animation: draft.animation.clone() };
+    let mut parts = Parts::default();
+    for (node, members) in bodies_of(&draft, &motion) {
+        let first = parts.patches.len() as u32;
+        let body = BodyId(parts.bodies.len() as u32);
+        for member in members {
+            let place = Placement { pose: pose_in_body(&motion, member), shape: residuals[member] };
+            let object = &draft.nodes[member];
+            for surface in &object.surfaces {
+                parts.add_surface(body, &object.name, surface, &place, &draft.materials)?;
+            }
+        }
+        let patches = Range { start: first, end: parts.patches.len() as u32 };
+        if !patches.is_empty() {
+            parts.bodies.push(Body {
+                name: draft.nodes[node].name.clone(),
+                node: NodeId(node as u32),
+                patches,
+            });
+        }
+    }
+    notes.append(&mut parts.notes);
+    notes.extend(parts.names.notes("surface"));
+    if parts.patches.is_empty() {
+        return Err(empty(&draft));
+    }
+    Ok(Scene {
+        name: draft.name,
+        bodies: parts.bodies,
+        surfaces: parts.surfaces,
+        patches: parts.patches,
+        materials: draft.materials,
+        lights: draft.lights,
+        cameras: draft.cameras,
+        motion,
+        notes,
+    })
+}
+
+/// What has been assembled so far.
+#[derive(Default)]
+struct Parts {
+    bodies: Vec<Body>,
+    surfaces: Vec<Surface>,
+    patches: Vec<Patch>,
+    notes: Vec<Note>,
+    names: Names,
+}
+
+/// How a node's own points get into the frame of its body.
+struct Placement {
+    pose: Pose,
+    shape: DMat3,
+}
+
+impl Placement {
+    /// The loop in the body's frame; a mirroring shape turns it round, so that the front stays the
+    /// front (glTF 2.0, section 3.7.4: a negative determinant flips the winding).
+    fn place(&self, polygon: &[DVec3]) -> Vec<DVec3> {
+        let shaped = |&p: &DVec3| if self.shape == DMat3::IDENTITY { p } else { self.shape * p };
+        let mut points: Vec<DVec3> = polygon.iter().map(|p| self.pose.point(shaped(p))).collect();
+        if self.shape.determinant() < 0.0 {
+            points.reverse();
+        }
+        points
+    }
+}
+
+impl Parts {
+    fn add_surface(
+        &mut self,
+        body: BodyId,
+        object: &str,
+        surface: &DraftSurface,
+        place: &Placement,
+        materials: &[Material],
+    ) -> Result<(), SceneError> {
+        let id = SurfaceId(self.surfaces.len() as u32);
+        let before = self.patches.len();
+        let mut degenerate = 0;
+        for polygon in &surface.polygons {
+            let points = place.place(polygon);
+            if points.iter().any(|p| !p.is_finite()) {
+                return Err(not_finite(&surface.name, object));
+            }
+            match flatten(&points) {
+                Ok((frame, corners)) => {
+                    let double_sided = materials[surface.material.0 as usize].double_sided;
+                    self.add_patch(body, id, surface.material, double_sided, frame, corners);
+                }
+                Err(_) => degenerate += 1,
+            }
+        }
+        if self.patches.len() > before {
+            let name = self.names.unique(&surface.name);
+            self.surfaces.push(Surface {
+                name,
+                object: object.to_owned(),
+                body,
+                material: surface.material,
+            });
+        }
+        if degenerate > 0 {
+            self.notes.push(degenerate_note(&surface.name, degenerate));
+        }
+        Ok(())
+    }
+
+    fn add_patch(
+        &mut self,
+        body: BodyId,
+        surface: SurfaceId,
+        material: MaterialId,
+        double_sided: bool,
+        frame: Frame,
+        corners: Vec<DVec2>,
+    ) {
+        let front = PatchId(self.patches.len() as u32);
+        let back = PatchId(front.0 + 1);
+        let (behind, behind_corners) = seen_from_behind(&frame, &corners);
+        let twin = double_sided.then_some(back);
+        self.patches.push(Patch { body, surface, material, frame, corners, twin });
+        if double_sided {
+            let twin = Some(front);
+            self.patches.push(Patch {
+                body,
+                surface,
+                material,
+                frame: behind,
+                corners: behind_corners,
+                twin,
+            });
+        }
+    }
+}
+
+/// The nodes that carry a body, in node order, each with the nodes whose surfaces it groups.
+fn bodies_of(draft: &Draft, motion: &Motion) -> Vec<(usize, Vec<usize>)> {
+    let mut members: Vec<Vec<usize>> = vec![Vec::new(); draft.nodes.len()];
+    for (index, node) in draft.nodes.iter().enumerate() {
+        if !node.surfaces.is_empty() {
+            let carrier = motion.anchor(NodeId(index as u32)).map_or(index, |a| a.0 as usize);
+            members[carrier].push(index);
+        }
+    }
+    members.into_iter().enumerate().filter(|(_, m)| !m.is_empty()).collect()
+}
+
+/// Where a node sits in the frame of the body it rides on: in the world, if it never moves.
+fn pose_in_body(motion: &Motion, node: usize) -> Pose {
+    let still = motion.upward(NodeId(node as u32)).take_while(|n| !n.animated());
+    still.fold(Pose::IDENTITY, |pose, n| n.local_pose(0.0) * pose)
+}
+
+/// The time of the last key.
+fn duration_s(nodes: &[super::Node]) -> f64 {
+    let last = |n: &super::Node| {
+        let translation = n.translation_track.as_ref().and_then(|t| t.times_s.last().copied());
+        let rotation = n.rotation_track.as_ref().and_then(|t| t.times_s.last().copied());
+        let presence = n.presence.last().map(|k| k.0);
+        [translation, rotation, presence].into_iter().flatten().fold(0.0, f64::max)
+    };
+    nodes.iter().map(last).fold(0.0, f64::max)
+}
+
+/// Makes names unique within their kind.
+fn unique_names(draft: &mut Draft, notes: &mut Vec<Note>) {
+    fn each<'a>(kind: &str, names: impl Iterator<Item = &'a mut String>, notes: &mut Vec<Note>) {
+        let mut unique = Names::default();
+        for name in names {
+            *name = unique.unique(name);
+        }
+        notes.extend(unique.notes(kind));
+    }
+    each("node", draft.nodes.iter_mut().map(|n| &mut n.name), notes);
+    each("material", draft.materials.iter_mut().map(|m| &mut m.name), notes);
+    each("light", draft.lights.iter_mut().map(|l| &mut l.name), notes);
+    each("camera", draft.cameras.iter_mut().map(|c| &mut c.name), notes);
+}
+
+/// Reflectance in [0, 1), exitance finite and not negative.
+fn check_materials(materials: &[Material]) -> Result<(), SceneError> {
+    for material in materials {
+        let fail = |what: String, remedy: &str| {
+            Err(SceneError::Material {
+                material: material.name.clone(),
+                what,
+                remedy: remedy.to_owned(),
+            })
+        };
+        if let Some(bad) = material.reflectance.iter().find(|r| !(0.0..1.0).contains(*r)) {
+            return fail(
+                format!("its reflectance is {bad}"),
+                "choose each channel from 0 up to, but not including, 1",
+            );
+        }
+        if let Some(bad) = material.exitance.iter().find(|m| !(m.is_finite() && **m >= 0.0)) {
+            return fail(
+                format!("its exitance is {bad} W/m2"),
+                "choose finite values of 0 or more",
+            );
+        }
+    }
+    Ok(())
+}
+
+fn degenerate_note(surface: &str, count: usize) -> Note {
+    Note {
+        severity: Severity::Info,
+        code: "degenerate",
+        subject: surface.to_owned(),
+        count,
+        message: format!("{count} polygons without area were left out"),
+    }
+}
+
+fn not_finite(surface: &str, object: &str) -> SceneError {
+    SceneError::Geometry {
+        subject: format!("surface `{surface}` of node `{object}`"),
+        what: "a vertex has a coordinate that is not finite".into(),
+        remedy: "repair the mesh and export it again".into(),
+    }
+}
+
+fn empty(draft: &Draft) -> SceneError {
+    let with_mesh = draft.nodes.iter().filter(|n| !n.surfaces.is_empty()).count();
+    let what = match (draft.nodes.len(), with_mesh) {
+        (0, _) => "there are no nodes".to_owned(),
+        (n, 0) => format!("none of its {n} nodes has a mesh of triangles"),
+        (_, m) => format!("the meshes of its {m} nodes have no area"),
+    };
+    let remedy = "export the objects' meshes as triangles, visible and in the active scene".into();
+    SceneError::Empty { scene: draft.name.clone(), what, remedy }
+}

@@ -1,0 +1,262 @@
+//! Scenes made in code: for tests, for the demonstration scenes, and for users with geometry of
+//! their own.
+//!
+//! Must not know how a scene is checked and grouped; that is `assemble`'s.
+
+use glam::{DQuat, DVec3};
+
+use super::assemble::assemble;
+use super::draft::{Draft, DraftNode, DraftSurface};
+use super::flatten::{Flaw, flatten};
+use super::{
+    Camera, Light, LightKind, Material, MaterialId, NodeId, Projection, RotationTrack, Scene,
+    SceneError, Track,
+};
+
+/// Builds a [`Scene`] from code, checked as a file would be.
+///
+/// Mistakes (a polygon that is not planar and convex, an id of another builder) are kept and
+/// returned by [`SceneBuilder::build`], the first one first.
+///
+/// ```
+/// use glam::{DQuat, DVec3};
+/// use relume::scene::SceneBuilder;
+///
+/// let mut b = SceneBuilder::new("furnace");
+/// let wall = b.material("wall", [0.5; 3], [1.0; 3]);
+/// let room = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+/// b.cuboid_inward(room, "walls", wall, DVec3::ZERO, DVec3::ONE);
+/// let scene = b.build()?;
+/// assert_eq!(scene.patches.len(), 6);
+/// # Ok::<(), relume::scene::SceneError>(())
+/// ```
+pub struct SceneBuilder {
+    draft: Draft,
+    mistake: Option<SceneError>,
+}
+
+impl SceneBuilder {
+    /// An empty scene of this name.
+    pub fn new(name: &str) -> SceneBuilder {
+        SceneBuilder { draft: Draft { name: name.to_owned(), ..Draft::default() }, mistake: None }
+    }
+
+    /// Adds a single-sided material: reflectance in [0, 1) and exitance in W/m2, linear RGB.
+    pub fn material(
+        &mut self,
+        name: &str,
+        reflectance: [f64; 3],
+        exitance: [f64; 3],
+    ) -> MaterialId {
+        self.add_material(Material {
+            name: name.to_owned(),
+            reflectance,
+            exitance,
+            double_sided: false,
+        })
+    }
+
+    /// Adds a material whose polygons reflect and emit on both sides.
+    pub fn double_sided_material(
+        &mut self,
+        name: &str,
+        reflectance: [f64; 3],
+        exitance: [f64; 3],
+    ) -> MaterialId {
+        self.add_material(Material {
+            name: name.to_owned(),
+            reflectance,
+            exitance,
+            double_sided: true,
+        })
+    }
+
+    fn add_material(&mut self, material: Material) -> MaterialId {
+        self.draft.materials.push(material);
+        MaterialId(self.draft.materials.len() as u32 - 1)
+    }
+
+    /// Adds a node placed relative to its parent (to the world without one).
+    pub fn node(
+        &mut self,
+        name: &str,
+        parent: Option<NodeId>,
+        translation: DVec3,
+        rotation: DQuat,
+    ) -> NodeId {
+        if let Some(parent) = parent {
+            self.check_node(parent, name);
+        }
+        let parent = parent.map(|p| p.0 as usize).filter(|&p| p < self.draft.nodes.len());
+        self.draft.nodes.push(DraftNode::still(name, parent, translation, rotation));
+        NodeId(self.draft.nodes.len() as u32 - 1)
+    }
+
+    /// Scales what hangs on a node, along the node's own axes; constant in time. A product of
+    /// negative sign mirrors; fronts stay fronts.
+    pub fn scale(&mut self, node: NodeId, scale: DVec3) {
+        self.change(node, |n| n.scale = scale);
+    }
+
+    /// Animates the translation of a node.
+    pub fn animate_translation(&mut self, node: NodeId, track: Track) {
+        self.change(node, |n| n.translation_track = Some(track));
+    }
+
+    /// Animates the rotation of a node.
+    pub fn animate_rotation(&mut self, node: NodeId, track: RotationTrack) {
+        self.change(node, |n| n.rotation_track = Some(track));
+    }
+
+    /// Makes a node and all below it come and go: present or not from each time (seconds) on;
+    /// before the first key as the first key says.
+    pub fn animate_presence(&mut self, node: NodeId, keys: Vec<(f64, bool)>) {
+        self.change(node, |n| n.presence = keys);
+    }
+
+    /// Adds a convex planar polygon, corners in the node's frame, counter-clockwise seen from its
+    /// front. Polygons of one node, surface name and material form one surface.
+    pub fn polygon(
+        &mut self,
+        node: NodeId,
+        surface_name: &str,
+        material: MaterialId,
+        corners: &[DVec3],
+    ) {
+        if let Some(flaw) = flaw_of(corners) {
+            self.fail(SceneError::Geometry {
+                subject: format!("a polygon of surface `{surface_name}`"),
+                what: flaw.to_owned(),
+                remedy: "give three or more finite corners of a planar convex polygon".into(),
+            });
+        }
+        if self.draft.materials.len() <= material.0 as usize {
+            self.fail(SceneError::Geometry {
+                subject: format!("surface `{surface_name}`"),
+                what: format!("material {} does not exist", material.0),
+                remedy: "use a material of the same builder".into(),
+            });
+        }
+        let polygon = corners.to_vec();
+        self.change(node, |n| {
+            match n.surfaces.iter_mut().find(|s| s.name == surface_name && s.material == material) {
+                Some(surface) => surface.polygons.push(polygon),
+                None => n.surfaces.push(DraftSurface {
+                    name: surface_name.to_owned(),
+                    material,
+                    polygons: vec![polygon],
+                }),
+            }
+        });
+    }
+
+    /// Adds the six sides of a box, seen from outside; order -x, +x, -y, +y, -z, +z.
+    pub fn cuboid(
+        &mut self,
+        node: NodeId,
+        surface_name: &str,
+        material: MaterialId,
+        min: DVec3,
+        max: DVec3,
+    ) {
+        for side in cuboid_sides(min, max) {
+            self.polygon(node, surface_name, material, &side);
+        }
+    }
+
+    /// Adds the six sides of a box, seen from inside (a room); order -x, +x, -y, +y, -z, +z.
+    pub fn cuboid_inward(
+        &mut self,
+        node: NodeId,
+        surface_name: &str,
+        material: MaterialId,
+        min: DVec3,
+        max: DVec3,
+    ) {
+        for mut side in cuboid_sides(min, max) {
+            side.reverse();
+            self.polygon(node, surface_name, material, &side);
+        }
+    }
+
+    /// Adds a punctual light that shines along the node's -Z: W/sr, or W/m2 if directional.
+    pub fn light(&mut self, name: &str, node: NodeId, kind: LightKind, intensity: [f64; 3]) {
+        self.check_node(node, name);
+        if intensity.iter().any(|i| !i.is_finite() || *i < 0.0) {
+            self.fail(SceneError::Geometry {
+                subject: format!("light `{name}`"),
+                what: format!("its intensity is {intensity:?}"),
+                remedy: "give finite values of 0 or more".into(),
+            });
+        }
+        let conversion = "given in radiometric units, not converted".into();
+        self.draft.lights.push(Light { name: name.to_owned(), node, kind, intensity, conversion });
+    }
+
+    /// Adds a camera that looks along the node's -Z, +Y up.
+    pub fn camera(&mut self, name: &str, node: NodeId, projection: Projection) {
+        self.check_node(node, name);
+        self.draft.cameras.push(Camera { name: name.to_owned(), node, projection });
+    }
+
+    /// Checks everything and makes the scene.
+    pub fn build(self) -> Result<Scene, SceneError> {
+        match self.mistake {
+            Some(mistake) => Err(mistake),
+            None => assemble(self.draft),
+        }
+    }
+
+    fn change(&mut self, node: NodeId, change: impl FnOnce(&mut DraftNode)) {
+        match self.draft.nodes.get_mut(node.0 as usize) {
+            Some(n) => change(n),
+            None => self.check_node(node, "what hangs on it"),
+        }
+    }
+
+    fn check_node(&mut self, node: NodeId, wanted_by: &str) {
+        if node.0 as usize >= self.draft.nodes.len() {
+            self.fail(SceneError::Hierarchy {
+                node: format!("{}", node.0),
+                what: format!("it does not exist, but {wanted_by} refers to it"),
+                remedy: "use a node of the same builder".into(),
+            });
+        }
+    }
+
+    fn fail(&mut self, mistake: SceneError) {
+        self.mistake.get_or_insert(mistake);
+    }
+}
+
+/// What is wrong with a polygon, in words.
+fn flaw_of(corners: &[DVec3]) -> Option<&'static str> {
+    if corners.iter().any(|c| !c.is_finite()) {
+        return Some("a corner is not finite");
+    }
+    match flatten(corners).err()? {
+        Flaw::Degenerate => Some("it has no area"),
+        Flaw::NonPlanar => Some("its corners are not in one plane"),
+        Flaw::NotConvex => Some("it is not convex"),
+    }
+}
+
+/// The sides of a box, counter-clockwise seen from outside.
+fn cuboid_sides(min: DVec3, max: DVec3) -> [[DVec3; 4]; 6] {
+    let corner = |bits: usize| {
+        let pick = |axis: usize| if bits >> axis & 1 == 1 { max[axis] } else { min[axis] };
+        DVec3::new(pick(0), pick(1), pick(2))
+    };
+    let side = |bits: [usize; 4]| bits.map(corner);
+    [
+        side([0, 4, 6, 2]),
+        side([1, 3, 7, 5]),
+        side([0, 1, 5, 4]),
+        side([2, 6, 7, 3]),
+        side([0, 2, 3, 1]),
+        side([4, 5, 7, 6]),
+    ]
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,64 @@
+//! A scene before it is checked: what the builder and the importer hand to `assemble`.
+//!
+//! Nodes still carry scales, polygons are loops of points in their node's own frame, and names
+//! may repeat. Must not know where any of it came from.
+
+use glam::{DQuat, DVec3};
+
+use super::{Camera, Light, Material, MaterialId, Note, RotationTrack, Track};
+
+/// Everything of a scene, unchecked.
+#[derive(Default)]
+pub(super) struct Draft {
+    pub(super) name: String,
+    /// Parents before children.
+    pub(super) nodes: Vec<DraftNode>,
+    pub(super) materials: Vec<Material>,
+    pub(super) lights: Vec<Light>,
+    pub(super) cameras: Vec<Camera>,
+    pub(super) animation: Option<String>,
+    pub(super) notes: Vec<Note>,
+}
+
+/// A node with its scale and what hangs on it.
+pub(super) struct DraftNode {
+    pub(super) name: String,
+    pub(super) parent: Option<usize>,
+    pub(super) translation: DVec3,
+    pub(super) rotation: DQuat,
+    pub(super) scale: DVec3,
+    pub(super) translation_track: Option<Track>,
+    pub(super) rotation_track: Option<RotationTrack>,
+    pub(super) presence: Vec<(f64, bool)>,
+    pub(super) surfaces: Vec<DraftSurface>,
+}
+
+/// Polygons of one material on one node.
+pub(super) struct DraftSurface {
+    pub(super) name: String,
+    pub(super) material: MaterialId,
+    /// Loops, counter-clockwise from the front, in the node's own (scaled) frame.
+    pub(super) polygons: Vec<Vec<DVec3>>,
+}
+
+impl DraftNode {
+    /// A node that does not move and shows nothing.
+    pub(super) fn still(
+        name: &str,
+        parent: Option<usize>,
+        translation: DVec3,
+        rotation: DQuat,
+    ) -> DraftNode {
+        DraftNode {
+            name: name.to_owned(),
+            parent,
+            translation,
+            rotation,
+            scale: DVec3::ONE,
+            translation_track: None,
+            rotation_track: None,
+            presence: Vec::new(),
+            surfaces: Vec::new(),
+        }
+    }
+}

@@ -9,7 +9,8 @@ use std::f64::consts::PI;
 use std::io;
 use std::path::Path;
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
+use relume::geometry::Pose;
 use relume::scene::{
     BodyId, Interpolation, Light, LightKind, Material, Node, NodeId, Patch, Projection, Scene,
     SurfaceId,
@@ -176,13 +177,13 @@ impl<'a> Writer<'a> {
             }
         }
         for (body, object, surfaces) in objects {
-            let (node, object_from_body) = self.object_node(body, object);
+            let (node, body_from_object) = self.object_node(body, object);
             let primitives: Vec<Value> = surfaces
                 .iter()
                 .filter(|s| !by_surface[s.0 as usize].is_empty())
                 .map(|s| {
                     let material = scene.surfaces[s.0 as usize].material.0;
-                    self.primitive(&by_surface[s.0 as usize], material, object_from_body)
+                    self.primitive(&by_surface[s.0 as usize], material, body_from_object)
                 })
                 .collect();
             if !primitives.is_empty() {
@@ -192,31 +193,32 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// The node that carries an object's mesh, and the rigid map from the body's frame to it.
+    /// The node that carries an object's mesh, and the constant map from it to the body's frame.
     ///
-    /// The object's own node where it is the body's or hangs rigidly below it; otherwise a new
-    /// child of the body's node.
-    fn object_node(&mut self, body: BodyId, object: &str) -> (usize, Rigid) {
-        let nodes = &self.scene.motion.nodes;
+    /// The object's own node; where there is none of its name (a scene put together by hand), a
+    /// new one at the origin of the body's frame.
+    fn object_node(&mut self, body: BodyId, object: &str) -> (usize, Pose) {
+        let motion = &self.scene.motion;
         let body_node = self.scene.bodies[body.0 as usize].node;
-        let own = nodes.iter().position(|n| n.name == object).map(|i| NodeId(i as u32));
-        if let Some(below) = own.and_then(|own| body_from_node(nodes, body_node, own)) {
-            let own = own.map_or(0, |own| own.0 as usize);
-            if !self.nodes[own].contains_key("mesh") {
-                return (own, below.inverse());
+        let carrier = motion.anchor(body_node);
+        let own = motion.nodes.iter().position(|n| n.name == object);
+        if let Some(own) = own {
+            let rides = motion.anchor(NodeId(own as u32)) == carrier;
+            if rides && !self.nodes[own].contains_key("mesh") {
+                return (own, body_from_node(&motion.nodes, own));
             }
         }
-        (self.add_node(Some(body_node.0 as usize), object), Rigid::IDENTITY)
+        (self.add_node(carrier.map(|node| node.0 as usize), object), Pose::IDENTITY)
     }
 
     /// Polygons of one surface as triangles with flat normals.
-    fn primitive(&mut self, patches: &[&Patch], material: u32, object_from_body: Rigid) -> Value {
+    fn primitive(&mut self, patches: &[&Patch], material: u32, body_from_object: Pose) -> Value {
         let (mut positions, mut normals, mut indices) = (Vec::new(), Vec::new(), Vec::new());
         for patch in patches {
             let first = positions.len() as u32;
-            let normal = (object_from_body.rotation * patch.frame.normal).normalize();
+            let normal = body_from_object.inverse_direction(patch.frame.normal).normalize();
             for corner in patch.corners_in_body() {
-                positions.push(object_from_body.point(corner).as_vec3().to_array());
+                positions.push(body_from_object.inverse_point(corner).as_vec3().to_array());
                 normals.push(normal.as_vec3().to_array());
             }
             for corner in 1..patch.corners.len() as u32 - 1 {
@@ -418,9 +420,6 @@ fn placement(node: &Node) -> Map<String, Value> {
     if node.rotation != DQuat::IDENTITY {
         map.insert("rotation".into(), json!(node.rotation.normalize().to_array()));
     }
-    if node.presence.first().is_some_and(|key| !key.1) {
-        map.insert("scale".into(), json!([0.0, 0.0, 0.0]));
-    }
     map
 }
 
@@ -486,47 +485,14 @@ fn name(interpolation: Interpolation) -> &'static str {
     }
 }
 
-/// A constant rigid map.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Rigid {
-    rotation: DQuat,
-    translation: DVec3,
-}
-
-impl Rigid {
-    const IDENTITY: Rigid = Rigid { rotation: DQuat::IDENTITY, translation: DVec3::ZERO };
-
-    fn point(self, p: DVec3) -> DVec3 {
-        self.rotation * p + self.translation
-    }
-
-    /// First `self`, then `outer`.
-    fn then(self, outer: Rigid) -> Rigid {
-        Rigid {
-            rotation: outer.rotation * self.rotation,
-            translation: outer.point(self.translation),
-        }
-    }
-
-    fn inverse(self) -> Rigid {
-        let rotation = self.rotation.inverse();
-        Rigid { rotation, translation: rotation * -self.translation }
-    }
-}
-
-/// The constant map from the frame of `node` to that of `body_node`, if `node` is that node or
-/// hangs below it without an animated node between.
-fn body_from_node(nodes: &[Node], body_node: NodeId, node: NodeId) -> Option<Rigid> {
-    let (mut map, mut at) = (Rigid::IDENTITY, node);
-    while at != body_node {
-        let n = &nodes[at.0 as usize];
-        let animated =
-            n.translation_track.is_some() || n.rotation_track.is_some() || !n.presence.is_empty();
-        if animated {
-            return None;
-        }
-        map = map.then(Rigid { rotation: n.rotation, translation: n.translation });
-        at = n.parent?;
-    }
-    Some(map)
+/// Where a node sits in the frame of the body that it rides on: relative to the nearest animated
+/// node at or above it, or to the world.
+fn body_from_node(nodes: &[Node], node: usize) -> Pose {
+    let get = |i: usize| &nodes[i];
+    std::iter::successors(Some(get(node)), |n| n.parent.map(|p| get(p.0 as usize)))
+        .take_while(|n| !n.animated())
+        .fold(Pose::IDENTITY, |pose, n| {
+            let local = Pose { rotation: DMat3::from_quat(n.rotation), translation: n.translation };
+            local * pose
+        })
 }

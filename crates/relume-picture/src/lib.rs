@@ -3,3 +3,4 @@
 //! Nothing here is ever written back into the solution.
 
 pub mod export;
+pub mod picture;

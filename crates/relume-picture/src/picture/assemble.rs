@@ -1,0 +1,230 @@
+//! A snapshot as an ordered list of things to draw.
+//!
+//! Must not know how pixels are made or how radiosity becomes a colour. Order: patches by id,
+//! leaves (or triangles) in order within, then their outlines; it decides between equally near
+//! things, so it must not depend on threads.
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use relume::scene::PatchId;
+use relume::session::{Leaf, Snapshot};
+
+use super::gouraud::{self, Triangle};
+use super::project::{Projector, SeenPlane, clip_to_pixels};
+use super::raster::{Grid, Primitive};
+use super::render::Shading;
+
+/// Depth of the near plane as a share of the distance to the farthest point of the scene.
+const NEAR: f64 = 1e-6;
+
+/// Width of outlines, pixels.
+const OUTLINE_WIDTH: f64 = 0.8;
+
+/// Outlines are drawn this much nearer than the surface they lie on (relative).
+const OUTLINE_LIFT: f64 = 1e-3;
+
+/// What a primitive shows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Fill {
+    /// One radiosity, W/m2.
+    Constant([f32; 3]),
+    /// Radiosity that is linear in the plane of the patch.
+    Linear(Linear),
+    /// The outline of a leaf that has this radiosity, W/m2.
+    Outline([f32; 3]),
+}
+
+/// Radiosity `value + along_u du + along_v dv` at plane coordinates `origin + (du, dv)`,
+/// within the range of its corners.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Linear {
+    plane: u32,
+    origin: DVec2,
+    value: [f64; 3],
+    gradient: [DVec2; 3],
+    range: [[f64; 2]; 3],
+}
+
+/// Everything that faces the camera, ready to be rasterised.
+#[derive(Debug, Default)]
+pub(crate) struct Drawing {
+    pub(crate) primitives: Vec<Primitive>,
+    /// What each primitive shows.
+    pub(crate) fills: Vec<Fill>,
+    /// Which patch each primitive belongs to.
+    pub(crate) patches: Vec<PatchId>,
+    planes: Vec<SeenPlane>,
+}
+
+impl Drawing {
+    /// All leaves of all patches whose front faces the camera; the backs of patches are left out.
+    pub(crate) fn new(
+        snapshot: &Snapshot,
+        projector: &Projector,
+        grid: &Grid,
+        shading: Shading,
+        outlines: bool,
+    ) -> Drawing {
+        let near = NEAR * farthest(snapshot, projector.eye());
+        let count = snapshot.scene.patches.len() as u32;
+        let of_patches: Vec<Option<PatchDrawing>> = (0..count)
+            .into_par_iter()
+            .map(|i| {
+                PatchDrawing::new(snapshot, PatchId(i), projector, grid, near, shading, outlines)
+            })
+            .collect();
+        let mut drawing = Drawing::default();
+        for (i, patch) in of_patches.into_iter().enumerate() {
+            let Some(patch) = patch else { continue };
+            let plane = drawing.planes.len() as u32;
+            drawing.planes.push(patch.plane);
+            for (primitive, mut fill) in patch.pieces {
+                if let Fill::Linear(linear) = &mut fill {
+                    linear.plane = plane;
+                }
+                drawing.primitives.push(primitive);
+                drawing.fills.push(fill);
+                drawing.patches.push(PatchId(i as u32));
+            }
+        }
+        drawing
+    }
+
+    /// Radiosity of a primitive at a position in pixels, W/m2.
+    pub(crate) fn radiosity(&self, primitive: usize, pixel: DVec2) -> [f32; 3] {
+        match &self.fills[primitive] {
+            Fill::Constant(b) | Fill::Outline(b) => *b,
+            Fill::Linear(linear) => {
+                let d = self.planes[linear.plane as usize].unproject(pixel) - linear.origin;
+                [0, 1, 2].map(|c| {
+                    let [low, high] = linear.range[c];
+                    (linear.value[c] + linear.gradient[c].dot(d)).clamp(low, high) as f32
+                })
+            }
+        }
+    }
+}
+
+/// Distance from `eye` to the farthest corner of a patch that is present, metres.
+fn farthest(snapshot: &Snapshot, eye: DVec3) -> f64 {
+    let mut far = 0.0_f64;
+    for patch in &snapshot.scene.patches {
+        if let Some(pose) = snapshot.poses[patch.body.0 as usize] {
+            far = patch.corners_in_body().fold(far, |far, p| far.max(pose.point(p).distance(eye)));
+        }
+    }
+    far
+}
+
+/// What one patch adds to a drawing.
+struct PatchDrawing {
+    plane: SeenPlane,
+    pieces: Vec<(Primitive, Fill)>,
+}
+
+impl PatchDrawing {
+    fn new(
+        snapshot: &Snapshot,
+        id: PatchId,
+        projector: &Projector,
+        grid: &Grid,
+        near: f64,
+        shading: Shading,
+        outlines: bool,
+    ) -> Option<PatchDrawing> {
+        let patch = &snapshot.scene.patches[id.0 as usize];
+        let pose = snapshot.poses[patch.body.0 as usize]?;
+        let origin = pose.point(patch.frame.origin);
+        if !projector.faces(origin, pose.direction(patch.frame.normal)) {
+            return None;
+        }
+        let (u, v) = (pose.direction(patch.frame.u), pose.direction(patch.frame.v));
+        let plane = SeenPlane::new(projector, origin, u, v)?;
+        let leaves = snapshot.leaves_of(id);
+        let mut pen = Pen { plane: &plane, grid, near, corners: Vec::new() };
+        let triangles = match shading {
+            Shading::Flat => Vec::new(),
+            Shading::Gouraud => gouraud::triangulate(&patch.corners, leaves),
+        };
+        let mut pieces: Vec<(Primitive, Fill)> = if triangles.is_empty() {
+            leaves.iter().filter_map(|leaf| pen.leaf(leaf)).collect()
+        } else {
+            triangles.iter().filter_map(|triangle| pen.triangle(triangle)).collect()
+        };
+        if outlines {
+            leaves.iter().for_each(|leaf| pen.outline(leaf, &mut pieces));
+        }
+        Some(PatchDrawing { plane, pieces })
+    }
+}
+
+/// Puts polygons of one plane on the screen.
+struct Pen<'a> {
+    plane: &'a SeenPlane,
+    grid: &'a Grid,
+    near: f64,
+    corners: Vec<DVec2>,
+}
+
+impl Pen<'_> {
+    fn polygon(&mut self, corners: &[DVec2]) -> Option<Primitive> {
+        self.clip(corners);
+        Primitive::new(self.grid, &self.corners, self.plane.nearness)
+    }
+
+    fn clip(&mut self, corners: &[DVec2]) {
+        let mut projected = [glam::DVec4::ZERO; 4];
+        for (projected, &corner) in projected.iter_mut().zip(corners) {
+            *projected = self.plane.project(corner);
+        }
+        clip_to_pixels(&projected[..corners.len()], self.near, &mut self.corners);
+    }
+
+    fn leaf(&mut self, leaf: &Leaf) -> Option<(Primitive, Fill)> {
+        Some((self.polygon(&leaf.corners)?, Fill::Constant(leaf.radiosity)))
+    }
+
+    fn triangle(&mut self, triangle: &Triangle) -> Option<(Primitive, Fill)> {
+        let primitive = self.polygon(&triangle.corners)?;
+        Some((
+            primitive,
+            Linear::new(triangle).map_or(Fill::Constant(triangle.radiosity[0]), Fill::Linear),
+        ))
+    }
+
+    fn outline(&mut self, leaf: &Leaf, pieces: &mut Vec<(Primitive, Fill)>) {
+        self.clip(&leaf.corners);
+        for (i, &a) in self.corners.iter().enumerate() {
+            let b = self.corners[(i + 1) % self.corners.len()];
+            let Some(across) = (b - a).perp().try_normalize() else { continue };
+            let across = across * (OUTLINE_WIDTH / 2.0);
+            let line = [a - across, b - across, b + across, a + across];
+            let primitive = Primitive::new(self.grid, &line, self.plane.nearness);
+            pieces.extend(primitive.map(|p| (p.lift(OUTLINE_LIFT), Fill::Outline(leaf.radiosity))));
+        }
+    }
+}
+
+impl Linear {
+    /// `None` for a triangle without area.
+    fn new(triangle: &Triangle) -> Option<Linear> {
+        let [a, b, c] = triangle.corners;
+        let (ab, ac) = (b - a, c - a);
+        let twice_area = ab.perp_dot(ac);
+        if twice_area.abs() <= 1e-12 * ab.length() * ac.length() {
+            return None;
+        }
+        let [at_a, at_b, at_c] = triangle.radiosity.map(|b| b.map(f64::from));
+        Some(Linear {
+            plane: 0,
+            origin: a,
+            value: at_a,
+            gradient: [0, 1, 2].map(|i| {
+                let (to_b, to_c) = (at_b[i] - at_a[i], at_c[i] - at_a[i]);
+                (ab.perp() * to_c - ac.perp() * to_b) / twice_area
+            }),
+            range: [0, 1, 2]
+                .map(|i| [at_a[i].min(at_b[i]).min(at_c[i]), at_a[i].max(at_b[i]).max(at_c[i])]),
+        })
+    }
+}

@@ -1,0 +1,35 @@
+//! Snapshot to pixels: camera, reconstruction, tone, overlays, PNG.
+//!
+//! This room reads snapshots and writes pictures. It must not know elements, pairs, links or the
+//! solver, and nothing that it computes is ever written back into a solution.
+//!
+//! The steps, each in a file of its own:
+//!
+//! | file | one sentence |
+//! |---|---|
+//! | `camera` | where the picture is taken from: [`Viewpoint`], [`View`] |
+//! | `auto_view` | a sensible [`View`] for a scene without a camera |
+//! | `project` | world to pixels, near clipping, and pixels back to a patch's plane |
+//! | `gouraud` | sample points of a patch, triangulated in the patch's own frame |
+//! | `assemble` | a snapshot as an ordered list of things to draw |
+//! | `raster` | which thing each sample of each pixel sees |
+//! | `tone` | radiosity to display values and bytes |
+//! | `exposure` | one exposure for a clip |
+//! | `image` | pixels and PNG files |
+
+mod assemble;
+mod auto_view;
+mod camera;
+mod exposure;
+mod gouraud;
+mod image;
+mod project;
+mod raster;
+mod render;
+mod tone;
+
+pub use camera::{View, ViewError, Viewpoint};
+pub use exposure::Exposure;
+pub use image::{Image, WriteError};
+pub use render::{Settings, Shading, render};
+pub use tone::Tone;

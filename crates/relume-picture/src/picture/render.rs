@@ -1,0 +1,120 @@
+//! A snapshot and a view to a picture.
+//!
+//! Must not know files. The bits depend on the arguments only, not on the number of threads.
+
+use relume::session::Snapshot;
+
+use super::assemble::{Drawing, Fill};
+use super::camera::View;
+use super::exposure::Exposure;
+use super::image::Image;
+use super::project::Projector;
+use super::raster::{Fragment, Grid, rasterise};
+use super::tone::{SrgbEncoder, Tone};
+
+/// How the elements' constant radiosities are shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Shading {
+    /// Every leaf in its one radiosity.
+    Flat,
+    /// Linear over a Delaunay triangulation of the sample points, patch by patch.
+    #[default]
+    Gouraud,
+}
+
+/// How a picture is made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// How radiosity varies over a leaf.
+    pub shading: Shading,
+    /// How bright.
+    pub exposure: Exposure,
+    /// How the bright end is treated.
+    pub tone: Tone,
+    /// Visibility samples per pixel, 1 to 64.
+    pub samples: u32,
+    /// Linear display value, in [0, 1], where nothing is seen.
+    pub background: [f64; 3],
+    /// Whether the outlines of the leaves are drawn over them.
+    pub mesh: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings {
+            width: 640,
+            height: 480,
+            shading: Shading::default(),
+            exposure: Exposure::default(),
+            tone: Tone::default(),
+            samples: 16,
+            background: [0.0; 3],
+            mesh: false,
+        }
+    }
+}
+
+/// Draws what a view sees of a snapshot.
+///
+/// Patches are one-sided: they hide what lies behind them only when their front faces the camera,
+/// so that one can look into a closed room from outside. (In the solution they block light on both
+/// sides.) Samples of one pixel that see different things are mixed after the tone curve, so
+/// that the edge of a lamp is as smooth as any.
+///
+/// Deterministic: the same bits for every number of threads.
+pub fn render(snapshot: &Snapshot, view: &View, settings: &Settings) -> Image {
+    let grid = Grid::new(settings.width, settings.height, settings.samples);
+    let projector = Projector::new(view, settings.width, settings.height);
+    let drawing = Drawing::new(snapshot, &projector, &grid, settings.shading, settings.mesh);
+    let shader = Shader {
+        drawing: &drawing,
+        exposure: settings.exposure.resolve(snapshot, view),
+        tone: settings.tone,
+        background: settings.background,
+        samples: f64::from(grid.samples()),
+        encoder: SrgbEncoder::new(),
+    };
+    let pixels = rasterise(&grid, &drawing.primitives, |fragments| shader.pixel(fragments));
+    Image { width: settings.width, height: settings.height, pixels }
+}
+
+struct Shader<'a> {
+    drawing: &'a Drawing,
+    exposure: f64,
+    tone: Tone,
+    background: [f64; 3],
+    samples: f64,
+    encoder: SrgbEncoder,
+}
+
+impl Shader<'_> {
+    fn pixel(&self, fragments: &[Fragment]) -> [u8; 3] {
+        let mut sum = [0.0; 3];
+        for fragment in fragments {
+            let display = self.display(fragment);
+            (0..3).for_each(|c| sum[c] += display[c] * f64::from(fragment.samples));
+        }
+        sum.map(|s| self.encoder.encode(s / self.samples))
+    }
+
+    /// Linear display values.
+    fn display(&self, fragment: &Fragment) -> [f64; 3] {
+        let Some(primitive) = fragment.primitive else { return self.background };
+        let radiosity = self.drawing.radiosity(primitive, fragment.position);
+        let display = self.tone.map(self.exposure, radiosity);
+        match self.drawing.fills[primitive] {
+            Fill::Outline(_) => contrast(display),
+            Fill::Constant(_) | Fill::Linear(_) => display,
+        }
+    }
+}
+
+/// A colour that is seen on the given one: darker on bright, brighter on dark.
+fn contrast(display: [f64; 3]) -> [f64; 3] {
+    let brightest = display.into_iter().fold(0.0, f64::max);
+    if brightest > 0.05 { display.map(|d| d * 0.4) } else { display.map(|d| d + 0.05) }
+}

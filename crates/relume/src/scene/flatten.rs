@@ -31,7 +31,7 @@ pub(super) fn flatten(points: &[DVec3]) -> Result<(Frame, Vec<DVec2>), Flaw> {
     }
     let plane =
         |p: &DVec3| DVec2::new((p - frame.origin).dot(frame.u), (p - frame.origin).dot(frame.v));
-    let corners = without_collinear(points.iter().map(plane).collect(), 0.1 * FLATNESS * extent);
+    let corners = without_collinear(points.iter().map(plane).collect(), 0.2 * FLATNESS * extent);
     if corners.len() < 3 {
         return Err(Flaw::Degenerate);
     }
@@ -81,27 +81,37 @@ fn frame_of(points: &[DVec3]) -> Option<Frame> {
 }
 
 /// Removes corners closer than `tolerance` to the line through their neighbours.
-fn without_collinear(mut corners: Vec<DVec2>, tolerance: f64) -> Vec<DVec2> {
-    let mut i = 0;
-    let mut kept_in_a_row = 0;
-    while corners.len() >= 3 && kept_in_a_row < corners.len() {
-        let n = corners.len();
-        i %= n;
-        let (a, b, c) = (corners[(i + n - 1) % n], corners[i], corners[(i + 1) % n]);
+fn without_collinear(corners: Vec<DVec2>, tolerance: f64) -> Vec<DVec2> {
+    let straight = |a: DVec2, b: DVec2, c: DVec2| {
         let chord = c - a;
-        let off = chord.perp_dot(b - a).abs();
-        let doubled = a.distance(b) <= tolerance;
-        if doubled || off <= tolerance * chord.length() {
-            corners.remove(i);
-            kept_in_a_row = 0;
+        a.distance(b) <= tolerance || chord.perp_dot(b - a).abs() <= tolerance * chord.length()
+    };
+    // Once along the loop, then round it until nothing changes: linear, where few are left to do.
+    let mut kept: Vec<DVec2> = Vec::with_capacity(corners.len());
+    for c in corners {
+        while let [.., a, b] = kept[..]
+            && straight(a, b, c)
+        {
+            kept.pop();
+        }
+        kept.push(c);
+    }
+    let mut i = 0;
+    let mut good_in_a_row = 0;
+    while kept.len() >= 3 && good_in_a_row < kept.len() {
+        let n = kept.len();
+        i %= n;
+        if straight(kept[(i + n - 1) % n], kept[i], kept[(i + 1) % n]) {
+            kept.remove(i);
+            good_in_a_row = 0;
             // The neighbours' angles changed: look at the one before again.
-            i += corners.len().max(1) - 1;
+            i += n - 2;
         } else {
-            kept_in_a_row += 1;
+            good_in_a_row += 1;
             i += 1;
         }
     }
-    corners
+    kept
 }
 
 /// Whether all corners turn left, once around in all.

@@ -13,6 +13,7 @@ mod builder;
 mod draft;
 mod error;
 mod flatten;
+mod merge;
 mod motion;
 mod names;
 mod rigid;

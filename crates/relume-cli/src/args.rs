@@ -152,9 +152,9 @@ pub(crate) struct SolveFlags {
     #[command(flatten)]
     pub(crate) animation: AnimationFlag,
     /// Relative error of irradiance aimed at (root mean square), between 0 and 1: 0.1 is quick,
-    /// 0.005 is fine.
-    #[arg(long, value_name = "ERROR", default_value = "0.02", value_parser = parse_tolerance, allow_negative_numbers = true)]
-    pub(crate) tolerance: f64,
+    /// 0.005 is fine [default: 0.02].
+    #[arg(long, value_name = "ERROR", value_parser = parse_tolerance, allow_negative_numbers = true)]
+    pub(crate) tolerance: Option<f64>,
     /// What decides whether two elements are linked: `error`, the estimated error of irradiance, or
     /// `form-factor=EPS[,MINAREA]`, as in the paper: a link where the form factor is below EPS,
     /// elements not refined below MINAREA m2 (left out: 1/5000 of the scene's area). Example:
@@ -196,8 +196,9 @@ pub(crate) struct PictureFlags {
     /// Name of the camera in the file [default: the first; an overview where there is none].
     #[arg(long, value_name = "NAME")]
     pub(crate) camera: Option<String>,
-    /// Exposure in stops (EV, +1 is twice as bright), fixed over the clip, or `auto`: chosen once, at
-    /// the first frame of the animation in which anything emits, whichever frames are asked for.
+    /// Exposure in stops, fixed over the clip: at 0 a radiance of 1 W/m2/sr is full white, +1 is twice
+    /// as bright. `auto` chooses it once, at the first frame of the animation in which anything
+    /// emits, whichever frames are asked for; report.json says what it chose.
     #[arg(long, value_name = "EV", default_value = "auto", allow_negative_numbers = true)]
     pub(crate) exposure: ExposureFlag,
     /// Draw the outlines of the elements over the picture.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::frames::FrameSpec;
 
@@ -216,7 +216,7 @@ pub(crate) struct Size {
 }
 
 /// How elements become colour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Shading {
     /// One value an element.
@@ -331,7 +331,9 @@ impl FromStr for OracleFlag {
             return Ok(OracleFlag::Error);
         }
         let Some(numbers) = text.strip_prefix("form-factor=") else {
-            return Err("write `error` or `form-factor=EPS[,MINAREA]`: form-factor=0.02,0.001".into());
+            return Err(
+                "write `error` or `form-factor=EPS[,MINAREA]`: form-factor=0.02,0.001".into()
+            );
         };
         let (epsilon, area) = match numbers.split_once(',') {
             Some((epsilon, area)) => (epsilon, Some(area)),

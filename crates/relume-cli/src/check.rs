@@ -1,5 +1,7 @@
 //! `relume check`: what is wrong with a scene, and what to do about it.
 
+use std::cmp::Reverse;
+
 use relume::scene::{self, Note, Scene, Severity};
 
 use crate::args::CheckArgs;
@@ -33,7 +35,7 @@ fn findings(scene: &Scene) -> Vec<Note> {
         }
     }
     // Stable: within a severity in the order they were found.
-    notes.sort_by(|a, b| b.severity.cmp(&a.severity));
+    notes.sort_by_key(|note| Reverse(note.severity));
     notes
 }
 
@@ -44,8 +46,7 @@ fn count_of(notes: &[Note], severity: Severity) -> usize {
 /// The findings as text, a line each, and the count of them.
 fn text(name: &str, notes: &[Note]) -> String {
     let mut text: String = notes.iter().map(|note| scene_file::line(note) + "\n").collect();
-    let (errors, warnings) =
-        (count_of(notes, Severity::Error), count_of(notes, Severity::Warning));
+    let (errors, warnings) = (count_of(notes, Severity::Error), count_of(notes, Severity::Warning));
     text += &match (errors, warnings) {
         (0, 0) => format!("{name}: nothing wrong found\n"),
         _ => format!("{name}: {}, {}\n", counted(errors, "error"), counted(warnings, "warning")),

@@ -134,7 +134,14 @@ enum Side {
 }
 
 /// One side of the box `min..max`, facing inwards, as an object of its own.
-fn wall(b: &mut SceneBuilder, name: &str, material: MaterialId, min: DVec3, max: DVec3, side: Side) {
+fn wall(
+    b: &mut SceneBuilder,
+    name: &str,
+    material: MaterialId,
+    min: DVec3,
+    max: DVec3,
+    side: Side,
+) {
     let at = |x: f64, y: f64, z: f64| min + (max - min) * DVec3::new(x, y, z);
     let corners = match side {
         Side::Left => [at(0., 0., 0.), at(0., 1., 0.), at(0., 1., 1.), at(0., 0., 1.)],

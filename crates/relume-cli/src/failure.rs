@@ -35,13 +35,14 @@ impl Failure {
 
     /// A file or directory that could not be written.
     pub(crate) fn write(path: &Path, error: &io::Error) -> Failure {
-        Failure::new(format_args!("cannot write {}: {}", path.display(), describe(error)))
-            .help(match error.kind() {
+        Failure::new(format_args!("cannot write {}: {}", path.display(), describe(error))).help(
+            match error.kind() {
                 io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
                     "free some space, then run again with --resume"
                 }
                 _ => "choose another place with -o, or check its permissions",
-            })
+            },
+        )
     }
 
     /// A file that could not be read.
@@ -61,9 +62,9 @@ fn describe(error: &io::Error) -> String {
     let text = error.to_string();
     let words = text.split(" (os error").next().unwrap_or(&text);
     let mut chars = words.chars();
-    chars.next().map_or_else(String::new, |first| {
-        first.to_lowercase().collect::<String>() + chars.as_str()
-    })
+    chars
+        .next()
+        .map_or_else(String::new, |first| first.to_lowercase().collect::<String>() + chars.as_str())
 }
 
 impl fmt::Display for Failure {

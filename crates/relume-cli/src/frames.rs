@@ -53,7 +53,8 @@ impl FromStr for FrameSpec {
     type Err = FrameSpecError;
 
     fn from_str(text: &str) -> Result<FrameSpec, FrameSpecError> {
-        let parts = text.split(',').map(|part| Part::parse(part.trim())).collect::<Result<_, _>>()?;
+        let parts =
+            text.split(',').map(|part| Part::parse(part.trim())).collect::<Result<_, _>>()?;
         Ok(FrameSpec { parts })
     }
 }
@@ -117,13 +118,17 @@ impl fmt::Display for FrameSpec {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub(crate) enum FrameRangeError {
     /// The scene stands still.
-    #[error("frame {frame} was asked for, but nothing in the scene is animated: it has frame 0 only")]
+    #[error(
+        "frame {frame} was asked for, but nothing in the scene is animated: it has frame 0 only"
+    )]
     Still {
         /// The frame asked for.
         frame: u32,
     },
     /// Past the end.
-    #[error("frame {frame} is outside the animation, which has frames 0-{last} at {fps} fps ({duration_s:.3} s)")]
+    #[error(
+        "frame {frame} is outside the animation, which has frames 0-{last} at {fps} fps ({duration_s:.3} s)"
+    )]
     Outside {
         /// The frame asked for.
         frame: u32,

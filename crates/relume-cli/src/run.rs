@@ -39,6 +39,8 @@ const MIN_AREA_SHARE: f64 = 1.0 / 5_000.0;
 /// The report is written again after a frame if the last time was this long ago. A run that is
 /// killed outright computes the frames of this time again when it is resumed.
 const REPORT_INTERVAL: Duration = Duration::from_secs(1);
+/// At most one part in so many of a run is spent on writing reports, however long they grow.
+const REPORT_SHARE: u32 = 20;
 
 /// `relume demo`
 pub(crate) fn demo(args: DemoArgs) -> Result<(), Failure> {
@@ -298,7 +300,7 @@ struct Run<'a> {
 impl Run<'_> {
     /// Solves and draws the frames that are not finished yet, in order.
     fn frames(&mut self, pending: &[u32]) -> Result<Outcome, Failure> {
-        let mut written = now();
+        let (mut written, mut interval) = (now(), REPORT_INTERVAL);
         for &frame in pending {
             if interrupt::requested() {
                 return Ok(Outcome::Interrupted);
@@ -309,9 +311,11 @@ impl Run<'_> {
             }
             self.frame(frame)?;
             self.progress.finish_frame();
-            if written.elapsed() >= REPORT_INTERVAL {
+            if written.elapsed() >= interval {
+                let before = now();
                 self.write_report()?;
                 written = now();
+                interval = REPORT_INTERVAL.max(before.elapsed() * REPORT_SHARE);
             }
         }
         Ok(Outcome::Done)

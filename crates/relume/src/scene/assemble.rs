@@ -8,7 +8,7 @@ use std::ops::Range;
 use glam::{DMat3, DVec2, DVec3};
 
 use super::draft::{Draft, DraftSurface};
-use super::flatten::{flatten, seen_from_behind};
+use super::flatten::{Flaw, flatten, seen_from_behind};
 use super::names::Names;
 use super::rigid::without_scales;
 use super::{
@@ -104,17 +104,19 @@ impl Parts {
         let id = SurfaceId(self.surfaces.len() as u32);
         let before = self.patches.len();
         let mut degenerate = 0;
+        let double_sided = materials[surface.material.0 as usize].double_sided;
         for polygon in &surface.polygons {
             let points = place.place(polygon);
             if points.iter().any(|p| !p.is_finite()) {
                 return Err(not_finite(&surface.name, object));
             }
-            match flatten(&points) {
-                Ok((frame, corners)) => {
-                    let double_sided = materials[surface.material.0 as usize].double_sided;
-                    self.add_patch(body, id, surface.material, double_sided, frame, corners);
+            for piece in flat_pieces(&points) {
+                match piece {
+                    Ok((frame, corners)) => {
+                        self.add_patch(body, id, surface.material, double_sided, frame, corners)
+                    }
+                    Err(_) => degenerate += 1,
                 }
-                Err(_) => degenerate += 1,
             }
         }
         if self.patches.len() > before {
@@ -157,6 +159,17 @@ impl Parts {
                 twin,
             });
         }
+    }
+}
+
+/// The loop as one polygon, or as triangles where an uneven scale made it leave its plane by more
+/// than rounding.
+fn flat_pieces(points: &[DVec3]) -> Vec<Result<(Frame, Vec<DVec2>), Flaw>> {
+    match flatten(points) {
+        Err(Flaw::NonPlanar | Flaw::NotConvex) => {
+            (1..points.len() - 1).map(|i| flatten(&[points[0], points[i], points[i + 1]])).collect()
+        }
+        one => vec![one],
     }
 }
 

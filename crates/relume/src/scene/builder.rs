@@ -3,7 +3,7 @@
 //!
 //! Must not know how a scene is checked and grouped; that is `assemble`'s.
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 use super::assemble::assemble;
 use super::draft::{Draft, DraftNode, DraftSurface};
@@ -95,7 +95,7 @@ impl SceneBuilder {
     /// Scales what hangs on a node, along the node's own axes; constant in time. A product of
     /// negative sign mirrors; fronts stay fronts.
     pub fn scale(&mut self, node: NodeId, scale: DVec3) {
-        self.change(node, |n| n.scale = scale);
+        self.change(node, |n| n.shape = DMat3::from_diagonal(scale));
     }
 
     /// Animates the translation of a node.

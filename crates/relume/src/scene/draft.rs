@@ -3,7 +3,7 @@
 //! Nodes still carry scales, polygons are loops of points in their node's own frame, and names
 //! may repeat. Must not know where any of it came from.
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 use super::{Camera, Light, Material, MaterialId, Note, RotationTrack, Track};
 
@@ -26,7 +26,8 @@ pub(super) struct DraftNode {
     pub(super) parent: Option<usize>,
     pub(super) translation: DVec3,
     pub(super) rotation: DQuat,
-    pub(super) scale: DVec3,
+    /// Applied before the rotation: a scale, or any constant linear map.
+    pub(super) shape: DMat3,
     pub(super) translation_track: Option<Track>,
     pub(super) rotation_track: Option<RotationTrack>,
     pub(super) presence: Vec<(f64, bool)>,
@@ -54,7 +55,7 @@ impl DraftNode {
             parent,
             translation,
             rotation,
-            scale: DVec3::ONE,
+            shape: DMat3::IDENTITY,
             translation_track: None,
             rotation_track: None,
             presence: Vec::new(),

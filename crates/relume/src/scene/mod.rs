@@ -13,6 +13,7 @@ mod builder;
 mod draft;
 mod error;
 mod flatten;
+mod import;
 mod merge;
 mod motion;
 mod names;
@@ -20,6 +21,7 @@ mod rigid;
 
 pub use builder::SceneBuilder;
 pub use error::SceneError;
+pub use import::{ImportOptions, import};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
 
 /// Index of a [`Body`] in [`Scene::bodies`].

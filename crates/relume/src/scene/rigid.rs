@@ -66,7 +66,10 @@ fn rigid_node(node: &DraftNode, above: DMat3) -> Result<Node, SceneError> {
 
 /// The matrix that shapes what hangs on the node.
 fn residual(node: &DraftNode, rigid: &Node, above: DMat3) -> Result<DMat3, SceneError> {
-    let scale = DMat3::from_diagonal(finite(node, "scale", node.scale)?);
+    let scale = node.shape;
+    for column in [scale.x_axis, scale.y_axis, scale.z_axis] {
+        finite(node, "scale", column)?;
+    }
     let isotropic = above == DMat3::from_diagonal(DVec3::splat(above.x_axis.x));
     if isotropic {
         return Ok(above * scale);

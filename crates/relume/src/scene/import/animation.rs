@@ -1,0 +1,314 @@
+//! Animations: keyframes of translation, rotation and presence for each node of the file.
+//!
+//! All animations play together unless one is chosen by name: exporters such as Blender's write
+//! one for each object. Where two move the same property of a node, the first one wins, with a
+//! note. Scale keys that only switch between nothing and one size become presence; a size that
+//! changes otherwise is an error, because the object would not move rigidly.
+
+use glam::{DQuat, DVec3};
+
+use super::document::Document;
+use super::{json, node_name, note};
+use crate::scene::{Interpolation, Note, RotationTrack, SceneError, Severity, Track};
+
+/// How long a scale may take from nothing to full size and still count as a switch, seconds.
+/// Exporters that write a key for each frame turn a switch into a ramp of one frame.
+const SWITCH_S: f64 = 0.1;
+
+/// Relative difference of scales that counts as none: what 32-bit exporters leave behind.
+const SAME_SCALE: f64 = 1e-5;
+
+/// Keyframes of one node of the file.
+#[derive(Default)]
+pub(super) struct Moves {
+    pub(super) translation: Option<Track>,
+    pub(super) rotation: Option<RotationTrack>,
+    /// The one scale of all keys, which replaces the node's.
+    pub(super) scale: Option<DVec3>,
+    pub(super) presence: Vec<(f64, bool)>,
+    pub(super) visibility: Vec<(f64, bool)>,
+}
+
+/// What moves each node, and the names of the animations that play.
+pub(super) fn moves(
+    document: &Document,
+    chosen: Option<&str>,
+    notes: &mut Vec<Note>,
+) -> Result<(Vec<Moves>, Option<String>), SceneError> {
+    let names: Vec<String> =
+        document.root.animations.iter().enumerate().map(|(i, a)| name_of(i, a)).collect();
+    if let Some(wanted) = chosen
+        && !names.iter().any(|n| n == wanted)
+    {
+        let there = if names.is_empty() {
+            "it has none".to_owned()
+        } else {
+            format!("it has {}", names.join(", "))
+        };
+        return Err(SceneError::Animation {
+            animation: wanted.to_owned(),
+            what: format!("`{}` has no animation of this name", document.file),
+            remedy: format!("choose one that is there ({there}), or none to play all together"),
+        });
+    }
+    let mut moves: Vec<Moves> = document.root.nodes.iter().map(|_| Moves::default()).collect();
+    let mut playing = Vec::new();
+    for (animation, name) in document.root.animations.iter().zip(&names) {
+        if chosen.is_none_or(|wanted| wanted == name) {
+            playing.push(name.clone());
+            for channel in &animation.channels {
+                Reader { document, animation, name }.channel(channel, &mut moves, notes)?;
+            }
+        }
+        if chosen == Some(name) {
+            break;
+        }
+    }
+    Ok((moves, (!playing.is_empty()).then(|| playing.join(", "))))
+}
+
+fn name_of(index: usize, animation: &json::Animation) -> String {
+    animation.name.clone().filter(|n| !n.is_empty()).unwrap_or_else(|| format!("animation {index}"))
+}
+
+/// Reads the channels of one animation.
+struct Reader<'a> {
+    document: &'a Document,
+    animation: &'a json::Animation,
+    name: &'a str,
+}
+
+impl Reader<'_> {
+    fn channel(
+        &self,
+        channel: &json::Channel,
+        moves: &mut [Moves],
+        notes: &mut Vec<Note>,
+    ) -> Result<(), SceneError> {
+        if channel.target.path == "pointer" {
+            return self.pointer(channel, moves, notes);
+        }
+        let Some(node) = channel.target.node else { return Ok(()) };
+        let name = node_name(self.document, node);
+        let of_node =
+            moves.get_mut(node).ok_or_else(|| self.document.out_of_range("node", node))?;
+        let taken = match channel.target.path.as_str() {
+            "translation" => of_node.translation.is_some(),
+            "rotation" => of_node.rotation.is_some(),
+            "scale" => of_node.scale.is_some(),
+            "weights" => {
+                let message =
+                    "its morph target animation is ignored: it stays in its base shape".to_owned();
+                notes.push(note(Severity::Warning, "morph", &name, 1, message));
+                return Ok(());
+            }
+            other => {
+                return Err(self.malformed(&format!(
+                    "node `{name}` has an unknown animated property `{other}`"
+                )));
+            }
+        };
+        if taken {
+            let path = &channel.target.path;
+            let message = format!(
+                "animation `{}` moves its {path} too; the first animation wins: choose one by name",
+                self.name
+            );
+            notes.push(note(Severity::Warning, "animation-conflict", &name, 1, message));
+            return Ok(());
+        }
+        let (times_s, interpolation) = self.keys(channel)?;
+        let output = self.sampler(channel)?.output;
+        match channel.target.path.as_str() {
+            "translation" => {
+                let values = self.vectors(output, &name)?;
+                of_node.translation = Some(Track { times_s, values, interpolation });
+            }
+            "rotation" => {
+                let read = self.document.numbers::<4>(output, &self.owner(&name))?;
+                let values = read.into_iter().map(DQuat::from_array).collect();
+                of_node.rotation = Some(RotationTrack { times_s, values, interpolation });
+            }
+            _ => {
+                let values = self.vectors(output, &name)?;
+                let (scale, presence) = switches(&name, &times_s, &values, interpolation)?;
+                if presence.iter().any(|k| !k.1) {
+                    let message = "its scale of 0 is taken as absence".to_owned();
+                    notes.push(note(Severity::Info, "presence", &name, 1, message));
+                    of_node.presence = presence;
+                }
+                of_node.scale = Some(scale);
+            }
+        }
+        Ok(())
+    }
+
+    /// KHR_animation_pointer: visibility of nodes is read, anything else is noted.
+    fn pointer(
+        &self,
+        channel: &json::Channel,
+        moves: &mut [Moves],
+        notes: &mut Vec<Note>,
+    ) -> Result<(), SceneError> {
+        let pointer = channel.target.extensions.pointer.as_ref().map_or("", |p| p.pointer.as_str());
+        let node = pointer
+            .strip_prefix("/nodes/")
+            .and_then(|rest| rest.strip_suffix("/extensions/KHR_node_visibility/visible"))
+            .and_then(|index| index.parse::<usize>().ok());
+        let Some(node) = node else {
+            let message =
+                format!("animation `{}` changes this over time, which is ignored", self.name);
+            notes.push(note(Severity::Warning, "animation-pointer", pointer, 1, message));
+            return Ok(());
+        };
+        let name = node_name(self.document, node);
+        let of_node =
+            moves.get_mut(node).ok_or_else(|| self.document.out_of_range("node", node))?;
+        if of_node.visibility.is_empty() {
+            let (times_s, _) = self.keys(channel)?;
+            let shown =
+                self.document.numbers::<1>(self.sampler(channel)?.output, &self.owner(&name))?;
+            of_node.visibility =
+                times_s.into_iter().zip(shown.into_iter().map(|[v]| v != 0.0)).collect();
+        }
+        Ok(())
+    }
+
+    fn sampler(&self, channel: &json::Channel) -> Result<&json::Sampler, SceneError> {
+        let sampler = self.animation.samplers.get(channel.sampler);
+        sampler
+            .ok_or_else(|| self.malformed(&format!("sampler {} does not exist", channel.sampler)))
+    }
+
+    fn keys(&self, channel: &json::Channel) -> Result<(Vec<f64>, Interpolation), SceneError> {
+        let sampler = self.sampler(channel)?;
+        let times =
+            self.document.numbers::<1>(sampler.input, &format!("animation `{}`", self.name))?;
+        let interpolation = match sampler.interpolation.as_deref() {
+            None | Some("LINEAR") => Interpolation::Linear,
+            Some("STEP") => Interpolation::Step,
+            Some("CUBICSPLINE") => Interpolation::CubicSpline,
+            Some(other) => {
+                return Err(self.malformed(&format!("the interpolation `{other}` does not exist")));
+            }
+        };
+        Ok((times.into_iter().map(|[t]| frame_time_s(t)).collect(), interpolation))
+    }
+
+    fn vectors(&self, accessor: usize, node: &str) -> Result<Vec<DVec3>, SceneError> {
+        let read = self.document.numbers::<3>(accessor, &self.owner(node))?;
+        Ok(read.into_iter().map(DVec3::from_array).collect())
+    }
+
+    fn owner(&self, node: &str) -> String {
+        format!("animation `{}` of node `{node}`", self.name)
+    }
+
+    fn malformed(&self, what: &str) -> SceneError {
+        self.document.malformed(format!("animation `{}`: {what}", self.name))
+    }
+}
+
+/// The time of a frame as a 64-bit number, where the 32-bit `time_s` is a rounded one.
+///
+/// Files hold 1/24 as the nearest 32-bit number; a clip rendered at 24 frames a second asks for
+/// the nearest 64-bit one, a little earlier or later, and would miss a switch by a whole frame.
+fn frame_time_s(time_s: f64) -> f64 {
+    let as_frame = |fps: f64| (time_s * fps).round() / fps;
+    let rates = [1.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 1000.0];
+    rates.into_iter().map(as_frame).find(|&t| t as f32 == time_s as f32).unwrap_or(time_s)
+}
+
+/// The one size among scale keys, and when the node has it; an error if there are more sizes.
+fn switches(
+    node: &str,
+    times_s: &[f64],
+    values: &[DVec3],
+    interpolation: Interpolation,
+) -> Result<(DVec3, Vec<(f64, bool)>), SceneError> {
+    let not_rigid = |what: String| {
+        SceneError::NotRigid {
+        node: node.to_owned(),
+        what,
+        remedy: "animate translation and rotation only, or switch the scale between 0 and one value in one step"
+            .into(),
+    }
+    };
+    let per_key = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+    if values.len() != times_s.len() * per_key {
+        return Err(not_rigid(format!(
+            "its scale has {} keys but {} values",
+            times_s.len(),
+            values.len()
+        )));
+    }
+    let keys: Vec<DVec3> = values.chunks(per_key).map(|v| v[per_key / 2]).collect();
+    let size = |v: &DVec3| v.abs().max_element();
+    let full = keys
+        .iter()
+        .copied()
+        .fold(DVec3::ZERO, |best, v| if size(&v) > size(&best) { v } else { best });
+    let present = |v: &DVec3| size(v) > SAME_SCALE * size(&full);
+    if let Some(other) = keys
+        .iter()
+        .find(|v| present(v) && (**v - full).abs().max_element() > SAME_SCALE * size(&full))
+    {
+        return Err(not_rigid(format!(
+            "its scale changes over time, from ({}, {}, {}) to ({}, {}, {})",
+            other.x, other.y, other.z, full.x, full.y, full.z
+        )));
+    }
+    let presence: Vec<(f64, bool)> =
+        times_s.iter().copied().zip(keys.iter().map(present)).collect();
+    let slow = presence.windows(2).find(|w| w[0].1 != w[1].1 && w[1].0 - w[0].0 > SWITCH_S);
+    if let (Some(w), true) = (slow, interpolation != Interpolation::Step) {
+        return Err(not_rigid(format!(
+            "it grows or shrinks between {} s and {} s",
+            w[0].0, w[1].0
+        )));
+    }
+    let changes = |i: usize| i == 0 || presence[i].1 != presence[i - 1].1;
+    let presence = (0..presence.len()).filter(|&i| changes(i)).map(|i| presence[i]).collect();
+    Ok((full, presence))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frame_times_are_found_again() {
+        for frame in 0..5000 {
+            for fps in [24.0, 25.0, 30.0, 60.0] {
+                let exact = f64::from(frame) / fps;
+                assert_eq!(frame_time_s(f64::from(exact as f32)), exact);
+            }
+        }
+        let odd = f64::from(0.123_456_79_f32);
+        assert_eq!(frame_time_s(odd), odd);
+        assert!(frame_time_s(f64::NAN).is_nan());
+    }
+
+    #[test]
+    fn scale_switches_are_presence_and_growth_is_refused() {
+        let (o, s) = (DVec3::ZERO, DVec3::splat(2.0));
+        let step = |keys: &[(f64, DVec3)], interpolation| {
+            let times: Vec<f64> = keys.iter().map(|k| k.0).collect();
+            let values: Vec<DVec3> = keys.iter().map(|k| k.1).collect();
+            switches("blinker", &times, &values, interpolation)
+        };
+        let blink = [(0.0, s), (1.0, o), (2.0, o), (3.0, s)];
+        let (scale, presence) = step(&blink, Interpolation::Step).unwrap();
+        assert_eq!((scale, presence), (s, vec![(0.0, true), (1.0, false), (3.0, true)]));
+        let message = step(&blink, Interpolation::Linear).unwrap_err().to_string();
+        assert!(
+            message.contains("`blinker`") && message.contains("between 0 s and 1 s"),
+            "{message}"
+        );
+        assert!(step(&[(0.0, s), (1.0, s), (1.04, o)], Interpolation::Linear).is_ok());
+        let message =
+            step(&[(0.0, s), (1.0, s * 1.5)], Interpolation::Step).unwrap_err().to_string();
+        assert!(message.contains("scale changes"), "{message}");
+        assert_eq!(step(&[(0.0, s)], Interpolation::Linear).unwrap().1, [(0.0, true)]);
+    }
+}

@@ -1,0 +1,94 @@
+//! Punctual lights (KHR_lights_punctual) and cameras.
+//!
+//! glTF states lights in photometric units: candela for point and spot lights, lux for directional
+//! ones. They are divided by 683 lm/W, which undoes what Blender's exporter does by default (its
+//! lighting mode "Standard"; the mode "Unitless" leaves the factor out, so such files come out 683
+//! times too dark). What each light became is stated in [`Light::conversion`] and in a note.
+
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+
+use super::document::Document;
+use super::{json, note};
+use crate::scene::{Light, LightKind, NodeId, Note, Projection, SceneError, Severity};
+
+/// Lumens in a watt at 555 nm.
+const LUMENS_PER_WATT: f64 = 683.0;
+
+/// The light `index` of the file on a node.
+pub(super) fn light(
+    document: &Document,
+    index: usize,
+    node: NodeId,
+    name: &str,
+    notes: &mut Vec<Note>,
+) -> Result<Light, SceneError> {
+    let lights = document.root.extensions.lights.as_ref().map_or(&[][..], |l| &l.lights);
+    let light = lights.get(index).ok_or_else(|| document.out_of_range("light", index))?;
+    let kind = kind_of(document, light, name)?;
+    let colour = light.color.unwrap_or([1.0; 3]);
+    let stated = light.intensity.unwrap_or(1.0);
+    let intensity = colour.map(|c| c * stated / LUMENS_PER_WATT);
+    if intensity.iter().any(|i| !i.is_finite() || *i < 0.0) {
+        return Err(document.malformed(format!(
+            "light `{name}` has the intensity {stated} and the colour {colour:?}"
+        )));
+    }
+    let (unit, becomes) = match kind {
+        LightKind::Directional => ("lx", "W/m2"),
+        _ => ("cd", "W/sr"),
+    };
+    let [r, g, b] = intensity;
+    let mut conversion = format!(
+        "{stated} {unit} x colour {colour:?} / 683 lm/W = ({r:.6}, {g:.6}, {b:.6}) {becomes}"
+    );
+    if light.range.is_some() {
+        conversion.push_str("; its range is ignored");
+    }
+    notes.push(note(Severity::Info, "light-units", name, 1, conversion.clone()));
+    Ok(Light { name: name.to_owned(), node, kind, intensity, conversion })
+}
+
+fn kind_of(document: &Document, light: &json::Light, name: &str) -> Result<LightKind, SceneError> {
+    match light.kind.as_str() {
+        "point" => Ok(LightKind::Point),
+        "directional" => Ok(LightKind::Directional),
+        "spot" => {
+            let angles = light.spot.as_ref();
+            let inner = angles.and_then(|s| s.inner_cone_angle).unwrap_or(0.0);
+            let outer = angles.and_then(|s| s.outer_cone_angle).unwrap_or(FRAC_PI_4);
+            // 32-bit exporters round pi/2 up.
+            if 0.0 <= inner && inner <= outer && outer <= FRAC_PI_2 + 1e-5 {
+                return Ok(LightKind::Spot { inner, outer });
+            }
+            Err(document.malformed(format!(
+                "spot light `{name}` has cone angles {inner} (inner) and {outer} (outer)"
+            )))
+        }
+        other => Err(document.malformed(format!("light `{name}` has the unknown type {other}"))),
+    }
+}
+
+/// The projection of camera `index` of the file.
+pub(super) fn projection(document: &Document, index: usize) -> Result<Projection, SceneError> {
+    let camera =
+        document.root.cameras.get(index).ok_or_else(|| document.out_of_range("camera", index))?;
+    let bad = |what: &str| Err(document.malformed(format!("camera {index}: {what}")));
+    let sensible = |x: f64| x.is_finite() && x > 0.0;
+    match (camera.kind.as_str(), &camera.perspective, &camera.orthographic) {
+        ("perspective", Some(p), _) if sensible(p.yfov) && p.yfov < std::f64::consts::PI => {
+            Ok(Projection::Perspective {
+                yfov: p.yfov,
+                aspect: p.aspect_ratio.filter(|&a| sensible(a)),
+            })
+        }
+        ("perspective", Some(p), _) => bad(&format!("its field of view is {} rad", p.yfov)),
+        // Negative extents are discouraged but legal; they mirror the picture, which is not done.
+        ("orthographic", _, Some(o)) if sensible(o.xmag.abs()) && sensible(o.ymag.abs()) => {
+            Ok(Projection::Orthographic { xmag: o.xmag.abs(), ymag: o.ymag.abs() })
+        }
+        ("orthographic", _, Some(o)) => {
+            bad(&format!("its extents are {} and {} m", o.xmag, o.ymag))
+        }
+        (kind, _, _) => bad(&format!("its type `{kind}` has no numbers to go with it")),
+    }
+}

@@ -1,0 +1,71 @@
+//! glTF 2.0 in: .glb and .gltf files become scenes.
+//!
+//! Reads and translates; what makes a scene valid is `assemble`'s. Whatever is wrong with a file
+//! is an error that names the node or mesh and the remedy, never a panic. Must not know light
+//! transport.
+
+use std::path::Path;
+
+mod accessor;
+mod animation;
+mod base64;
+mod document;
+mod json;
+mod light;
+mod material;
+mod mesh;
+mod tree;
+
+use document::Document;
+
+use super::assemble::assemble;
+use super::{Note, Scene, SceneError, Severity};
+
+/// What to read of a file.
+#[derive(Clone, Debug, Default)]
+pub struct ImportOptions {
+    /// Name of the one animation to play; `None` plays all together, as exporters that write one
+    /// for each object mean it.
+    pub animation: Option<String>,
+}
+
+/// Reads a scene from a .glb or .gltf file (glTF 2.0; external and embedded buffers).
+///
+/// Units are metres, seconds and W: emissive factors are radiances in W/m2/sr, punctual lights are
+/// converted ([`super::Light::conversion`]). Extensions without effect on diffuse light are
+/// ignored; what is read otherwise than the file says is in [`Scene::notes`]. Skinned and morphed
+/// meshes are read in their rest shape, with a warning that names the node.
+///
+/// # Errors
+/// A file that is missing, damaged or needs what is not supported, a motion that is not rigid, a
+/// scene without polygons: each names the file, node or mesh, and the remedy.
+pub fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError> {
+    let document = Document::open(path)?;
+    let mut draft = tree::draft(&document, options)?;
+    let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned());
+    draft.name = stem.unwrap_or_else(|| document.file.clone());
+    assemble(draft)
+}
+
+/// A note in one line.
+fn note(
+    severity: Severity,
+    code: &'static str,
+    subject: &str,
+    count: usize,
+    message: String,
+) -> Note {
+    Note { severity, code, subject: subject.to_owned(), count, message }
+}
+
+/// The node's name, or that of what it shows, or its number.
+fn node_name(document: &Document, index: usize) -> String {
+    let node = document.root.nodes.get(index);
+    let named = |name: &Option<String>| name.clone().filter(|n| !n.is_empty());
+    let of_mesh = || {
+        node.and_then(|n| n.mesh)
+            .and_then(|m| document.root.meshes.get(m))
+            .and_then(|m| named(&m.name))
+    };
+    node.and_then(|n| named(&n.name)).or_else(of_mesh).unwrap_or_else(|| format!("node {index}"))
+}

@@ -98,7 +98,7 @@ impl Drawing {
                 let d = self.planes[linear.plane as usize].unproject(pixel) - linear.origin;
                 [0, 1, 2].map(|c| {
                     let [low, high] = linear.range[c];
-                    (linear.value[c] + linear.gradient[c].dot(d)).clamp(low, high) as f32
+                    (linear.value[c] + linear.gradient[c].dot(d)).max(low).min(high) as f32
                 })
             }
         }

@@ -8,7 +8,7 @@
 //! objects in open space (few). Each kind has its candidate views, and all candidates are scored in
 //! one way, from tiny pictures of the scene at a few instants:
 //!
-//!   score = seen + 0.3 (front - back) + 0.1 lamps - close
+//! `score = seen + 0.3 (front - back) + 0.1 lamps - close`
 //!
 //! where `seen` is the share of the scene's area that the picture shows from the front, `front` and
 //! `back` are the shares of pixels that meet a front or a back first, `lamps` is the seen share of
@@ -38,6 +38,10 @@ const ROWS: u32 = 36;
 const ROOM: f64 = 0.45;
 const CLOSED: f64 = 0.97;
 
+/// A middle must also see points this far apart, relative to the diagonal of the bounds: the
+/// inside of a double-sided object is no room.
+const SPAN: f64 = 0.4;
+
 /// Instants at which the swept bounds are taken.
 const SWEEP_STEPS: u32 = 64;
 
@@ -50,12 +54,12 @@ pub(crate) fn choose(scene: &Scene) -> View {
     let stages: Vec<Stage> = (0..if duration > 0.0 { 3 } else { 1 })
         .map(|i| Stage::new(scene, duration * f64::from(i) / 3.0, bounds.diagonal()))
         .collect();
-    let enclosure = stages[0].enclosure(&bounds);
+    let middle = Middle::new(&stages[0], &bounds);
     let mut candidates = Vec::new();
-    if enclosure < CLOSED {
+    if middle.enclosure < CLOSED {
         candidates.extend(outside(&bounds));
     }
-    if enclosure > ROOM {
+    if middle.enclosure > ROOM {
         candidates.extend(inside(&bounds));
     }
     let scores: Vec<f64> = candidates
@@ -169,20 +173,64 @@ fn inside(bounds: &Bounds) -> Vec<View> {
     views
 }
 
+/// What is met by looking around from points in the middle of the bounds.
+struct Middle {
+    /// Greatest share of directions in which a front is met first.
+    enclosure: f64,
+    /// Which patches are seen from points that are in a room.
+    seen: Vec<bool>,
+}
+
+impl Middle {
+    fn new(stage: &Stage, bounds: &Bounds) -> Middle {
+        let mut middle = Middle { enclosure: 0.0, seen: vec![false; stage.areas.len()] };
+        for (x, z) in [(0.5, 0.5), (0.3, 0.3), (0.7, 0.3), (0.3, 0.7), (0.7, 0.7)] {
+            for y in [0.5, 0.75] {
+                middle.look_around(stage, bounds.at(x, y, z));
+            }
+        }
+        let emits = |index: usize| stage.emits(&stage.scene.patches[index]);
+        let mut emitters =
+            (0..stage.areas.len()).filter(|&i| stage.areas[i] > 0.0 && emits(i)).peekable();
+        // A dark inside, while something shines outside: an object.
+        if emitters.peek().is_some() && !emitters.any(|i| middle.seen[i]) {
+            middle.enclosure = 0.0;
+        }
+        middle
+    }
+
+    fn look_around(&mut self, stage: &Stage, eye: DVec3) {
+        let sides = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|d| [d, -d]);
+        let met: Vec<Met> = sides
+            .map(|side| View::look_at(eye, eye + side, std::f64::consts::FRAC_PI_2))
+            .flat_map(|view| stage.look(&view, 16, 16))
+            .collect();
+        let fronts = || met.iter().filter(|m| m.front);
+        let (low, high) = fronts().fold((eye, eye), |(l, h), m| (l.min(m.point), h.max(m.point)));
+        let enclosure = fronts().count() as f64 / met.len() as f64;
+        if enclosure > ROOM && low.distance(high) > SPAN * stage.diagonal {
+            self.enclosure = self.enclosure.max(enclosure);
+            fronts().filter_map(|m| m.patch).for_each(|patch| self.seen[patch] = true);
+        }
+    }
+}
+
 /// The scene at one instant.
 struct Stage<'a> {
     scene: &'a Scene,
     poses: Vec<Option<Pose>>,
     diagonal: f64,
-    area: f64,
-    lamp_area: f64,
+    /// Area of each patch, 0 while it is absent, m2; indexed by patch.
+    areas: Vec<f64>,
 }
 
 /// What a pixel of a scored picture meets.
 #[derive(Clone, Copy, Default)]
 struct Met {
-    patch: Option<u32>,
+    patch: Option<usize>,
     front: bool,
+    /// World point, metres.
+    point: DVec3,
     /// Distance, metres.
     distance: f64,
     /// Area of the patch that the pixel shows, m2.
@@ -193,14 +241,9 @@ impl<'a> Stage<'a> {
     fn new(scene: &'a Scene, time_s: f64, diagonal: f64) -> Self {
         let poses: Vec<_> =
             scene.bodies.iter().map(|b| scene.motion.pose(b.node, time_s)).collect();
-        let mut stage = Stage { scene, poses, diagonal, area: 0.0, lamp_area: 0.0 };
-        for patch in &scene.patches {
-            if stage.pose(patch).is_some() {
-                stage.area += patch.area_m2();
-                stage.lamp_area += if stage.emits(patch) { patch.area_m2() } else { 0.0 };
-            }
-        }
-        stage
+        let area = |patch: &Patch| poses[patch.body.0 as usize].map_or(0.0, |_| patch.area_m2());
+        let areas = scene.patches.iter().map(area).collect();
+        Stage { scene, poses, diagonal, areas }
     }
 
     fn pose(&self, patch: &Patch) -> Option<&Pose> {
@@ -211,54 +254,34 @@ impl<'a> Stage<'a> {
         self.scene.materials[patch.material.0 as usize].exitance.iter().any(|&m| m > 0.0)
     }
 
-    /// Greatest share of directions in which a front is met first, over points in the middle.
-    fn enclosure(&self, bounds: &Bounds) -> f64 {
-        let towards = [DVec3::X, DVec3::Y, DVec3::Z];
-        let mut best = 0.0_f64;
-        for (x, y, z) in [(0.5, 0.5), (0.3, 0.3), (0.7, 0.3), (0.3, 0.7), (0.7, 0.7)]
-            .into_iter()
-            .flat_map(|(x, z)| [(x, 0.5, z), (x, 0.75, z)])
-        {
-            let eye = bounds.at(x, y, z);
-            let mut fronts = 0;
-            let mut pixels = 0;
-            for direction in towards.into_iter().flat_map(|d| [d, -d]) {
-                let view = View::look_at(eye, eye + direction, std::f64::consts::FRAC_PI_2);
-                let met = self.look(&view, 16, 16);
-                fronts += met.iter().filter(|m| m.front).count();
-                pixels += met.len();
-            }
-            best = best.max(fronts as f64 / pixels as f64);
-        }
-        best
-    }
-
     fn score(&self, view: &View) -> f64 {
         let met = self.look(view, (f64::from(ROWS) * ASPECT) as u32, ROWS);
-        let mut seen = vec![0.0; self.scene.patches.len()];
-        let (mut front, mut back, mut close) = (0, 0, 0);
+        let mut seen = vec![0.0; self.areas.len()];
+        let (mut front, mut back, mut close) = (0.0, 0.0, 0.0);
         for m in &met {
             let Some(patch) = m.patch else { continue };
-            close += usize::from(m.distance < 0.06 * self.diagonal);
+            if m.distance < 0.06 * self.diagonal {
+                close += 1.0;
+            }
             if m.front {
-                front += 1;
-                seen[patch as usize] += m.area;
+                front += 1.0;
+                seen[patch] += m.area;
             } else {
-                back += 1;
+                back += 1.0;
             }
         }
-        let (mut area, mut lamp_area) = (0.0, 0.0);
-        for (patch, &seen) in self.scene.patches.iter().zip(&seen) {
-            let seen = patch.area_m2().min(seen);
-            area += seen;
-            lamp_area += if self.emits(patch) { seen } else { 0.0 };
+        // (seen, whole), of all patches and of those that emit.
+        let (mut all, mut lamps) = ([0.0; 2], [0.0; 2]);
+        for (index, patch) in self.scene.patches.iter().enumerate() {
+            let whole = self.areas[index];
+            for (sum, area) in [seen[index].min(whole), whole].into_iter().enumerate() {
+                all[sum] += area;
+                lamps[sum] += if self.emits(patch) { area } else { 0.0 };
+            }
         }
-        let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
+        let share = |[part, whole]: [f64; 2]| if whole > 0.0 { part / whole } else { 0.0 };
         let pixels = met.len() as f64;
-        share(area, self.area)
-            + 0.3 * (front as f64 - back as f64) / pixels
-            + 0.1 * share(lamp_area, self.lamp_area)
-            - close as f64 / pixels
+        share(all) + 0.1 * share(lamps) + (0.3 * (front - back) - close) / pixels
     }
 
     /// What each pixel meets first, be it the front or the back of a patch.
@@ -280,7 +303,7 @@ impl<'a> Stage<'a> {
             }
             for piece in self.pieces(patch, &plane, &grid) {
                 primitives.push(piece);
-                drawn.push(Drawn { patch: index as u32, plane, origin, u, v, front });
+                drawn.push(Drawn { patch: index, plane, origin, u, v, front });
             }
         }
         rasterise(&grid, &primitives, |fragments| {
@@ -304,7 +327,7 @@ impl<'a> Stage<'a> {
 
 /// A patch on the screen.
 struct Drawn {
-    patch: u32,
+    patch: usize,
     plane: SeenPlane,
     origin: DVec3,
     u: DVec3,
@@ -315,13 +338,14 @@ struct Drawn {
 impl Drawn {
     fn met(&self, projector: &Projector, fragment: &Fragment) -> Met {
         let p = self.plane.unproject(fragment.position);
-        let towards_point = self.origin + self.u * p.x + self.v * p.y - projector.eye();
+        let point = self.origin + self.u * p.x + self.v * p.y;
+        let towards_point = point - projector.eye();
         let distance = towards_point.length();
         let depth = towards_point.dot(projector.forward());
         // A pixel is the solid angle (depth / distance)^3 / scale^2; a surface at a slant shows more.
         let cosine = (towards_point.dot(self.u.cross(self.v)) / distance).abs().max(1e-3);
         let area =
             depth * depth * depth / (distance * cosine) / (projector.scale() * projector.scale());
-        Met { patch: Some(self.patch), front: self.front, distance, area }
+        Met { patch: Some(self.patch), front: self.front, point, distance, area }
     }
 }

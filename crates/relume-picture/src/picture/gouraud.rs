@@ -196,7 +196,7 @@ impl Slope {
     fn over(&self, d: DVec2) -> Rgb {
         [0, 1, 2].map(|c| {
             let bound = EXTRAPOLATION_MAX * self.step_max[c];
-            self.gradient[c].dot(d).clamp(-bound, bound)
+            self.gradient[c].dot(d).max(-bound).min(bound)
         })
     }
 }

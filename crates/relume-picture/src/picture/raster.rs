@@ -44,6 +44,7 @@ pub(crate) struct Grid {
     pub(crate) height: usize,
     /// Offsets from the pixel's centre, each coordinate in (-0.5, 0.5).
     offsets: Vec<DVec2>,
+    mean_offset: DVec2,
 }
 
 /// The samples of one pixel that see the same primitive.
@@ -68,11 +69,9 @@ impl Grid {
             DVec2::new(along - 0.5, radical_inverse + 0.5 / f64::from(n) - 0.5)
                 .clamp(DVec2::splat(-0.499), DVec2::splat(0.499))
         };
-        Grid {
-            width: width as usize,
-            height: height as usize,
-            offsets: (0..n).map(offset).collect(),
-        }
+        let offsets: Vec<DVec2> = (0..n).map(offset).collect();
+        let mean_offset = offsets.iter().sum::<DVec2>() / f64::from(n);
+        Grid { width: width as usize, height: height as usize, offsets, mean_offset }
     }
 
     /// Samples a pixel.
@@ -231,14 +230,14 @@ impl<'a> TileBuffer<'a> {
                 }
                 let nearness = p.nearness.dot(centre) as f32;
                 let first = ((y - self.y) * TILE + x - self.x) * samples;
-                let slots = self.nearness[first..first + samples].iter_mut();
-                let slots = slots.zip(&mut self.seen[first..first + samples]);
-                for (s, (slot, slot_seen)) in slots.enumerate() {
-                    let k = (nearness + steps[s]).clamp(low, high);
-                    if mask >> s & 1 == 1 && k > *slot {
-                        *slot = k;
-                        *slot_seen = seen;
-                    }
+                let pixel = first..first + samples;
+                let slots = self.nearness[pixel.clone()].iter_mut().zip(&mut self.seen[pixel]);
+                // Without branches, so that it is done for several samples at a time.
+                for (s, ((slot, slot_seen), step)) in slots.zip(&steps).enumerate() {
+                    let k = (nearness + step).max(low).min(high);
+                    let wins = (mask >> s & 1 == 1) & (k > *slot);
+                    *slot = if wins { k } else { *slot };
+                    *slot_seen = if wins { seen } else { *slot_seen };
                 }
             }
         }
@@ -281,6 +280,13 @@ impl<'a> TileBuffer<'a> {
     /// Groups the samples of one pixel by what they see.
     fn group(&self, seen: &[Option<NonZeroU32>], centre: DVec2, fragments: &mut Vec<Fragment>) {
         fragments.clear();
+        let primitive = |seen: Option<NonZeroU32>| seen.map(|index| index.get() as usize - 1);
+        let samples = self.grid.samples();
+        if seen.iter().all(|&s| s == seen[0]) {
+            let position = centre + self.grid.mean_offset;
+            fragments.push(Fragment { primitive: primitive(seen[0]), samples, position });
+            return;
+        }
         let mut left = u64::MAX >> (SAMPLES_MAX - seen.len());
         while left != 0 {
             let first = seen[left.trailing_zeros() as usize];
@@ -293,7 +299,7 @@ impl<'a> TileBuffer<'a> {
                 }
             }
             fragments.push(Fragment {
-                primitive: first.map(|index| index.get() as usize - 1),
+                primitive: primitive(first),
                 samples,
                 position: centre + sum / f64::from(samples),
             });

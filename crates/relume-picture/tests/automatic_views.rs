@@ -1,0 +1,120 @@
+//! What automatic views show of rooms and objects.
+
+mod common;
+
+use common::*;
+use glam::DVec3;
+use relume::scene::{BodyId, Scene};
+use relume_picture::picture::{Exposure, Settings, Shading, Tone, View, render};
+
+/// Shares of the picture that show fronts, backs and nothing, the nearest counting: found by
+/// drawing every patch twice, in red from the front and in green from behind.
+fn fronts_and_backs(scene: &Scene, view: &View) -> (f64, f64) {
+    let mut both = empty();
+    let red = material(&mut both, [0.9, 0.0, 0.0], 0.0);
+    let green = material(&mut both, [0.0, 0.9, 0.0], 0.0);
+    for (index, b) in scene.bodies.iter().enumerate() {
+        let pose = scene.pose(BodyId(index as u32), 0.0).unwrap();
+        for patch in &scene.patches[b.patches.start as usize..b.patches.end as usize] {
+            let front: Vec<DVec3> = patch.corners_in_body().map(|p| pose.point(p)).collect();
+            let back = front.iter().rev().copied().collect();
+            body(&mut both, &[(front, red), (back, green)]);
+        }
+    }
+    let snapshot = snapshot(&both, |_, _, _| false, |_, _, m| m.reflectance.map(|r| r as f32));
+    let settings = Settings {
+        shading: Shading::Flat,
+        exposure: Exposure::Fixed(3.0),
+        tone: Tone::Clip,
+        samples: 1,
+        ..Settings::default()
+    };
+    let image = render(&snapshot, view, &settings);
+    let share = |c: usize| {
+        image.pixels.iter().filter(|p| p[c] > 0).count() as f64 / image.pixels.len() as f64
+    };
+    (share(0), share(1))
+}
+
+#[test]
+fn a_closed_room_is_seen_from_inside() {
+    let scene = room(&[]);
+    let view = View::automatic(&scene);
+    let eye = view.world_from_camera.translation;
+    assert!(eye.cmpgt(DVec3::ZERO).all() && eye.cmplt(v(4.0, 3.0, 5.0)).all(), "{eye}");
+    // A sample on an edge may meet either of the two patches there.
+    let (front, back) = fronts_and_backs(&scene, &view);
+    assert!(front + back == 1.0 && back < 1e-4, "{front} {back}");
+}
+
+#[test]
+fn a_room_without_a_wall_is_seen_through_the_opening() {
+    for without in [Side::Front, Side::Back, Side::Left, Side::Right] {
+        let scene = room(&[without]);
+        let view = View::automatic(&scene);
+        let (front, back) = fronts_and_backs(&scene, &view);
+        assert!(front > 0.6 && back < 0.02, "{without:?}: {front} {back} {view:?}");
+        let eye = view.world_from_camera.translation;
+        let through = match without {
+            Side::Front => eye.z > 4.0,
+            Side::Back => eye.z < 1.0,
+            Side::Left => eye.x < 1.0,
+            _ => eye.x > 3.0,
+        };
+        assert!(through, "{without:?}: {eye}");
+        assert_eq!(View::automatic(&double_sided(&scene)), view, "{without:?}, double-sided");
+    }
+}
+
+#[test]
+fn a_room_with_a_window_is_seen_from_inside_although_its_walls_have_outsides() {
+    let mut scene = room(&[Side::Front]);
+    let white = scene.patches[1].material;
+    let [mut left, mut right] =
+        [(0.0, 1.5), (2.5, 4.0)].map(|(a, b)| side(v(a, 0.0, 0.0), v(b, 3.0, 5.0), Side::Front));
+    left.reverse();
+    right.reverse();
+    body(&mut scene, &[(left, white), (right, white)]);
+    for scene in [scene.clone(), double_sided(&scene)] {
+        let eye = View::automatic(&scene).world_from_camera.translation;
+        assert!(eye.cmpgt(DVec3::ZERO).all() && eye.cmplt(v(4.0, 3.0, 5.0)).all(), "{eye}");
+    }
+}
+
+#[test]
+fn a_room_of_three_walls_without_a_ceiling_is_seen_from_its_open_side() {
+    let scene = room(&[Side::Front, Side::Ceiling]);
+    let view = View::automatic(&scene);
+    let (front, back) = fronts_and_backs(&scene, &view);
+    assert!(front > 0.5 && back < 0.05, "{front} {back} {view:?}");
+    assert!(view.world_from_camera.translation.z > 4.0);
+}
+
+#[test]
+fn a_double_sided_object_is_no_room() {
+    let mut scene = empty();
+    let grey = material(&mut scene, [0.5; 3], 0.0);
+    solid(&mut scene, v(-1.0, -1.0, -1.0), v(1.0, 1.0, 1.0), grey);
+    solid(&mut scene, v(-6.0, -0.5, -0.01), v(-1.0, 0.5, 0.01), grey);
+    solid(&mut scene, v(1.0, -0.5, -0.01), v(6.0, 0.5, 0.01), grey);
+    let scene = double_sided(&scene);
+    let eye = View::automatic(&scene).world_from_camera.translation;
+    assert!(eye.length() > 6.0, "{eye}");
+}
+
+#[test]
+fn a_floating_object_is_seen_from_outside_and_whole() {
+    let mut scene = empty();
+    let grey = material(&mut scene, [0.5; 3], 0.0);
+    solid(&mut scene, v(10.0, 20.0, 30.0), v(11.0, 20.5, 30.7), grey);
+    solid(&mut scene, v(11.0, 20.2, 30.3), v(13.0, 20.25, 30.4), grey);
+    let view = View::automatic(&scene);
+    let (front, back) = fronts_and_backs(&scene, &view);
+    assert!(front > 0.1 && back < 1e-4, "{front} {back} {view:?}");
+    for patch in &scene.patches {
+        for corner in patch.corners_in_body() {
+            let pixel = view.project(corner, 640, 480).expect("in front of the camera");
+            assert!(pixel.cmpgt(glam::DVec2::ZERO).all() && pixel.x < 640.0 && pixel.y < 480.0);
+        }
+    }
+}

@@ -124,6 +124,9 @@ impl Job {
         let report = self.open_report(&scene, threads)?;
         let pending: Vec<u32> =
             wanted.iter().copied().filter(|frame| !report.frames.contains_key(frame)).collect();
+        if !self.solve.quiet {
+            self.warn_of_old_pictures(&wanted, &report);
+        }
         let session =
             Session::new(Arc::new(scene), self.options_for(&report)).map_err(Failure::new)?;
         let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.solve.quiet);

@@ -245,7 +245,8 @@ impl Job {
 
     fn interrupted(&self, finished: usize, wanted: usize) -> Failure {
         let failure = Failure::interrupted(format_args!(
-            "stopped: {finished} of {} finished",
+            "stopped: {} of {} finished",
+            count(finished as u64),
             counted(wanted, "frame")
         ));
         if self.report_paths().is_empty() {

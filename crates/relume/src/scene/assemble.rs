@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::draft::{Draft, DraftSurface};
+use super::draft::{Draft, DraftNode, DraftSurface};
 use super::flatten::{Flaw, flatten, seen_from_behind};
 use super::names::Names;
 use super::rigid::without_scales;
@@ -25,6 +25,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
     let (nodes, residuals) = without_scales(&draft)?;
     let motion =
         Motion { duration_s: duration_s(&nodes), nodes, animation: draft.animation.clone() };
+    notes.extend(misdirected(&draft, &residuals));
     let mut parts = Parts::default();
     for (node, members) in bodies_of(&draft, &motion) {
         let first = parts.patches.len() as u32;
@@ -33,7 +34,14 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
             let place = Placement { pose: pose_in_body(&motion, member), shape: residuals[member] };
             let object = &draft.nodes[member];
             for surface in &object.surfaces {
-                parts.add_surface(body, &object.name, surface, &place, &draft.materials)?;
+                let name = surface_name(object, surface, &draft.materials);
+                parts.add_surface(
+                    body,
+                    (&object.name, &name),
+                    surface,
+                    &place,
+                    &draft.materials,
+                )?;
             }
         }
         let patches = Range { start: first, end: parts.patches.len() as u32 };
@@ -96,7 +104,7 @@ impl Parts {
     fn add_surface(
         &mut self,
         body: BodyId,
-        object: &str,
+        (object, name): (&str, &str),
         surface: &DraftSurface,
         place: &Placement,
         materials: &[Material],
@@ -108,7 +116,7 @@ impl Parts {
         for polygon in &surface.polygons {
             let points = place.place(polygon);
             if points.iter().any(|p| !p.is_finite()) {
-                return Err(not_finite(&surface.name, object));
+                return Err(not_finite(name, object));
             }
             for piece in flat_pieces(&points) {
                 match piece {
@@ -120,7 +128,7 @@ impl Parts {
             }
         }
         if self.patches.len() > before {
-            let name = self.names.unique(&surface.name);
+            let name = self.names.unique(name);
             self.surfaces.push(Surface {
                 name,
                 object: object.to_owned(),
@@ -129,7 +137,7 @@ impl Parts {
             });
         }
         if degenerate > 0 {
-            self.notes.push(degenerate_note(&surface.name, degenerate));
+            self.notes.push(degenerate_note(name, degenerate));
         }
         Ok(())
     }
@@ -159,6 +167,15 @@ impl Parts {
                 twin,
             });
         }
+    }
+}
+
+/// The surface's own name, or one made of its object's and, among several, its material's.
+fn surface_name(object: &DraftNode, surface: &DraftSurface, materials: &[Material]) -> String {
+    match &surface.name {
+        Some(name) => name.clone(),
+        None if object.surfaces.len() == 1 => object.name.clone(),
+        None => format!("{}/{}", object.name, materials[surface.material.0 as usize].name),
     }
 }
 
@@ -215,6 +232,28 @@ fn unique_names(draft: &mut Draft, notes: &mut Vec<Note>) {
     each("material", draft.materials.iter_mut().map(|m| &mut m.name), notes);
     each("light", draft.lights.iter_mut().map(|l| &mut l.name), notes);
     each("camera", draft.cameras.iter_mut().map(|c| &mut c.name), notes);
+}
+
+/// Lights and cameras below a scale that mirrors or bends the direction they look in: the scale is
+/// taken out of rigid motion, so they look where the node's rotation says.
+fn misdirected(draft: &Draft, residuals: &[DMat3]) -> Vec<Note> {
+    let lights = draft.lights.iter().map(|l| (l.node, &l.name));
+    let hanging = lights.chain(draft.cameras.iter().map(|c| (c.node, &c.name)));
+    let bent = |node: NodeId| {
+        let axis = residuals[node.0 as usize].z_axis;
+        axis.z <= 0.0 || axis.truncate().length() > 1e-6 * axis.z
+    };
+    let bent = hanging.filter(|(node, _)| bent(*node));
+    let message = "a scale above it mirrors or bends its direction; the scale is ignored for it: \
+                   apply the scale before export";
+    bent.map(|(_, name)| Note {
+        severity: Severity::Warning,
+        code: "direction",
+        subject: name.clone(),
+        count: 1,
+        message: message.to_owned(),
+    })
+    .collect()
 }
 
 /// Reflectance in [0, 1), exitance finite and not negative.

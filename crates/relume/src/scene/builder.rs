@@ -139,10 +139,14 @@ impl SceneBuilder {
         }
         let polygon = corners.to_vec();
         self.change(node, |n| {
-            match n.surfaces.iter_mut().find(|s| s.name == surface_name && s.material == material) {
+            match n
+                .surfaces
+                .iter_mut()
+                .find(|s| s.name.as_deref() == Some(surface_name) && s.material == material)
+            {
                 Some(surface) => surface.polygons.push(polygon),
                 None => n.surfaces.push(DraftSurface {
-                    name: surface_name.to_owned(),
+                    name: Some(surface_name.to_owned()),
                     material,
                     polygons: vec![polygon],
                 }),
@@ -242,7 +246,7 @@ fn flaw_of(corners: &[DVec3]) -> Option<&'static str> {
 }
 
 /// The sides of a box, counter-clockwise seen from outside.
-fn cuboid_sides(min: DVec3, max: DVec3) -> [[DVec3; 4]; 6] {
+pub(super) fn cuboid_sides(min: DVec3, max: DVec3) -> [[DVec3; 4]; 6] {
     let corner = |bits: usize| {
         let pick = |axis: usize| if bits >> axis & 1 == 1 { max[axis] } else { min[axis] };
         DVec3::new(pick(0), pick(1), pick(2))

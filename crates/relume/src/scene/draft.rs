@@ -36,7 +36,8 @@ pub(super) struct DraftNode {
 
 /// Polygons of one material on one node.
 pub(super) struct DraftSurface {
-    pub(super) name: String,
+    /// `None`: the object's name, followed by the material's where the object has several surfaces.
+    pub(super) name: Option<String>,
     pub(super) material: MaterialId,
     /// Loops, counter-clockwise from the front, in the node's own (scaled) frame.
     pub(super) polygons: Vec<Vec<DVec3>>,

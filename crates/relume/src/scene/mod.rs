@@ -10,6 +10,7 @@ use crate::geometry::Pose;
 
 mod assemble;
 mod builder;
+mod check;
 mod draft;
 mod error;
 mod flatten;
@@ -20,6 +21,7 @@ mod names;
 mod rigid;
 
 pub use builder::SceneBuilder;
+pub use check::check;
 pub use error::SceneError;
 pub use import::{ImportOptions, import};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};

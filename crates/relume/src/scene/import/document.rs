@@ -251,8 +251,7 @@ fn parse(file: &str, text: &[u8]) -> Result<json::Root, SceneError> {
         Err(e) if e.is_eof() => return fail(format!("its JSON is cut off ({e})")),
         Err(e) => return fail(format!("its JSON does not parse ({e})")),
     };
-    let version = value.pointer("/asset/version").and_then(serde_json::Value::as_str);
-    if let Some(old) = version.filter(|v| v.starts_with("1.") || v.starts_with("0.")) {
+    if let Some(old) = old_version(&value) {
         return Err(format_error(
             file,
             format!("its version is {old}"),
@@ -260,7 +259,29 @@ fn parse(file: &str, text: &[u8]) -> Result<json::Root, SceneError> {
         ));
     }
     serde_path_to_error::deserialize(value)
-        .or_else(|e| fail(format!("at {}: {}", e.path(), e.inner())))
+        .or_else(|e| fail(format!("at {}: {}", e.path(), in_json_words(&e.inner().to_string()))))
+}
+
+/// The version of a glTF 1 file: as it says, or 1.0 where its nodes are listed by name.
+fn old_version(document: &serde_json::Value) -> Option<&str> {
+    let stated = document.pointer("/asset/version").and_then(serde_json::Value::as_str);
+    let by_name = document.get("nodes").is_some_and(serde_json::Value::is_object);
+    stated.filter(|v| v.starts_with("1.") || v.starts_with("0.")).or(by_name.then_some("1.0"))
+}
+
+/// What the JSON reader says about types, in the words of JSON instead of Rust's.
+fn in_json_words(message: &str) -> String {
+    let words = [
+        ("usize", "a whole number of 0 or more"),
+        ("u32", "a whole number of 0 or more"),
+        ("f64", "a number"),
+    ];
+    let words = words.into_iter().chain([
+        ("map", "object"),
+        ("a sequence", "an array"),
+        ("struct ", "an object like "),
+    ]);
+    words.fold(message.to_owned(), |m, (from, to)| m.replace(from, to))
 }
 
 /// `%20` and its like, undone.

@@ -49,8 +49,20 @@ fn roots(document: &Document, notes: &mut Vec<Note>) -> Result<Vec<usize>, Scene
             });
             let message = "the file lists no scene; all its nodes are read".to_owned();
             notes.push(note(Severity::Info, "no-scene", &document.file, 1, message));
-            Ok((0..root.nodes.len()).filter(|&i| !child[i]).collect())
+            let roots: Vec<usize> = (0..root.nodes.len()).filter(|&i| !child[i]).collect();
+            if roots.is_empty() && !root.nodes.is_empty() {
+                return Err(not_a_tree(document, 0));
+            }
+            Ok(roots)
         }
+    }
+}
+
+fn not_a_tree(document: &Document, node: usize) -> SceneError {
+    SceneError::Hierarchy {
+        node: node_name(document, node),
+        what: "it hangs below itself or on two parents, so the nodes are not a tree".into(),
+        remedy: "give each node one parent and export again".into(),
     }
 }
 
@@ -77,12 +89,7 @@ impl Tree<'_> {
                 .get(index)
                 .ok_or_else(|| self.document.out_of_range("node", index))?;
             if std::mem::replace(&mut seen[index], true) {
-                return Err(SceneError::Hierarchy {
-                    node: node_name(self.document, index),
-                    what: "it hangs below itself or on two parents, so the nodes are not a tree"
-                        .into(),
-                    remedy: "give each node one parent and export again".into(),
-                });
+                return Err(not_a_tree(self.document, index));
             }
             let shown_later = !self.moves[index].visibility.is_empty();
             if node.extensions.visibility.as_ref().is_some_and(|v| !v.visible) && !shown_later {
@@ -153,7 +160,9 @@ impl Tree<'_> {
             self.note(Severity::Warning, "instancing", index, message.to_owned());
         }
         let morphed = |m: &json::Mesh| m.primitives.iter().any(|p| !p.targets.is_empty());
-        if self.document.root.meshes.get(mesh).is_some_and(morphed) {
+        let name = node_name(self.document, index);
+        let noted = self.draft.notes.iter().any(|n| n.code == "morph" && n.subject == name);
+        if self.document.root.meshes.get(mesh).is_some_and(morphed) && !noted {
             let message =
                 "its morph targets are ignored: the mesh is read in its base shape".to_owned();
             self.note(Severity::Warning, "morph", index, message);
@@ -165,7 +174,6 @@ impl Tree<'_> {
             self.meshes[mesh] = Some(polygons(self.document, mesh, &mut self.draft.notes)?);
         }
         let primitives = self.meshes[mesh].as_deref().unwrap_or_default();
-        let object = node_name(self.document, index);
         let mut surfaces = Vec::with_capacity(primitives.len());
         for primitive in primitives {
             let none = self.draft.materials.len() - 1;
@@ -174,12 +182,12 @@ impl Tree<'_> {
                 return Err(self.document.out_of_range("material", material));
             }
             self.without_material += usize::from(primitive.material.is_none());
-            let name = match primitives.len() {
-                1 => object.clone(),
-                _ => format!("{object}/{}", self.draft.materials[material].name),
-            };
             let polygons = primitive.loops.clone();
-            surfaces.push(DraftSurface { name, material: MaterialId(material as u32), polygons });
+            surfaces.push(DraftSurface {
+                name: None,
+                material: MaterialId(material as u32),
+                polygons,
+            });
         }
         Ok(surfaces)
     }
@@ -195,7 +203,7 @@ impl Tree<'_> {
         } else {
             let (count, rho) = (self.without_material, material::REFLECTANCE_MAX);
             let message = format!(
-                "{count} surfaces have no material; they get reflectance {rho}: give them one"
+                "surfaces without a material: {count}; they get reflectance {rho}: give them one"
             );
             self.draft.notes.push(note(
                 Severity::Warning,

@@ -1,0 +1,128 @@
+//! What is likely wrong with a scene: each finding with a name, a count and a remedy.
+//!
+//! Looks at the scene as it is at time 0 and changes nothing. What was noticed while reading (what
+//! is degenerate, skinned, clamped, left out) is in [`Scene::notes`] and not repeated here. Must
+//! not know light transport.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{Material, MaterialId, Note, Scene, Severity};
+
+mod shape;
+mod topology;
+
+/// Reflectances from here on are reported: real paints stay below.
+const REFLECTANCE_HIGH: f64 = 0.95;
+/// Diagonals outside this range, in metres, are likely a mistaken unit.
+const DIAGONAL_M: (f64, f64) = (1e-3, 1e4);
+/// Exitance from here on is likely a mistaken unit, W/m2: a glowing filament has about this.
+const EXITANCE_HIGH: f64 = 1e6;
+/// The same for directional lights, W/m2: ten suns.
+const SUN_HIGH: f64 = 1.4e4;
+
+/// Finds what is likely wrong, the most serious first.
+///
+/// | code | severity | what |
+/// |---|---|---|
+/// | `nothing-emits` | error | no emitting surface and no light |
+/// | `open-enclosure` | warning, info | gaps in what encloses the scene; nothing encloses it |
+/// | `open-object` | info | an object within it that is not closed |
+/// | `flipped-normals` | warning | neighbours that face opposite ways; closed objects inside out |
+/// | `duplicate` | warning | polygons that coincide |
+/// | `reflectance` | warning | a reflectance of 0.95 or more |
+/// | `units` | warning | a size or a brightness that suggests a mistaken unit |
+///
+/// O(n log n) in the number of polygons, where sides are short beside the scene.
+pub fn check(scene: &Scene) -> Vec<Note> {
+    let mut notes = Vec::new();
+    emission(scene, &mut notes);
+    reflectance(scene, &mut notes);
+    units(scene, &mut notes);
+    shape::shape(scene, &mut notes);
+    notes.sort_by_key(|n| std::cmp::Reverse(n.severity));
+    notes
+}
+
+fn note(
+    severity: Severity,
+    code: &'static str,
+    subject: &str,
+    count: usize,
+    message: String,
+) -> Note {
+    Note { severity, code, subject: subject.to_owned(), count, message }
+}
+
+/// The materials in use, each with its number of patches.
+fn used(scene: &Scene) -> Vec<(&Material, usize)> {
+    let mut counts: BTreeMap<MaterialId, usize> = BTreeMap::new();
+    for patch in &scene.patches {
+        *counts.entry(patch.material).or_default() += 1;
+    }
+    counts.into_iter().map(|(m, n)| (&scene.materials[m.0 as usize], n)).collect()
+}
+
+fn emission(scene: &Scene, notes: &mut Vec<Note>) {
+    let glows = used(scene).iter().any(|(m, _)| m.exitance.iter().any(|&e| e > 0.0));
+    let shines = scene.lights.iter().any(|l| l.intensity.iter().any(|&i| i > 0.0));
+    if !glows && !shines {
+        let message = "nothing emits light, so every picture is black; give a material an emission \
+                       (emissiveFactor) or add a point, spot or sun light (area lights are not exported to glTF: \
+                       use an emitting polygon)";
+        notes.push(note(Severity::Error, "nothing-emits", &scene.name, 0, message.to_owned()));
+    }
+}
+
+fn reflectance(scene: &Scene, notes: &mut Vec<Note>) {
+    for (material, count) in used(scene) {
+        let highest = material.reflectance.iter().copied().fold(0.0, f64::max);
+        if highest >= REFLECTANCE_HIGH {
+            let message = format!(
+                "it reflects {highest:.3} of the light: the balance needs many sweeps and small errors grow; \
+                 real paints stay below 0.9, so lower the base colour"
+            );
+            notes.push(note(Severity::Warning, "reflectance", &material.name, count, message));
+        }
+    }
+}
+
+fn units(scene: &Scene, notes: &mut Vec<Note>) {
+    if let Some((min, max)) = scene.bounds(0.0) {
+        let diagonal = min.distance(max);
+        if !(DIAGONAL_M.0..=DIAGONAL_M.1).contains(&diagonal) {
+            let message = format!(
+                "the scene is {diagonal:.3e} m across; glTF is in metres, so check the unit scale of the export"
+            );
+            notes.push(note(Severity::Warning, "units", &scene.name, 1, message));
+        }
+    }
+    for (material, count) in used(scene) {
+        let brightest = material.exitance.iter().copied().fold(0.0, f64::max);
+        if brightest > EXITANCE_HIGH {
+            let message = format!(
+                "it emits {brightest:.3e} W/m2, more than a glowing filament; check the emission strength"
+            );
+            notes.push(note(Severity::Warning, "units", &material.name, count, message));
+        }
+    }
+    for light in &scene.lights {
+        let brightest = light.intensity.iter().copied().fold(0.0, f64::max);
+        if light.kind == super::LightKind::Directional && brightest > SUN_HIGH {
+            let message =
+                format!("it gives {brightest:.3e} W/m2, more than ten suns ({})", light.conversion);
+            notes.push(note(Severity::Warning, "units", &light.name, 1, message));
+        }
+    }
+}
+
+/// Up to three names, for a sentence.
+fn listed(names: &BTreeSet<&str>) -> String {
+    let first: Vec<&str> = names.iter().take(3).copied().collect();
+    match names.len().saturating_sub(3) {
+        0 => first.join(", "),
+        more => format!("{} and {more} more", first.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests;

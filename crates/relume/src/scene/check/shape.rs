@@ -1,0 +1,249 @@
+//! What is wrong with the shape: gaps, normals that face the wrong way, polygons that coincide.
+//!
+//! Must not know materials beyond whether they are double-sided, nor how sides are matched.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec3;
+
+use super::topology::Topology;
+use super::{listed, note};
+use crate::scene::{Note, Scene, Severity};
+
+/// Adds what is wrong with the shape at time 0.
+pub(super) fn shape(scene: &Scene, notes: &mut Vec<Note>) {
+    let topology = Topology::of(scene, 0.0);
+    let parts = parts(&topology);
+    open(scene, &topology, &parts, notes);
+    turned(scene, &topology, notes);
+    inside_out(scene, &topology, &parts, notes);
+    duplicates(scene, &topology, notes);
+}
+
+/// What hangs together along sides.
+struct Part {
+    bounds: (DVec3, DVec3),
+    free_sides: usize,
+    /// Sides on which two neighbours face opposite ways, or more than two polygons meet.
+    odd_sides: usize,
+    flat: bool,
+    two_sided: bool,
+    /// Signed volume, m3: negative if the fronts are inside. Meaningful where closed.
+    volume: f64,
+}
+
+impl Part {
+    fn closed(&self) -> bool {
+        self.free_sides == 0
+    }
+
+    fn diagonal(&self) -> f64 {
+        self.bounds.0.distance(self.bounds.1)
+    }
+
+    /// Whether the bounds of another part, or its own, lie within its bounds.
+    fn spans(&self, other: &Part) -> bool {
+        other.bounds.0.cmpge(self.bounds.0).all() && other.bounds.1.cmple(self.bounds.1).all()
+    }
+
+    fn contains(&self, p: DVec3) -> bool {
+        p.cmpgt(self.bounds.0).all() && p.cmplt(self.bounds.1).all()
+    }
+}
+
+fn parts(topology: &Topology) -> Vec<Part> {
+    let count = topology.component.iter().max().map_or(0, |&c| c + 1);
+    let mut parts: Vec<Part> = vec![];
+    let mut normals: Vec<Option<DVec3>> = vec![None; count as usize];
+    parts.resize_with(count as usize, || Part {
+        bounds: (DVec3::INFINITY, DVec3::NEG_INFINITY),
+        free_sides: 0,
+        odd_sides: 0,
+        flat: true,
+        two_sided: false,
+        volume: 0.0,
+    });
+    for (polygon, &c) in topology.polygons.iter().zip(&topology.component) {
+        let part = &mut parts[c as usize];
+        let points: Vec<DVec3> =
+            polygon.corners.iter().map(|&v| topology.points[v as usize]).collect();
+        for &p in &points {
+            part.bounds = (part.bounds.0.min(p), part.bounds.1.max(p));
+        }
+        let origin = points[0];
+        for i in 1..points.len().saturating_sub(1) {
+            part.volume += origin.dot(points[i].cross(points[i + 1])) / 6.0;
+        }
+        let area = (1..points.len().saturating_sub(1))
+            .map(|i| (points[i] - origin).cross(points[i + 1] - origin));
+        let normal = area.sum::<DVec3>().normalize_or_zero();
+        let first = *normals[c as usize].get_or_insert(normal);
+        part.flat &= first.cross(normal).length() < 1e-4;
+        part.two_sided |= polygon.two_sided;
+    }
+    for group in &topology.sides {
+        let part = &mut parts[topology.component[group[0].polygon as usize] as usize];
+        part.free_sides += usize::from(group.len() == 1);
+        part.odd_sides +=
+            usize::from(group.len() > 2 || (group.len() == 2 && group[0].start == group[1].start));
+    }
+    parts
+}
+
+/// Free sides, for each object: of the largest part as a warning, of others for information. Flat
+/// sheets (a lamp, a leaf) are meant to have free sides.
+fn open(scene: &Scene, topology: &Topology, parts: &[Part], notes: &mut Vec<Note>) {
+    let largest = (0..parts.len())
+        .max_by(|&a, &b| parts[a].diagonal().total_cmp(&parts[b].diagonal()).then(b.cmp(&a)));
+    let mut free: BTreeMap<(&str, bool), (usize, f64)> = BTreeMap::new();
+    for side in topology.sides.iter().filter(|g| g.len() == 1).map(|g| g[0]) {
+        let part = topology.component[side.polygon as usize] as usize;
+        if !parts[part].flat {
+            let entry = free
+                .entry((object(scene, topology, side.polygon), Some(part) == largest))
+                .or_default();
+            entry.0 += 1;
+            entry.1 +=
+                topology.points[side.start as usize].distance(topology.points[side.end as usize]);
+        }
+    }
+    let gaps = free.keys().any(|&(_, enclosure)| enclosure);
+    for ((object, enclosure), (count, length)) in free {
+        let (severity, code, what) = match enclosure {
+            true => (
+                Severity::Warning,
+                "open-enclosure",
+                "light escapes there into black surroundings; close the gap unless it is meant",
+            ),
+            false => (
+                Severity::Info,
+                "open-object",
+                "the object is not closed; close it if its back faces (black, blocking light) can be seen",
+            ),
+        };
+        let message = format!(
+            "{count} free sides, {length:.4} m in all, where no other polygon joins: {what}"
+        );
+        notes.push(note(severity, code, object, count, message));
+    }
+    let around_all = |p: &Part| parts.iter().all(|q| p.spans(q));
+    if !gaps
+        && !parts.iter().any(|p| p.closed() && around_all(p) && (parts.len() > 1 || p.volume < 0.0))
+    {
+        let message = "nothing encloses the scene: light that leaves it is lost in black surroundings; \
+                       put it in a closed room if that is not meant";
+        notes.push(note(Severity::Info, "open-enclosure", &scene.name, 1, message.to_owned()));
+    }
+}
+
+/// Neighbours of one object that face opposite ways.
+fn turned(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
+    let mut turned: BTreeMap<&str, usize> = BTreeMap::new();
+    for group in &topology.sides {
+        let [a, b] = group[..] else { continue };
+        let two_sided = [a, b].iter().any(|s| topology.polygons[s.polygon as usize].two_sided);
+        let (of_a, of_b) = (object(scene, topology, a.polygon), object(scene, topology, b.polygon));
+        if a.start == b.start && !two_sided && of_a == of_b {
+            *turned.entry(of_a).or_default() += 1;
+        }
+    }
+    for (object, count) in turned {
+        let message = format!(
+            "at {count} sides two neighbouring polygons face opposite ways; some normals are flipped: \
+             recalculate them (in Blender: Mesh > Normals > Recalculate Outside) or make the material double-sided"
+        );
+        notes.push(note(Severity::Warning, "flipped-normals", object, count, message));
+    }
+}
+
+/// Closed, evenly turned parts that face the wrong way: inward around nothing, or outward around
+/// everything else.
+fn inside_out(scene: &Scene, topology: &Topology, parts: &[Part], notes: &mut Vec<Note>) {
+    let hangs = scene.lights.iter().map(|l| l.node).chain(scene.cameras.iter().map(|c| c.node));
+    let stands: Vec<DVec3> =
+        hangs.filter_map(|n| scene.motion.pose(n, 0.0)).map(|pose| pose.translation).collect();
+    for (number, part) in parts.iter().enumerate() {
+        if !part.closed() || part.odd_sides > 0 || part.two_sided {
+            continue;
+        }
+        let others = || parts.iter().enumerate().filter(|(n, _)| *n != number).map(|(_, p)| p);
+        let holds = |p: &Part| part.contains(p.bounds.0) && part.contains(p.bounds.1);
+        let empty = !others().any(|p| part.contains((p.bounds.0 + p.bounds.1) / 2.0))
+            && !stands.iter().any(|&p| part.contains(p));
+        let all_in = parts.len() > 1 && others().all(holds);
+        let what = match part.volume < 0.0 {
+            true if empty && emits_nothing(scene, topology, number) => {
+                "it is closed and faces inward, but nothing is inside"
+            }
+            false if all_in => {
+                "it encloses all the rest but faces outward, so from inside it is black"
+            }
+            _ => continue,
+        };
+        let members =
+            (0..topology.polygons.len()).filter(|&p| topology.component[p] as usize == number);
+        let names: BTreeSet<&str> =
+            members.clone().map(|p| object(scene, topology, p as u32)).collect();
+        let message = format!("{what}; flip its normals (in Blender: Mesh > Normals > Flip)");
+        notes.push(note(
+            Severity::Warning,
+            "flipped-normals",
+            &listed(&names),
+            members.count(),
+            message,
+        ));
+    }
+}
+
+/// Whether no polygon of a part emits: an empty room whose walls glow is a furnace, not a mistake.
+fn emits_nothing(scene: &Scene, topology: &Topology, part: usize) -> bool {
+    let mut members =
+        topology.polygons.iter().zip(&topology.component).filter(|(_, c)| **c as usize == part);
+    members.all(|(p, _)| {
+        let material = scene.patches[p.patch.0 as usize].material;
+        scene.materials[material.0 as usize].exitance == [0.0; 3]
+    })
+}
+
+/// Polygons with the same corners that do not lie back to back.
+fn duplicates(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
+    let mut seen: BTreeMap<Vec<u32>, Vec<usize>> = BTreeMap::new();
+    for (number, polygon) in topology.polygons.iter().enumerate() {
+        let mut key = polygon.corners.clone();
+        key.sort_unstable();
+        seen.entry(key).or_default().push(number);
+    }
+    let mut doubled: BTreeMap<&str, (usize, BTreeSet<&str>)> = BTreeMap::new();
+    for same in seen.values().filter(|s| s.len() > 1) {
+        for (k, &later) in same.iter().enumerate().skip(1) {
+            let earlier = same[..k].iter().find(|&&e| coincide(topology, e, later));
+            if let Some(&earlier) = earlier {
+                let entry = doubled.entry(object(scene, topology, later as u32)).or_default();
+                entry.0 += 1;
+                entry.1.insert(object(scene, topology, earlier as u32));
+            }
+        }
+    }
+    for (object, (count, with)) in doubled {
+        let message = format!(
+            "{count} polygons coincide with polygons of {}, so light is exchanged twice; delete one of each",
+            listed(&with)
+        );
+        notes.push(note(Severity::Warning, "duplicate", object, count, message));
+    }
+}
+
+/// Whether two polygons of the same corners show the same side; two-sided ones always do.
+fn coincide(topology: &Topology, a: usize, b: usize) -> bool {
+    let (a, b) = (&topology.polygons[a], &topology.polygons[b]);
+    let after = |c: &[u32]| {
+        let at = c.iter().position(|&v| v == a.corners[0]).unwrap_or(0);
+        c[(at + 1) % c.len()]
+    };
+    a.two_sided || b.two_sided || after(&a.corners) == after(&b.corners)
+}
+
+fn object<'a>(scene: &'a Scene, topology: &Topology, polygon: u32) -> &'a str {
+    let patch = topology.polygons[polygon as usize].patch;
+    &scene.surfaces[scene.patches[patch.0 as usize].surface.0 as usize].object
+}

@@ -1,0 +1,184 @@
+//! Each finding on a scene that has it, and none on one that is sound.
+
+use glam::{DQuat, DVec3};
+
+use super::*;
+use crate::scene::{LightKind, NodeId, SceneBuilder};
+
+const O: DVec3 = DVec3::ZERO;
+const I: DVec3 = DVec3::ONE;
+
+/// A room with a lamp below the ceiling and a box on the floor; `change` may spoil it.
+fn notes(change: impl FnOnce(&mut SceneBuilder, NodeId, MaterialId)) -> Vec<Note> {
+    let mut b = SceneBuilder::new("s");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.0; 3], [10.0; 3]);
+    let room = b.node("room", None, O, DQuat::IDENTITY);
+    b.cuboid_inward(room, "walls", grey, O, I);
+    let lamp = b.node("lamp", None, DVec3::new(0.0, 0.9, 0.0), DQuat::IDENTITY);
+    b.polygon(
+        lamp,
+        "lamp",
+        glow,
+        &[0.4, 0.6, 0.6, 0.4]
+            .into_iter()
+            .zip([0.4, 0.4, 0.6, 0.6])
+            .map(|(x, z)| DVec3::new(x, 0.0, z))
+            .collect::<Vec<_>>(),
+    );
+    let crate_ = b.node("crate", None, O, DQuat::IDENTITY);
+    b.cuboid(crate_, "crate", grey, I * 0.1, I * 0.3);
+    change(&mut b, room, grey);
+    check(&b.build().unwrap())
+}
+
+fn found(notes: &[Note], code: &str) -> Vec<(Severity, String, usize)> {
+    notes
+        .iter()
+        .filter(|n| n.code == code)
+        .map(|n| (n.severity, n.subject.clone(), n.count))
+        .collect()
+}
+
+#[test]
+fn a_sound_room_has_no_findings() {
+    assert_eq!(notes(|_, _, _| ()), []);
+}
+
+#[test]
+fn a_wall_of_other_pieces_still_closes_the_room() {
+    // Four walls and a floor whose neighbours are cut differently (T-junctions), in two objects
+    // with a placement that rounds.
+    let mut b = SceneBuilder::new("s");
+    let glow = b.material("glow", [0.5; 3], [1.0; 3]);
+    let turn = DQuat::from_xyzw(0.1, 0.2, 0.3, 1.0).normalize();
+    let low = b.node("low", None, O, turn);
+    let high = b.node("high", None, turn * DVec3::new(0.0, 1.0 / 3.0, 0.0), turn);
+    let lift = DVec3::new(0.0, 1.0 / 3.0, 0.0);
+    let p = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+    for (a, c) in [(0.0, 0.3), (0.3, 1.0)] {
+        b.polygon(low, "floor", glow, &[p(0., 0., a), p(0., 0., c), p(1., 0., c), p(1., 0., a)]);
+        b.polygon(
+            high,
+            "ceiling",
+            glow,
+            &[p(a, 1., 0.) - lift, p(c, 1., 0.) - lift, p(c, 1., 1.) - lift, p(a, 1., 1.) - lift],
+        );
+    }
+    b.polygon(low, "back", glow, &[p(0., 0., 0.), p(1., 0., 0.), p(1., 1., 0.), p(0., 1., 0.)]);
+    b.polygon(
+        high,
+        "front",
+        glow,
+        &[p(1., 0., 1.), p(0., 0., 1.), p(0., 1., 1.), p(1., 1., 1.)].map(|q| q - lift),
+    );
+    b.polygon(low, "left", glow, &[p(0., 0., 1.), p(0., 0., 0.), p(0., 1., 0.), p(0., 1., 1.)]);
+    b.polygon(low, "right", glow, &[p(1., 0., 0.), p(1., 0., 1.), p(1., 1., 1.), p(1., 1., 0.)]);
+    let scene = b.build().unwrap();
+    assert_eq!(check(&scene), []);
+}
+
+#[test]
+fn nothing_emits() {
+    let mut b = SceneBuilder::new("dark");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    b.material("unused glow", [0.5; 3], [1.0; 3]);
+    let n = b.node("n", None, O, DQuat::IDENTITY);
+    b.cuboid(n, "box", grey, O, I);
+    assert_eq!(
+        found(&check(&b.build().unwrap()), "nothing-emits"),
+        [(Severity::Error, "dark".into(), 0)]
+    );
+}
+
+#[test]
+fn an_open_room_is_named_with_its_free_sides() {
+    let mut b = SceneBuilder::new("s");
+    let m = b.material("m", [0.5; 3], [1.0; 3]);
+    let room = b.node("room", None, O, DQuat::IDENTITY);
+    let all = super::super::builder::cuboid_sides(O, I);
+    for side in &all[..5] {
+        let mut side = *side;
+        side.reverse();
+        b.polygon(room, "walls", m, &side);
+    }
+    assert_eq!(
+        found(&check(&b.build().unwrap()), "open-enclosure"),
+        [(Severity::Warning, "room".into(), 4)]
+    );
+}
+
+#[test]
+fn objects_in_the_open_and_open_objects_are_worth_knowing() {
+    let mut b = SceneBuilder::new("space");
+    let m = b.material("m", [0.5; 3], [1.0; 3]);
+    let n = b.node("probe", None, O, DQuat::IDENTITY);
+    b.cuboid(n, "probe", m, O, I);
+    assert_eq!(
+        found(&check(&b.build().unwrap()), "open-enclosure"),
+        [(Severity::Info, "space".into(), 1)]
+    );
+    let lidless = notes(|b, _, grey| {
+        let n = b.node("bin", None, O, DQuat::IDENTITY);
+        for side in &super::super::builder::cuboid_sides(I * 0.5, I * 0.7)[..5] {
+            b.polygon(n, "bin", grey, side);
+        }
+    });
+    assert_eq!(lidless.len(), 1);
+    assert_eq!(found(&lidless, "open-object"), [(Severity::Info, "bin".into(), 4)]);
+}
+
+#[test]
+fn flipped_polygons_and_objects_are_found() {
+    let one = notes(|b, _, grey| {
+        let n = b.node("patched", None, O, DQuat::IDENTITY);
+        for (i, mut side) in
+            super::super::builder::cuboid_sides(I * 0.5, I * 0.7).into_iter().enumerate()
+        {
+            if i == 2 {
+                side.reverse();
+            }
+            b.polygon(n, "patched", grey, &side);
+        }
+    });
+    assert_eq!(found(&one, "flipped-normals"), [(Severity::Warning, "patched".into(), 4)]);
+    let whole = notes(|b, _, grey| {
+        let n = b.node("inverted", None, O, DQuat::IDENTITY);
+        b.cuboid_inward(n, "inverted", grey, I * 0.5, I * 0.7);
+    });
+    assert_eq!(found(&whole, "flipped-normals"), [(Severity::Warning, "inverted".into(), 6)]);
+    let outward = notes(|b, _, grey| {
+        let n = b.node("shell", None, O, DQuat::IDENTITY);
+        b.cuboid(n, "shell", grey, I * -1.0, I * 2.0);
+    });
+    assert_eq!(found(&outward, "flipped-normals"), [(Severity::Warning, "shell".into(), 6)]);
+}
+
+#[test]
+fn coincident_polygons_are_counted_but_not_back_to_back_ones() {
+    let twice = notes(|b, _, grey| {
+        let n = b.node("again", None, O, DQuat::IDENTITY);
+        b.cuboid(n, "again", grey, I * 0.1, I * 0.3);
+    });
+    assert_eq!(found(&twice, "duplicate"), [(Severity::Warning, "again".into(), 6)]);
+    let resting = notes(|b, _, grey| {
+        let n = b.node("neighbour", None, O, DQuat::IDENTITY);
+        b.cuboid(n, "neighbour", grey, DVec3::new(0.3, 0.1, 0.1), DVec3::new(0.5, 0.3, 0.3));
+    });
+    assert_eq!(found(&resting, "duplicate"), []);
+}
+
+#[test]
+fn numbers_out_of_the_usual_are_reported() {
+    let odd = notes(|b, room, _| {
+        let white = b.material("white", [0.97, 0.2, 0.2], [0.0; 3]);
+        let laser = b.material("laser", [0.0; 3], [1e7, 0.0, 0.0]);
+        let n = b.node("far", None, DVec3::splat(1e4), DQuat::IDENTITY);
+        b.cuboid(n, "a", white, O, I);
+        b.cuboid(n, "b", laser, I * 2.0, I * 3.0);
+        b.light("sun", room, LightKind::Directional, [1e5; 3]);
+    });
+    assert_eq!(found(&odd, "reflectance"), [(Severity::Warning, "white".into(), 6)]);
+    let subjects: Vec<String> = found(&odd, "units").into_iter().map(|f| f.1).collect();
+    assert_eq!(subjects, ["s", "laser", "sun"]);
+}

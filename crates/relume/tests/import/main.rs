@@ -1,0 +1,32 @@
+//! The importer against files: scenes that ship with the tests, files written here, broken ones,
+//! and Debian's assimp-testmodels where it is installed.
+
+mod broken;
+mod files;
+mod gltf;
+mod motion;
+mod shipped;
+mod surfaces;
+
+use std::path::{Path, PathBuf};
+
+use gltf::Gltf;
+use relume::scene::{ImportOptions, Note, Scene, SceneError, import};
+
+fn read(path: &Path) -> Result<Scene, SceneError> {
+    import(path, &ImportOptions::default())
+}
+
+/// The scene of a file that is written to a folder of its own.
+fn scene_of(gltf: &Gltf) -> Result<Scene, SceneError> {
+    let folder = tempfile::tempdir().unwrap();
+    read(&gltf.write(folder.path(), "scene"))
+}
+
+fn with_code<'a>(notes: &'a [Note], code: &str) -> Vec<&'a Note> {
+    notes.iter().filter(|n| n.code == code).collect()
+}
+
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+}

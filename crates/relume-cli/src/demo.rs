@@ -38,7 +38,8 @@ const ROOM_SIDE_M: f64 = 3.0;
 const ROOM_LAMP_SIDE_M: f64 = 0.7;
 /// How far below the ceiling the lamp hangs.
 const ROOM_LAMP_DROP_M: f64 = 0.1;
-const ROOM_PATH_M: (f64, f64) = (0.95, 0.95);
+/// Negative: it starts at the back.
+const ROOM_PATH_M: (f64, f64) = (-0.95, -0.95);
 
 /// Emitted radiance of the lamps, W/m2/sr: a warm white.
 const LAMP_RADIANCE: [f64; 3] = [20.0, 18.0, 15.0];
@@ -94,8 +95,8 @@ fn corridor() -> Result<Scene, SceneError> {
     // The last frame is the first again.
     let path = ellipse(centre, CORRIDOR_PATH_M, CORRIDOR_FRAMES, CORRIDOR_FRAMES - 1);
     lamp(&mut b, CORRIDOR_LAMP_SIDE_M, path);
-    let eye = DVec3::new(0.0, 2.1, 3.6);
-    camera(&mut b, eye, -0.12, 50f64.to_radians());
+    let eye = DVec3::new(0.0, 1.9, 2.6);
+    camera(&mut b, eye, -0.1, 52f64.to_radians());
     b.build()
 }
 
@@ -116,9 +117,10 @@ fn room() -> Result<Scene, SceneError> {
     let centre = DVec3::new(0.0, ROOM_SIDE_M - ROOM_LAMP_DROP_M, 0.0);
     // A loop: the frame after the last is the first.
     lamp(&mut b, ROOM_LAMP_SIDE_M, ellipse(centre, ROOM_PATH_M, ROOM_FRAMES, ROOM_FRAMES));
-    // Inside, with the front wall at its back.
-    let eye = DVec3::new(0.0, ROOM_SIDE_M / 2.0, half - 0.05);
-    camera(&mut b, eye, 0.0, 68f64.to_radians());
+    // Outside, looking in through the front wall: pictures leave out what is seen from behind. At
+    // 4 : 3 the opening is just wider than the picture.
+    let eye = DVec3::new(0.0, ROOM_SIDE_M / 2.0, half + 1.45);
+    camera(&mut b, eye, 0.0, 74f64.to_radians());
     b.build()
 }
 

@@ -139,7 +139,7 @@ fn info_says_what_was_read() {
         "frames 0-19 at 24 fps (20 in all), 1 of 7 bodies moving",
         "left wall",
         "sum 81.59, from 0.49 m2",
-        "perspective, 68.0 degrees high",
+        "perspective, 74.0 degrees high",
     ] {
         assert!(out.contains(part), "`{part}` is missing in:\n{out}");
     }

@@ -126,7 +126,7 @@ fn an_interrupted_run_can_be_resumed() {
     let out = dir.path().to_str().unwrap();
     // More frames than could be made in the time before the signal.
     let demo = ["demo", "room", "-o", out, "--fps", "24000"];
-    let child = Command::new(env!("CARGO_BIN_EXE_relume"))
+    let mut child = Command::new(env!("CARGO_BIN_EXE_relume"))
         .args(demo)
         .args(QUICK)
         .stdout(Stdio::piped())
@@ -135,6 +135,8 @@ fn an_interrupted_run_can_be_resumed() {
         .unwrap();
     let started = Instant::now();
     while !dir.path().join("frame-0001.png").exists() {
+        let ended = child.try_wait().unwrap();
+        assert!(ended.is_none(), "it ended by itself: {ended:?}");
         assert!(started.elapsed() < Duration::from_secs(60), "no frame in a minute");
         std::thread::sleep(Duration::from_millis(5));
     }

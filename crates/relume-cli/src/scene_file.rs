@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use relume::scene::{ImportOptions, Note, Scene, SceneError, Severity, import};
+use relume::scene::{ImportOptions, Note, Scene, SceneError, Severity, check, import};
 
 use crate::args::AnimationFlag;
 use crate::failure::Failure;
@@ -35,10 +35,14 @@ pub(crate) fn failure(error: SceneError) -> Failure {
     }
 }
 
-/// Says on stderr what was noticed while reading, unless it is merely worth knowing.
+/// Says on stderr, before a scene is solved, what was noticed while reading, unless it is merely
+/// worth knowing, and what `relume check` would call an error.
 pub(crate) fn warn(scene: &Scene) {
-    for note in scene.notes.iter().filter(|note| note.severity > Severity::Info) {
-        output::complain(&line(note));
+    let read = scene.notes.iter().filter(|note| note.severity > Severity::Info).cloned();
+    let found = check(scene).into_iter().filter(|note| note.severity == Severity::Error);
+    for note in read.chain(found) {
+        // The run goes on, so it is no more than a warning here.
+        output::complain(&line(&Note { severity: Severity::Warning, ..note }));
     }
 }
 

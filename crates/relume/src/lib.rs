@@ -16,6 +16,10 @@
 // Tests may measure and compare with whatever the platform offers: what they compute decides nothing.
 #![cfg_attr(test, allow(clippy::disallowed_methods, clippy::disallowed_types))]
 
+pub mod element;
 pub mod geometry;
+pub mod pair;
 pub mod scene;
 pub mod session;
+pub mod solver;
+pub mod transport;

@@ -1,23 +1,34 @@
 //! The session owns all mutable state and runs the phases of a frame; snapshots come out.
 
 use std::sync::Arc;
+use std::time::Instant;
 
+use crate::element::{Forest, WorldView};
+use crate::pair::{self, Brightness, Frontier, PairTree, Placed, Stage, Work, grow, resume};
 use crate::scene::Scene;
+use crate::solver::{Links, Radiosity, Stop};
+use crate::transport::Simd;
 
+mod coarse;
+mod gather;
 mod options;
 mod report;
 mod snapshot;
+mod surfaces;
+mod tally;
 
 pub use options::{Options, Oracle, Update};
 pub use report::{Energy, FrameReport, PairCounts, RowSumError, Seconds};
 pub use snapshot::{Leaf, Snapshot};
+
+use surfaces::LitForest;
 
 /// Why a frame could not be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionError {
     /// The links of this tolerance do not fit into the memory allowed.
     #[error(
-        "frame {frame} at tolerance {tolerance} needs more than the {limit_bytes} bytes of memory allowed ({links} links so far): raise --max-memory or the tolerance"
+        "frame {frame} at tolerance {tolerance} needs more than the {limit_bytes} bytes of memory allowed ({links} pairs so far): raise --max-memory or the tolerance"
     )]
     OutOfMemory {
         /// The frame being computed.
@@ -26,7 +37,7 @@ pub enum SessionError {
         tolerance: f64,
         /// The limit, bytes.
         limit_bytes: u64,
-        /// Links made when the limit was met.
+        /// Pairs made when the limit was met.
         links: u64,
     },
     /// An option is out of its range.
@@ -38,12 +49,36 @@ pub enum SessionError {
 pub struct Session {
     scene: Arc<Scene>,
     options: Options,
+    simd: Simd,
+    forest: Forest,
+    solved: Option<Solved>,
 }
+
+/// What the last step left.
+struct Solved {
+    time_s: f64,
+    view: WorldView,
+    tree: PairTree,
+    links: Links,
+    radiosity: Radiosity,
+}
+
+/// Threshold of the error oracle for a link, relative to the tolerance of the whole: the errors of
+/// a receiver's links add up. Measured; see docs/tolerance.md.
+const LINK_SHARE: f64 = 0.1;
+
+/// Residual of the solver relative to the tolerance.
+const RESIDUAL_SHARE: f64 = 0.005;
 
 impl Session {
     /// Prepares a scene for solving; the links are built by the first [`Session::step`].
+    ///
+    /// # Errors
+    /// [`SessionError::Option`] if an option is out of its range.
     pub fn new(scene: Arc<Scene>, options: Options) -> Result<Session, SessionError> {
-        Ok(Session { scene, options })
+        options.validate()?;
+        let forest = Forest::new(&scene);
+        Ok(Session { scene, options, simd: Simd::detect(), forest, solved: None })
     }
 
     /// The scene being solved.
@@ -57,8 +92,100 @@ impl Session {
     }
 
     /// Brings the solution to `time_s` (seconds of the animation); `frame` only labels the report.
+    ///
+    /// # Errors
+    /// [`SessionError::OutOfMemory`] if the links do not fit; the last solution is kept.
     pub fn step(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, SessionError> {
-        Ok(FrameReport { frame, time_s, ..FrameReport::default() })
+        let mut clock = Clock::start();
+        let mut report = FrameReport { frame, time_s, ..FrameReport::default() };
+        report.moved = self.moved_since_last(time_s);
+        self.forest.clear();
+        let view = WorldView::new(&self.scene, &self.forest, time_s);
+        report.seconds.moving = clock.lap();
+
+        let mut tree = PairTree::new(Forest::ROOT);
+        let mut work = Work::default();
+        let (start, coarse) = self.build(&view, &mut tree, &mut work, frame)?;
+        report.seconds.evaluate = clock.lap();
+
+        let links = surfaces::links_of(&self.forest, tree.links());
+        let lit = LitForest::new(&self.scene, &self.forest);
+        let stop = Stop::Residual(self.options.tolerance * RESIDUAL_SHARE);
+        let guess = |id: u32| coarse::radiosity_at(&self.forest, &start, &coarse, id, &lit);
+        let radiosity = Radiosity::solve(&lit, &links, Some(&guess), stop);
+        report.seconds.solve = clock.lap();
+
+        let solved = Solved { time_s, view, tree, links, radiosity };
+        tally::fill(&mut report, &self.scene, &self.forest, &solved, &work);
+        report.seconds.judge = clock.lap();
+        report.seconds.total = clock.total();
+        self.solved = Some(solved);
+        Ok(report)
+    }
+
+    /// Grows the pair tree of the present poses; returns the coarse solution on the way.
+    fn build(
+        &mut self,
+        view: &WorldView,
+        tree: &mut PairTree,
+        work: &mut Work,
+        frame: u32,
+    ) -> Result<(Radiosity, Vec<u32>), SessionError> {
+        let limit = self.options.max_memory_bytes.unwrap_or(u64::MAX);
+        let enough = |tree: &PairTree, elements: usize, scratch: u64| {
+            // Links and solution are still to come: 16 bytes a pair, 32 an element.
+            let pairs = tree.memory_bytes() + tree.len() as u64 * 16;
+            pairs + elements as u64 * 96 + scratch <= limit
+        };
+        let oracle = self.options.pair_oracle();
+        let coarse = match oracle {
+            pair::Oracle::Error { .. } => coarse::number(&self.scene, &mut self.forest),
+            pair::Oracle::FormFactor { .. } => Vec::new(),
+        };
+        let mut placed = Placed {
+            forest: &mut self.forest,
+            view,
+            stage: Stage::Coarse,
+            oracle,
+            simd: self.simd,
+        };
+        let root = [Forest::ROOT.0];
+        let (frontier, start, brightness);
+        if coarse.is_empty() {
+            (start, brightness) = (Radiosity::default(), Brightness::default());
+            placed.stage = Stage::Fine(&brightness);
+            frontier = grow(tree, &mut placed, &root, work, &enough).map(|_| Frontier::default());
+        } else {
+            let held = grow(tree, &mut placed, &root, work, &enough);
+            let held = held.ok_or_else(|| self.too_large(tree, limit, frame))?;
+            (start, brightness) = coarse::solve(&self.scene, &self.forest, tree, &held, &coarse);
+            let mut placed = Placed {
+                forest: &mut self.forest,
+                view,
+                stage: Stage::Fine(&brightness),
+                oracle,
+                simd: self.simd,
+            };
+            frontier = resume(tree, &mut placed, held, work, &enough);
+        }
+        match frontier {
+            Some(_) => Ok((start, coarse)),
+            None => Err(self.too_large(tree, limit, frame)),
+        }
+    }
+
+    fn too_large(&self, tree: &PairTree, limit_bytes: u64, frame: u32) -> SessionError {
+        let tolerance = self.options.tolerance;
+        SessionError::OutOfMemory { frame, tolerance, limit_bytes, links: tree.len() as u64 }
+    }
+
+    fn moved_since_last(&self, time_s: f64) -> Vec<String> {
+        let Some(last) = &self.solved else { return Vec::new() };
+        let bodies = self.scene.bodies.iter().zip(last.view.poses());
+        bodies
+            .filter(|(body, pose)| self.scene.motion.pose(body.node, time_s) != **pose)
+            .map(|(body, _)| body.name.clone())
+            .collect()
     }
 
     /// The present solution as an immutable value.
@@ -66,11 +193,58 @@ impl Session {
     /// # Panics
     /// Before the first [`Session::step`].
     pub fn snapshot(&self) -> Snapshot {
-        unimplemented!("filled in by the solver")
+        let solved = self.solved.as_ref().expect("a step comes before a snapshot");
+        snapshot::take(&self.scene, &self.forest, solved)
+    }
+
+    /// The pair tree of the present solution, with the forest its elements are in.
+    ///
+    /// # Panics
+    /// Before the first [`Session::step`].
+    pub fn pairs(&self) -> (&PairTree, &Forest) {
+        let solved = self.solved.as_ref().expect("a step comes before a look at the pairs");
+        (&solved.tree, &self.forest)
+    }
+
+    /// Sum of the form factors from a leaf element; 1 in a closed scene, up to the links' errors.
+    ///
+    /// # Panics
+    /// Before the first [`Session::step`].
+    pub fn row_sum(&self, leaf: crate::element::ElementId) -> f64 {
+        let solved = self.solved.as_ref().expect("a step comes before a look at the rows");
+        f64::from(solved.radiosity.row_sum(leaf.0))
     }
 
     /// Bytes that the engine's structures hold now.
     pub fn memory_bytes(&self) -> u64 {
-        0
+        let solved = self.solved.as_ref().map_or(0, |s| {
+            s.tree.memory_bytes() + s.links.memory_bytes() + s.radiosity.memory_bytes()
+        });
+        self.forest.memory_bytes() + solved
+    }
+}
+
+/// Wall-clock time of the phases; it labels reports and decides nothing.
+struct Clock {
+    start: Instant,
+    lap: Instant,
+}
+
+impl Clock {
+    fn start() -> Clock {
+        let now = Instant::now();
+        Clock { start: now, lap: now }
+    }
+
+    /// Seconds since the last lap.
+    fn lap(&mut self) -> f64 {
+        let now = Instant::now();
+        let seconds = (now - self.lap).as_secs_f64();
+        self.lap = now;
+        seconds
+    }
+
+    fn total(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
     }
 }

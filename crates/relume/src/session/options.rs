@@ -45,3 +45,36 @@ pub enum Update {
     /// Rebuild everything in every frame: the reference that others are checked against.
     Scratch,
 }
+
+impl Options {
+    /// Checks every range.
+    pub(super) fn validate(&self) -> Result<(), super::SessionError> {
+        let fail = |text: String| Err(super::SessionError::Option(text));
+        if !(self.tolerance > 0.0 && self.tolerance < 1.0) {
+            return fail(format!(
+                "tolerance {} is not between 0 and 1: it is a relative error, such as 0.02",
+                self.tolerance
+            ));
+        }
+        if let Oracle::FormFactor { epsilon, min_area_m2 } = self.oracle
+            && !(epsilon > 0.0 && epsilon < 1.0 && min_area_m2 >= 0.0)
+        {
+            return fail(format!(
+                "form-factor={epsilon},{min_area_m2}: the form factor must lie between 0 and 1 and the area must not be negative"
+            ));
+        }
+        Ok(())
+    }
+
+    /// The oracle in the pair tree's terms.
+    pub(super) fn pair_oracle(&self) -> crate::pair::Oracle {
+        match self.oracle {
+            Oracle::Error => {
+                crate::pair::Oracle::Error { threshold: self.tolerance * super::LINK_SHARE }
+            }
+            Oracle::FormFactor { epsilon, min_area_m2 } => {
+                crate::pair::Oracle::FormFactor { epsilon, min_area_m2 }
+            }
+        }
+    }
+}

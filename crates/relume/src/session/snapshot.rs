@@ -4,8 +4,11 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
+use crate::element::{ElementId, Forest};
 use crate::geometry::Pose;
 use crate::scene::{PatchId, Scene};
+
+use super::Solved;
 
 /// The solution at one instant.
 #[derive(Clone, Debug)]
@@ -38,5 +41,36 @@ impl Snapshot {
     pub fn leaves_of(&self, patch: PatchId) -> &[Leaf] {
         let i = patch.0 as usize;
         &self.leaves[self.leaf_offsets[i] as usize..self.leaf_offsets[i + 1] as usize]
+    }
+}
+
+/// The leaves of a solved forest.
+pub(super) fn take(scene: &Arc<Scene>, forest: &Forest, solved: &Solved) -> Snapshot {
+    let mut leaves = Vec::new();
+    let mut leaf_offsets = vec![0];
+    for (k, patch) in scene.patches.iter().enumerate() {
+        let mut stack = vec![forest.patch_root(PatchId(k as u32))];
+        if !solved.view.is_present(patch.body) {
+            stack.clear();
+        }
+        while let Some(id) = stack.pop() {
+            let children = forest.children(id);
+            if children.is_empty() {
+                leaves.push(Leaf {
+                    corners: forest.shape(id).corners,
+                    irradiance: solved.radiosity.irradiance(id.0),
+                    radiosity: solved.radiosity.radiosity(id.0),
+                });
+            }
+            stack.extend(children.rev().map(ElementId));
+        }
+        leaf_offsets.push(leaves.len() as u32);
+    }
+    Snapshot {
+        scene: Arc::clone(scene),
+        time_s: solved.time_s,
+        poses: solved.view.poses().to_vec(),
+        leaves,
+        leaf_offsets,
     }
 }

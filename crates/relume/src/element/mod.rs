@@ -1,0 +1,13 @@
+//! The element forest: scene > body > cluster > patch > quadtree element.
+//!
+//! An element knows its place in its body's own frame and nothing else: no light, no links, no
+//! pose. Parents come before children.
+
+mod clusters;
+mod forest;
+mod split;
+mod world;
+
+pub use forest::{ElementId, ElementKey, Forest, Kind};
+pub use split::{Shape, bilinear};
+pub use world::{OccluderPolygon, WorldElement, WorldLight, WorldPatch, WorldView};

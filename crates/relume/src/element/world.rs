@@ -1,0 +1,291 @@
+//! Where elements are at one instant: patch planes, boxes and occluders under the present poses.
+
+use glam::{DVec2, DVec3};
+
+use super::forest::{ElementId, Forest, Kind};
+use super::split::bilinear;
+use crate::geometry::{Aabb, Plane, Pose};
+use crate::scene::{BodyId, Frame, LightKind, PatchId, Scene};
+
+/// Rounding of element corners: they are kept in single precision relative to their patch.
+const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
+
+/// A patch's plane, in its body's frame and in the world.
+#[derive(Clone, Copy, Debug)]
+pub struct WorldPatch {
+    /// In the body's frame.
+    pub local: Frame,
+    /// In the world.
+    pub world: Frame,
+    /// The body it rides on.
+    pub body: BodyId,
+    /// How far an element corner of this patch may be off its exact place, metres.
+    pub rounding_m: f64,
+}
+
+/// A polygon that blocks light, with the planes that bound it.
+#[derive(Clone, Copy, Debug)]
+pub struct OccluderPolygon<'a> {
+    /// The polygon's plane.
+    pub plane: Plane,
+    /// Planes through its edges, perpendicular to it; the inside is in front of all.
+    pub edges: &'a [Plane],
+    /// Its corners.
+    pub corners: &'a [DVec3],
+}
+
+/// Everything about the present poses that pairs need: derived, and dropped at any time.
+#[derive(Clone, Debug)]
+pub struct WorldView {
+    patches: Vec<WorldPatch>,
+    poses: Vec<Option<Pose>>,
+    boxes: Vec<Aabb>,
+    world: Occluders,
+    local: Occluders,
+    lights: Vec<Option<WorldLight>>,
+    present: Vec<bool>,
+    hidden_twin: Vec<bool>,
+}
+
+/// A punctual light at one instant.
+#[derive(Clone, Copy, Debug)]
+pub struct WorldLight {
+    /// Where it is, metres.
+    pub position: DVec3,
+    /// Unit direction it shines along.
+    pub direction: DVec3,
+    /// What it is.
+    pub kind: LightKind,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Occluders {
+    offsets: Vec<u32>,
+    planes: Vec<Plane>,
+    corners: Vec<DVec3>,
+    edges: Vec<Plane>,
+}
+
+impl Occluders {
+    fn of(scene: &Scene, poses: &[Option<Pose>]) -> Occluders {
+        let mut out = Occluders { offsets: vec![0], ..Occluders::default() };
+        for patch in &scene.patches {
+            let pose = poses[patch.body.0 as usize].unwrap_or(Pose::IDENTITY);
+            let normal = pose.direction(patch.frame.normal);
+            let start = out.corners.len();
+            out.corners.extend(patch.corners_in_body().map(|c| pose.point(c)));
+            let corners = &out.corners[start..];
+            out.planes.push(Plane::through(corners[0], normal));
+            for (k, &p) in corners.iter().enumerate() {
+                let q = corners[(k + 1) % corners.len()];
+                out.edges.push(Plane::through(p, normal.cross(q - p).normalize_or_zero()));
+            }
+            out.offsets.push(out.corners.len() as u32);
+        }
+        out
+    }
+
+    fn get(&self, patch: usize) -> OccluderPolygon<'_> {
+        let range = self.offsets[patch] as usize..self.offsets[patch + 1] as usize;
+        OccluderPolygon {
+            plane: self.planes[patch],
+            edges: &self.edges[range.clone()],
+            corners: &self.corners[range],
+        }
+    }
+}
+
+impl WorldView {
+    /// The scene at `time_s`. Cost: proportional to the patches.
+    pub fn new(scene: &Scene, forest: &Forest, time_s: f64) -> WorldView {
+        let poses: Vec<Option<Pose>> =
+            (0..scene.bodies.len()).map(|b| scene.pose(BodyId(b as u32), time_s)).collect();
+        let patches = scene.patches.iter().map(|p| world_patch(p, &poses)).collect();
+        let still = vec![Some(Pose::IDENTITY); poses.len()];
+        let world = Occluders::of(scene, &poses);
+        let boxes = boxes(forest, &poses, &world, scene);
+        WorldView {
+            patches,
+            boxes,
+            world,
+            local: Occluders::of(scene, &still),
+            lights: scene.lights.iter().map(|l| world_light(scene, l, time_s)).collect(),
+            present: poses.iter().map(Option::is_some).collect(),
+            hidden_twin: hidden_twins(scene),
+            poses,
+        }
+    }
+
+    /// World pose of each body, `None` while absent.
+    pub fn poses(&self) -> &[Option<Pose>] {
+        &self.poses
+    }
+
+    /// A patch's plane.
+    #[inline]
+    pub fn patch(&self, patch: PatchId) -> &WorldPatch {
+        &self.patches[patch.0 as usize]
+    }
+
+    /// A light, `None` while absent.
+    #[inline]
+    pub fn light(&self, index: usize) -> Option<&WorldLight> {
+        self.lights[index].as_ref()
+    }
+
+    /// World box of a node of the forest's fixed part; empty while absent and for lights.
+    #[inline]
+    pub fn fixed_box(&self, id: ElementId) -> &Aabb {
+        &self.boxes[id.0 as usize]
+    }
+
+    /// Whether a body is there at all.
+    #[inline]
+    pub fn is_present(&self, body: BodyId) -> bool {
+        self.present[body.0 as usize]
+    }
+
+    /// A patch as a blocker in the world.
+    #[inline]
+    pub fn occluder(&self, patch: PatchId) -> OccluderPolygon<'_> {
+        self.world.get(patch.0 as usize)
+    }
+
+    /// A patch as a blocker in its body's frame: for light between two elements of that body,
+    /// which must not depend on where the body is.
+    #[inline]
+    pub fn occluder_in_body(&self, patch: PatchId) -> OccluderPolygon<'_> {
+        self.local.get(patch.0 as usize)
+    }
+
+    /// Whether the patch is the back of a double-sided polygon, whose front blocks already.
+    #[inline]
+    pub fn is_hidden_twin(&self, patch: PatchId) -> bool {
+        self.hidden_twin[patch.0 as usize]
+    }
+}
+
+fn hidden_twins(scene: &Scene) -> Vec<bool> {
+    let twin_is_first =
+        |(i, p): (usize, &crate::scene::Patch)| p.twin.is_some_and(|t| (t.0 as usize) < i);
+    scene.patches.iter().enumerate().map(twin_is_first).collect()
+}
+
+fn world_patch(patch: &crate::scene::Patch, poses: &[Option<Pose>]) -> WorldPatch {
+    let pose = poses[patch.body.0 as usize].unwrap_or(Pose::IDENTITY);
+    let f = patch.frame;
+    let reach = patch.corners.iter().fold(0.0_f64, |m, c| m.max(c.x.abs()).max(c.y.abs()));
+    WorldPatch {
+        local: f,
+        world: Frame {
+            origin: pose.point(f.origin),
+            u: pose.direction(f.u),
+            v: pose.direction(f.v),
+            normal: pose.direction(f.normal),
+        },
+        body: patch.body,
+        rounding_m: reach * ROUNDING,
+    }
+}
+
+fn world_light(scene: &Scene, light: &crate::scene::Light, time_s: f64) -> Option<WorldLight> {
+    let pose = scene.motion.pose(light.node, time_s)?;
+    Some(WorldLight {
+        position: pose.translation,
+        direction: pose.direction(DVec3::NEG_Z),
+        kind: light.kind,
+    })
+}
+
+fn boxes(forest: &Forest, poses: &[Option<Pose>], world: &Occluders, scene: &Scene) -> Vec<Aabb> {
+    let mut boxes = vec![Aabb::EMPTY; forest.fixed_len() as usize];
+    for id in (0..forest.fixed_len()).rev() {
+        let element = ElementId(id);
+        // Facets and polygons take their patch's box: they are small parts of it at worst.
+        if let Some(patch) = forest.patch(element) {
+            let body = scene.patches[patch.0 as usize].body;
+            if poses[body.0 as usize].is_some() {
+                let corners = world.get(patch.0 as usize).corners;
+                boxes[id as usize] = Aabb::of(corners.iter().copied());
+            }
+        }
+        if let Some(parent) = forest.parent(element) {
+            let own = boxes[id as usize];
+            let parent_box = &mut boxes[parent.0 as usize];
+            *parent_box = parent_box.union(own);
+        }
+    }
+    boxes
+}
+
+/// An element placed in space for one query.
+#[derive(Clone, Copy, Debug)]
+pub struct WorldElement {
+    /// Corners, counter-clockwise from the front, metres; a triangle repeats its last.
+    pub corners: [DVec3; 4],
+    /// Three or four.
+    pub len: usize,
+    /// Its plane.
+    pub plane: Plane,
+    /// Axes of the patch's frame in the plane.
+    pub axes: [DVec3; 2],
+    /// Centroid.
+    pub centre: DVec3,
+    /// Largest distance of a corner from the centre, metres.
+    pub radius: f64,
+    /// Area, m2.
+    pub area: f64,
+    /// Box around it.
+    pub bounds: Aabb,
+    /// How far its corners may be off their exact place, metres.
+    pub rounding_m: f64,
+}
+
+impl WorldElement {
+    /// Places an element: in its body's frame if `in_body`, else in the world.
+    ///
+    /// # Panics
+    /// If `id` is not an element.
+    #[inline]
+    pub fn new(view: &WorldView, forest: &Forest, id: ElementId, in_body: bool) -> WorldElement {
+        debug_assert_eq!(forest.kind(id), Kind::Element);
+        let patch = view.patch(forest.patch(id).expect("an element has a patch"));
+        let frame = if in_body { &patch.local } else { &patch.world };
+        let shape = forest.shape(id);
+        let place = |p: DVec2| frame.point(p);
+        let corners = shape.corners.map(place);
+        let centre = place(shape.centroid());
+        let reach2 = corners.iter().map(|c| (*c - centre).length_squared()).fold(0.0, f64::max);
+        WorldElement {
+            corners,
+            len: shape.len,
+            plane: Plane::through(frame.origin, frame.normal),
+            axes: [frame.u, frame.v],
+            centre,
+            radius: reach2.sqrt(),
+            area: shape.area(),
+            bounds: Aabb::of(corners),
+            rounding_m: patch.rounding_m,
+        }
+    }
+
+    /// The point at parameters `(s, t)` of the unit square.
+    #[inline]
+    pub fn point(&self, s: f64, t: f64) -> DVec3 {
+        bilinear(&self.corners, s, t)
+    }
+
+    /// Plane coordinates of a point relative to the centroid, metres.
+    #[inline]
+    pub fn offset(&self, p: DVec3) -> DVec2 {
+        let d = p - self.centre;
+        DVec2::new(d.dot(self.axes[0]), d.dot(self.axes[1]))
+    }
+
+    /// Signed distances of the corners from a plane: smallest and largest, metres.
+    #[inline]
+    pub fn span(&self, plane: &Plane) -> (f64, f64) {
+        let d = self.corners.map(|c| plane.distance(c));
+        (d[0].min(d[1]).min(d[2].min(d[3])), d[0].max(d[1]).max(d[2].max(d[3])))
+    }
+}

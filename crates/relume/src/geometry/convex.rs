@@ -1,0 +1,153 @@
+//! Small convex polygons in space, clipped by planes.
+
+use glam::{DVec2, DVec3};
+
+/// An oriented plane: `normal . x = offset`; the front is where the left side is larger.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Unit normal.
+    pub normal: DVec3,
+    /// Signed distance of the origin's foot along the normal, metres.
+    pub offset: f64,
+}
+
+impl Plane {
+    /// The plane through `point` with unit `normal`.
+    #[inline]
+    pub fn through(point: DVec3, normal: DVec3) -> Plane {
+        Plane { normal, offset: normal.dot(point) }
+    }
+
+    /// Signed distance of a point, metres; positive in front.
+    #[inline]
+    pub fn distance(&self, p: DVec3) -> f64 {
+        self.normal.dot(p) - self.offset
+    }
+}
+
+/// Corners a [`ConvexPolygon`] has room for: a quadrilateral cut by a dozen planes.
+const ROOM: usize = 16;
+
+/// A convex planar polygon in space with up to 16 corners, on the stack.
+#[derive(Clone, Copy, Debug)]
+pub struct ConvexPolygon {
+    corners: [DVec3; ROOM],
+    len: usize,
+}
+
+impl ConvexPolygon {
+    /// A polygon from its corners in order.
+    ///
+    /// # Panics
+    /// With more than 16 corners.
+    pub fn new(corners: &[DVec3]) -> ConvexPolygon {
+        let mut out = ConvexPolygon { corners: [DVec3::ZERO; ROOM], len: corners.len() };
+        out.corners[..corners.len()].copy_from_slice(corners);
+        out
+    }
+
+    /// Its corners in order; fewer than three where nothing is left.
+    #[inline]
+    pub fn corners(&self) -> &[DVec3] {
+        &self.corners[..self.len]
+    }
+
+    /// The part in front of `plane` (Sutherland & Hodgman 1974); corners within `slack_m` of the
+    /// plane count as on it and are kept.
+    pub fn clipped(&self, plane: &Plane, slack_m: f64) -> ConvexPolygon {
+        let mut out = ConvexPolygon { corners: [DVec3::ZERO; ROOM], len: 0 };
+        for i in 0..self.len {
+            let (p, q) = (self.corners[i], self.corners[(i + 1) % self.len]);
+            let (dp, dq) = (plane.distance(p), plane.distance(q));
+            if dp >= -slack_m {
+                out.push(p);
+            }
+            if (dp > slack_m && dq < -slack_m) || (dp < -slack_m && dq > slack_m) {
+                out.push(p + (q - p) * (dp / (dp - dq)));
+            }
+        }
+        out
+    }
+
+    fn push(&mut self, p: DVec3) {
+        if self.len < ROOM {
+            self.corners[self.len] = p;
+            self.len += 1;
+        }
+    }
+
+    /// Twice the vector area (right-hand rule), m2.
+    pub fn area_vector2(&self) -> DVec3 {
+        let mut sum = DVec3::ZERO;
+        for i in 1..self.len.saturating_sub(1) {
+            let e = self.corners[i] - self.corners[0];
+            sum += e.cross(self.corners[i + 1] - self.corners[0]);
+        }
+        sum
+    }
+
+    /// Area, m2.
+    pub fn area(&self) -> f64 {
+        self.area_vector2().length() * 0.5
+    }
+}
+
+/// Splits a convex polygon with more than four corners along the chord that makes the two parts
+/// most alike in area and most compact; returns the corner ranges `[i..=j]` and `[j..=i]`.
+///
+/// # Panics
+/// With fewer than five corners.
+pub fn split_convex(corners: &[DVec2]) -> (Vec<DVec2>, Vec<DVec2>) {
+    let n = corners.len();
+    assert!(n >= 5, "a polygon of {n} corners is not split by a chord");
+    let mut best = (f64::INFINITY, 0, 2);
+    for i in 0..n {
+        for j in i + 2..n {
+            if i == 0 && j == n - 1 {
+                continue;
+            }
+            let (one, two) = parts(corners, i, j);
+            let (a, b) = (area2(&one), area2(&two));
+            // Uneven areas and long chords both cost.
+            let cost = (a - b).abs() + (corners[i] - corners[j]).length_squared();
+            if cost < best.0 {
+                best = (cost, i, j);
+            }
+        }
+    }
+    parts(corners, best.1, best.2)
+}
+
+fn parts(corners: &[DVec2], i: usize, j: usize) -> (Vec<DVec2>, Vec<DVec2>) {
+    let two = corners[j..].iter().chain(&corners[..=i]).copied().collect();
+    (corners[i..=j].to_vec(), two)
+}
+
+fn area2(corners: &[DVec2]) -> f64 {
+    (0..corners.len()).map(|i| corners[i].perp_dot(corners[(i + 1) % corners.len()])).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clipping_a_square_keeps_the_part_in_front() {
+        let square =
+            ConvexPolygon::new(&[DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y]);
+        let plane = Plane::through(DVec3::new(0.25, 0.0, 0.0), DVec3::X);
+        assert!((square.clipped(&plane, 0.0).area() - 0.75).abs() < 1e-15);
+        let behind = Plane::through(DVec3::X * 2.0, DVec3::X);
+        assert!(square.clipped(&behind, 0.0).corners().is_empty());
+    }
+
+    #[test]
+    fn a_polygon_splits_into_parts_of_its_area() {
+        let disc: Vec<DVec2> = (0..32)
+            .map(|k| DVec2::from_angle(f64::from(k) * std::f64::consts::TAU / 32.0))
+            .collect();
+        let (one, two) = split_convex(&disc);
+        assert!((area2(&one) + area2(&two) - area2(&disc)).abs() < 1e-14);
+        assert!((area2(&one) / area2(&disc) - 0.5).abs() < 0.05);
+    }
+}

@@ -1,0 +1,75 @@
+//! The brightness bounds that the error oracle weighs links by.
+
+use crate::element::{ElementId, Forest};
+
+/// What the oracle may know about the light of one coarse element; W/m2, mean of the channels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Radiosity, emitted and reflected (or intensity of a punctual light).
+    pub radiosity: f64,
+    /// The reflected part of it, which varies over the element; the emitted part does not.
+    pub reflected: f64,
+    /// Irradiance that errors on this element are measured against; positive.
+    pub irradiance: f64,
+}
+
+impl Light {
+    /// The light of a scene in which every surface weighs the same.
+    pub const UNIFORM: Light = Light { radiosity: 1.0, reflected: 1.0, irradiance: 1.0 };
+}
+
+/// Canonical brightness: a pure function of the scene at one instant, never of the running
+/// solution, so that verdicts have no memory.
+#[derive(Clone, Debug, Default)]
+pub struct Brightness {
+    coarse: Vec<Light>,
+    lights: Vec<f64>,
+    reference_area_m2: f64,
+}
+
+impl Brightness {
+    /// From the light of each coarse element, the mean intensity of each punctual light, and the
+    /// area below which elements weigh less than others, m2. Values are rounded to half powers of
+    /// two, so that they seldom change.
+    pub fn new(coarse: Vec<Light>, lights: Vec<f64>, reference_area_m2: f64) -> Brightness {
+        let step = |l: Light| Light {
+            radiosity: coarsen(l.radiosity),
+            reflected: coarsen(l.reflected),
+            irradiance: coarsen(l.irradiance),
+        };
+        Brightness { coarse: coarse.into_iter().map(step).collect(), lights, reference_area_m2 }
+    }
+
+    /// The light of an element or punctual light.
+    #[inline]
+    pub fn of(&self, forest: &Forest, id: ElementId) -> Light {
+        if let Some(light) = forest.light(id) {
+            let radiosity = self.lights[light];
+            return Light { radiosity, reflected: 0.0, irradiance: f64::INFINITY };
+        }
+        forest.coarse(id).map_or(Light::UNIFORM, |c| self.coarse[c])
+    }
+
+    /// Area at which an element weighs 1 in the error norm, m2.
+    pub fn reference_area_m2(&self) -> f64 {
+        self.reference_area_m2
+    }
+}
+
+/// Rounds down to 1, 1.5, 2, 3, 4, 6, 8 ...: all but the first bit of the mantissa is dropped.
+fn coarsen(x: f64) -> f64 {
+    f64::from_bits(x.to_bits() & !((1 << 51) - 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_keeps_half_powers_of_two() {
+        for (x, y) in [(1.0, 1.0), (1.4, 1.0), (1.5, 1.5), (1.99, 1.5), (5.9, 4.0), (0.0, 0.0)] {
+            assert_eq!(coarsen(x), y);
+        }
+        assert!(coarsen(f64::INFINITY).is_infinite());
+    }
+}

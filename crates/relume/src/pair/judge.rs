@@ -1,0 +1,413 @@
+//! Judging pairs of the three-dimensional forest.
+
+use std::ops::Range;
+
+use glam::DVec3;
+
+use crate::element::{ElementId, Forest, Kind, WorldElement, WorldLight, WorldView};
+use crate::geometry::{Aabb, Plane, shaft_meets_box};
+use crate::scene::LightKind;
+use crate::transport::{
+    Exchange, Meeting, SegmentBundle, Shaft, Simd, Visibility, exchange, light_at, light_exchange,
+    light_visibility, meeting, visibility,
+};
+
+use super::brightness::Brightness;
+use super::grow::{Hierarchy, Judge, Judgement, Verdict};
+use super::hash::pair_key;
+use super::oracle::{End, Oracle, Side, estimate};
+use super::tree::{CullReason, Gradients};
+
+/// How far pairs are decided.
+#[derive(Clone, Copy, Debug)]
+pub enum Stage<'a> {
+    /// Down to pairs of coarse elements, which are held.
+    Coarse,
+    /// By the oracle, with the brightness it weighs by.
+    Fine(&'a Brightness),
+}
+
+/// The forest placed in space, with what decides.
+pub struct Placed<'a> {
+    /// The elements.
+    pub forest: &'a mut Forest,
+    /// Where they are.
+    pub view: &'a WorldView,
+    /// How far to go.
+    pub stage: Stage<'a>,
+    /// What decides in the end.
+    pub oracle: Oracle,
+    /// Vector instructions.
+    pub simd: Simd,
+}
+
+impl Hierarchy for Placed<'_> {
+    fn children(&self, id: ElementId) -> Range<u32> {
+        self.forest.children(id)
+    }
+
+    fn split(&mut self, id: ElementId) -> (Range<u32>, bool) {
+        match self.forest.kind(id) {
+            Kind::Element => self.forest.split(id),
+            _ => (self.forest.children(id), false),
+        }
+    }
+
+    fn element_count(&self) -> usize {
+        self.forest.len()
+    }
+}
+
+impl Judge for Placed<'_> {
+    fn judge(
+        &self,
+        a: ElementId,
+        b: ElementId,
+        candidates: &[u32],
+        narrowed: &mut Vec<u32>,
+    ) -> Judgement {
+        match (self.forest.kind(a), self.forest.kind(b)) {
+            (Kind::Element, Kind::Element) => self.judge_elements(a, b, candidates, narrowed),
+            (Kind::Element, Kind::Light) => self.judge_light(b, a, Side::A, candidates, narrowed),
+            (Kind::Light, Kind::Element) => self.judge_light(a, b, Side::B, candidates, narrowed),
+            (Kind::Light, Kind::Light) => culled(CullReason::NoReceiver),
+            _ => self.judge_groups(a, b, candidates, narrowed),
+        }
+    }
+}
+
+/// A verdict of which the numbers do not matter.
+fn passing(verdict: Verdict, segments: u32) -> Judgement {
+    Judgement {
+        verdict,
+        exchange_area_m2: 0.0,
+        visibility: 0.0,
+        gradients: Gradients::default(),
+        segments,
+    }
+}
+
+fn culled(reason: CullReason) -> Judgement {
+    passing(Verdict::Cull(reason), 0)
+}
+
+/// A verdict to link or to hold, with what the link carries.
+fn carrying(
+    verdict: Verdict,
+    x: &Exchange,
+    v: &Visibility,
+    (a, b): (&WorldElement, &WorldElement),
+) -> Judgement {
+    Judgement {
+        verdict,
+        exchange_area_m2: x.area_m2 as f32,
+        visibility: v.value as f32,
+        gradients: Gradients::new(
+            (x.over_a.gradient + v.gradient_a, a.radius),
+            (x.over_b.gradient + v.gradient_b, b.radius),
+        ),
+        segments: v.segments,
+    }
+}
+
+impl Placed<'_> {
+    fn judge_groups(
+        &self,
+        a: ElementId,
+        b: ElementId,
+        candidates: &[u32],
+        narrowed: &mut Vec<u32>,
+    ) -> Judgement {
+        let (box_a, box_b) = (self.view.fixed_box(a), self.view.fixed_box(b));
+        let lit = |id| self.forest.kind(id) == Kind::Light;
+        if (box_a.is_empty() && !lit(a)) || (box_b.is_empty() && !lit(b)) {
+            return culled(CullReason::Absent);
+        }
+        if a == b {
+            if self.forest.kind(a) == Kind::Polygon {
+                return culled(CullReason::FacingAway);
+            }
+            narrowed.extend_from_slice(candidates);
+            return passing(Verdict::RefineSelf, 0);
+        }
+        if lit(a) || lit(b) {
+            narrowed.extend_from_slice(candidates);
+            let side = if lit(a) { Side::B } else { Side::A };
+            return passing(Verdict::Refine(side), 0);
+        }
+        if self.box_is_behind(a, box_b) || self.box_is_behind(b, box_a) {
+            return culled(CullReason::FacingAway);
+        }
+        narrow_boxes(self.view, self.forest, (box_a, box_b), candidates, narrowed);
+        let size = |id: ElementId, bounds: &Aabb| match self.forest.kind(id) {
+            Kind::Element => -1.0,
+            _ => bounds.diagonal(),
+        };
+        let side = if size(a, box_a) >= size(b, box_b) { Side::A } else { Side::B };
+        passing(Verdict::Refine(side), 0)
+    }
+
+    /// Whether a box is wholly behind the plane of a polygon or element.
+    fn box_is_behind(&self, id: ElementId, bounds: &Aabb) -> bool {
+        let Some(patch) = self.forest.patch(id) else { return false };
+        let patch = self.view.patch(patch);
+        let n = patch.world.normal;
+        let plane = Plane::through(patch.world.origin, n);
+        let far = DVec3::select(n.cmpge(DVec3::ZERO), bounds.hi, bounds.lo);
+        plane.distance(far) <= patch.rounding_m
+    }
+
+    fn judge_elements(
+        &self,
+        a: ElementId,
+        b: ElementId,
+        candidates: &[u32],
+        narrowed: &mut Vec<u32>,
+    ) -> Judgement {
+        let patches = (self.patch_of(a), self.patch_of(b));
+        let bodies = (self.view.patch(patches.0).body, self.view.patch(patches.1).body);
+        if !self.view.is_present(bodies.0) || !self.view.is_present(bodies.1) {
+            return culled(CullReason::Absent);
+        }
+        let one_body = bodies.0 == bodies.1;
+        let place = |id, in_body| WorldElement::new(self.view, self.forest, id, in_body);
+        // Light between two elements of one body must not depend on where the body is.
+        let (own_a, own_b) = (place(a, one_body), place(b, one_body));
+        let met = meeting(&own_a, &own_b);
+        if met == Meeting::Away {
+            return culled(CullReason::FacingAway);
+        }
+        let (world_a, world_b);
+        let shaft = if one_body && !candidates.is_empty() {
+            (world_a, world_b) = (place(a, false), place(b, false));
+            self.shaft((&world_a, &world_b), Some((bodies.0, &own_a, &own_b)), patches)
+        } else {
+            self.shaft((&own_a, &own_b), None, patches)
+        };
+        shaft.narrow(candidates, narrowed);
+        let blockers = narrowed.split_off(0);
+        let judgement = self.decide((a, b), (&own_a, &own_b), met, &shaft, &blockers);
+        narrowed.extend(blockers);
+        judgement
+    }
+
+    fn shaft<'a>(
+        &'a self,
+        (a, b): (&'a WorldElement, &'a WorldElement),
+        own: Option<(crate::scene::BodyId, &'a WorldElement, &'a WorldElement)>,
+        patches: (crate::scene::PatchId, crate::scene::PatchId),
+    ) -> Shaft<'a> {
+        Shaft { forest: self.forest, view: self.view, a, b, own, patches }
+    }
+
+    fn patch_of(&self, id: ElementId) -> crate::scene::PatchId {
+        self.forest.patch(id).expect("elements have patches")
+    }
+
+    fn decide(
+        &self,
+        (a, b): (ElementId, ElementId),
+        (place_a, place_b): (&WorldElement, &WorldElement),
+        met: Meeting,
+        shaft: &Shaft<'_>,
+        blockers: &[u32],
+    ) -> Judgement {
+        if let Stage::Coarse = self.stage
+            && let Some(side) = self.above_coarse(a, b)
+        {
+            return passing(Verdict::Refine(side), 0);
+        }
+        let key = pair_key(self.forest.key(a), self.forest.key(b));
+        let x = exchange(self.simd, place_a, place_b, met);
+        if let (Oracle::FormFactor { epsilon, min_area_m2 }, Stage::Fine(_)) =
+            (self.oracle, self.stage)
+        {
+            let areas = (place_a.area, place_b.area);
+            if x.area_m2 / areas.0.min(areas.1) > epsilon
+                && let Some(side) = self.larger((a, b), areas, min_area_m2)
+            {
+                return passing(Verdict::Refine(side), 0);
+            }
+        }
+        let v = visibility(self.simd, shaft, blockers, key, 4);
+        let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
+        else {
+            let verdict = match self.stage {
+                Stage::Coarse => Verdict::Hold,
+                Stage::Fine(_) => Verdict::Link,
+            };
+            return carrying(verdict, &x, &v, (place_a, place_b));
+        };
+        let end = |id, area| End { area, light: brightness.of(self.forest, id) };
+        let ends = (end(a, place_a.area), end(b, place_b.area));
+        let e = estimate(&x, &v, (&ends.0, &ends.1), brightness.reference_area_m2());
+        if e.error > threshold
+            && let Some(side) = self.splittable((a, b), e.side(&ends.0, &ends.1))
+        {
+            return passing(Verdict::Refine(side), v.segments);
+        }
+        let v = self.settle(v, shaft, blockers, key);
+        carrying(Verdict::Link, &x, &v, (place_a, place_b))
+    }
+
+    /// A link that is partly blocked gets more segments.
+    fn settle(&self, v: Visibility, shaft: &Shaft<'_>, blockers: &[u32], key: u64) -> Visibility {
+        if v.value <= 0.0 || v.value >= 1.0 {
+            return v;
+        }
+        let fine = visibility(self.simd, shaft, blockers, key, 6);
+        Visibility { segments: v.segments + fine.segments, ..fine }
+    }
+
+    /// The side that is above the coarse level, if one is; the larger first.
+    fn above_coarse(&self, a: ElementId, b: ElementId) -> Option<Side> {
+        let above = |id| self.forest.coarse(id).is_none();
+        match (above(a), above(b)) {
+            (true, false) => Some(Side::A),
+            (false, true) => Some(Side::B),
+            (false, false) => None,
+            (true, true) => Some(if self.forest.area_m2(a) >= self.forest.area_m2(b) {
+                Side::A
+            } else {
+                Side::B
+            }),
+        }
+    }
+
+    /// The larger side if it may still be refined, else the smaller.
+    fn larger(
+        &self,
+        (a, b): (ElementId, ElementId),
+        (area_a, area_b): (f64, f64),
+        min_area: f64,
+    ) -> Option<Side> {
+        let order = if area_a >= area_b { [Side::A, Side::B] } else { [Side::B, Side::A] };
+        order.into_iter().find(|&side| {
+            let (id, area) = if side == Side::A { (a, area_a) } else { (b, area_b) };
+            area > min_area && self.forest.can_split(id)
+        })
+    }
+
+    fn splittable(&self, (a, b): (ElementId, ElementId), wish: Side) -> Option<Side> {
+        let order = if wish == Side::A { [Side::A, Side::B] } else { [Side::B, Side::A] };
+        let id = |side| if side == Side::A { a } else { b };
+        order.into_iter().find(|&side| self.forest.can_split(id(side)))
+    }
+
+    fn judge_light(
+        &self,
+        light: ElementId,
+        element: ElementId,
+        side: Side,
+        candidates: &[u32],
+        narrowed: &mut Vec<u32>,
+    ) -> Judgement {
+        let index = self.forest.light(light).expect("a light has an index");
+        let patch = self.patch_of(element);
+        let present = self.view.is_present(self.view.patch(patch).body);
+        let Some(lamp) = self.view.light(index).filter(|_| present) else {
+            return culled(CullReason::Absent);
+        };
+        if let Stage::Coarse = self.stage
+            && self.forest.coarse(element).is_none()
+        {
+            narrowed.extend_from_slice(candidates);
+            return passing(Verdict::Refine(side), 0);
+        }
+        let e = WorldElement::new(self.view, self.forest, element, false);
+        let x = light_exchange(lamp, &e);
+        if x.area_m2 <= 0.0 {
+            return culled(CullReason::FacingAway);
+        }
+        let place = LightPlace::new(lamp, &e, self.view.fixed_box(Forest::ROOT));
+        let shaft = self.shaft((&e, &place.stand_in), None, (patch, patch));
+        shaft.narrow(candidates, narrowed);
+        let key = pair_key(self.forest.key(element), self.forest.key(light));
+        let segments = place.segments(lamp, &e, key);
+        let v = light_visibility(self.simd, &shaft, narrowed, &segments);
+        let verdict = match (self.stage, self.oracle) {
+            (Stage::Coarse, _) => Verdict::Hold,
+            (Stage::Fine(brightness), Oracle::Error { threshold }) => {
+                let ends = (
+                    End { area: e.area, light: brightness.of(self.forest, element) },
+                    End { area: 0.0, light: brightness.of(self.forest, light) },
+                );
+                let est = estimate(&x, &v, (&ends.0, &ends.1), brightness.reference_area_m2());
+                self.refine_if(est.error > threshold && self.forest.can_split(element), side)
+            }
+            (Stage::Fine(_), Oracle::FormFactor { epsilon, min_area_m2 }) => {
+                let uneven = x.over_a.slope.max(v.spread_a) > epsilon;
+                let room = e.area > min_area_m2 && self.forest.can_split(element);
+                self.refine_if(uneven && room, side)
+            }
+        };
+        carrying(verdict, &x, &v, (&e, &place.stand_in))
+    }
+
+    fn refine_if(&self, wanted: bool, side: Side) -> Verdict {
+        if wanted { Verdict::Refine(side) } else { Verdict::Link }
+    }
+}
+
+/// A punctual light as the far end of a shaft.
+struct LightPlace {
+    stand_in: WorldElement,
+    /// For directional lights: far enough along the light to be outside everything.
+    away_m: f64,
+}
+
+impl LightPlace {
+    fn new(lamp: &WorldLight, e: &WorldElement, scene: &Aabb) -> LightPlace {
+        let away_m = scene.diagonal() * 1.5;
+        let corners = match lamp.kind {
+            LightKind::Directional => e.corners.map(|c| c - lamp.direction * away_m),
+            LightKind::Point | LightKind::Spot { .. } => [lamp.position; 4],
+        };
+        let centre = (corners[0] + corners[1] + corners[2] + corners[3]) * 0.25;
+        let stand_in = WorldElement {
+            corners,
+            len: 4,
+            // Nothing is behind a light.
+            plane: Plane { normal: DVec3::ZERO, offset: -1.0 },
+            axes: [DVec3::ZERO; 2],
+            centre,
+            radius: corners.iter().map(|c| c.distance(centre)).fold(0.0, f64::max),
+            area: 0.0,
+            bounds: Aabb::of(corners),
+            rounding_m: 0.0,
+        };
+        LightPlace { stand_in, away_m }
+    }
+
+    fn segments(&self, lamp: &WorldLight, e: &WorldElement, key: u64) -> SegmentBundle {
+        let end = |p: DVec3| match lamp.kind {
+            LightKind::Directional => p - lamp.direction * self.away_m,
+            LightKind::Point | LightKind::Spot { .. } => lamp.position,
+        };
+        SegmentBundle::to_light(e, key, end, |p| light_at(lamp, p, e.plane.normal))
+    }
+}
+
+/// Candidates of a pair of boxes; clusters large against the pair are opened.
+fn narrow_boxes(
+    view: &WorldView,
+    forest: &Forest,
+    (a, b): (&Aabb, &Aabb),
+    parents: &[u32],
+    out: &mut Vec<u32>,
+) {
+    let keep_m = 0.5 * a.union(*b).diagonal();
+    let mut stack: Vec<u32> = parents.iter().rev().copied().collect();
+    while let Some(id) = stack.pop() {
+        let element = ElementId(id);
+        let bounds = view.fixed_box(element);
+        if bounds.is_empty() || !shaft_meets_box(a, b, bounds) {
+            continue;
+        }
+        if forest.patch(element).is_some() || bounds.diagonal() <= keep_m {
+            out.push(id);
+        } else {
+            stack.extend(forest.children(element).rev());
+        }
+    }
+}

@@ -1,0 +1,307 @@
+//! Partial visibility of a pair: which bodies stand in its shaft, and which of its fixed
+//! segments they block.
+
+use crate::element::{ElementId, Forest, Kind, Shape, WorldElement, WorldView};
+use crate::geometry::{Aabb, shaft_meets_box};
+use crate::scene::{BodyId, PatchId};
+
+use super::kernel::Simd;
+use super::segments::{SEGMENTS, SegmentBundle};
+use glam::{DVec2, DVec3};
+
+/// Nodes of the forest's fixed part that may stand between the two ends of a pair: clusters and
+/// patch roots. Conservative: what is not below one of them blocks nothing.
+pub type Candidates = [u32];
+
+/// The visibility of a pair, kernel-weighted over its segments.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Visibility {
+    /// Unoccluded share, in [0, 1].
+    pub value: f64,
+    /// What occlusion adds to the relative gradient of what arrives over the first end, 1/m.
+    pub gradient_a: DVec2,
+    /// The same over the second end.
+    pub gradient_b: DVec2,
+    /// Standard deviation between the quadrants of the first end, absolute.
+    pub spread_a: f64,
+    /// Standard deviation between the quadrants of the second end, absolute.
+    pub spread_b: f64,
+    /// Segments traced; 0 where the shaft is empty, and then `value` is exactly 1.
+    pub segments: u32,
+}
+
+impl Visibility {
+    /// Nothing in the way.
+    pub const CLEAR: Visibility = Visibility {
+        value: 1.0,
+        gradient_a: DVec2::ZERO,
+        gradient_b: DVec2::ZERO,
+        spread_a: 0.0,
+        spread_b: 0.0,
+        segments: 0,
+    };
+}
+
+/// A pair placed for visibility queries.
+#[derive(Clone, Copy, Debug)]
+pub struct Shaft<'a> {
+    /// The forest.
+    pub forest: &'a Forest,
+    /// The poses.
+    pub view: &'a WorldView,
+    /// First end in the world.
+    pub a: &'a WorldElement,
+    /// Second end in the world.
+    pub b: &'a WorldElement,
+    /// Both ends in their body's frame, where they ride on one body that may move.
+    pub own: Option<(BodyId, &'a WorldElement, &'a WorldElement)>,
+    /// Patches of the two ends: they do not block their own light.
+    pub patches: (PatchId, PatchId),
+}
+
+impl Shaft<'_> {
+    fn slack(&self) -> f64 {
+        self.a.rounding_m + self.b.rounding_m
+    }
+
+    /// Whether a patch could block any segment.
+    fn may_be_blocked_by(&self, patch: PatchId, bounds: &Aabb) -> bool {
+        if patch == self.patches.0 || patch == self.patches.1 || self.view.is_hidden_twin(patch) {
+            return false;
+        }
+        let slack = self.slack();
+        let occluder = self.view.occluder(patch);
+        let (a_lo, a_hi) = self.a.span(&occluder.plane);
+        let (b_lo, b_hi) = self.b.span(&occluder.plane);
+        if a_lo.min(b_lo) >= -slack || a_hi.max(b_hi) <= slack {
+            return false;
+        }
+        let behind =
+            |e: &WorldElement| occluder.corners.iter().all(|&c| e.plane.distance(c) <= slack);
+        !behind(self.a)
+            && !behind(self.b)
+            && shaft_meets_box(&self.a.bounds, &self.b.bounds, bounds)
+    }
+
+    /// Which of `parents` (candidates of a pair above) remain candidates here, appended to `out`;
+    /// clusters large against the shaft are opened.
+    pub fn narrow(&self, parents: &Candidates, out: &mut Vec<u32>) {
+        let reach = (self.b.centre - self.a.centre).length() + self.a.radius + self.b.radius;
+        for &parent in parents {
+            self.walk(ElementId(parent), 0.25 * reach, &mut |id| out.push(id.0));
+        }
+    }
+
+    /// Visits the candidates at or below `id`: patches, and clusters no larger than `keep_m`.
+    fn walk(&self, id: ElementId, keep_m: f64, visit: &mut dyn FnMut(ElementId)) {
+        let bounds = self.view.fixed_box(id);
+        if bounds.is_empty() {
+            return;
+        }
+        if let Some(patch) = self.forest.patch(id) {
+            if self.may_be_blocked_by(patch, bounds) {
+                visit(id);
+            }
+            return;
+        }
+        if self.forest.kind(id) == Kind::Light
+            || !shaft_meets_box(&self.a.bounds, &self.b.bounds, bounds)
+        {
+            return;
+        }
+        if bounds.diagonal() <= keep_m {
+            visit(id);
+            return;
+        }
+        for child in self.forest.children(id) {
+            self.walk(ElementId(child), keep_m, visit);
+        }
+    }
+
+    /// The segments of `bundle` (in the world; `own` in the body's frame) that are blocked.
+    fn blocked(
+        &self,
+        simd: Simd,
+        candidates: &Candidates,
+        world: &SegmentBundle,
+        own: Option<&SegmentBundle>,
+    ) -> u16 {
+        let mut mask = 0_u16;
+        let slack = 2.0 * self.slack();
+        for &candidate in candidates {
+            self.walk(ElementId(candidate), -1.0, &mut |id| {
+                if mask == u16::MAX {
+                    return;
+                }
+                let patch = self.forest.patch(id).expect("walk ends at patches");
+                let rides = self.own.filter(|o| o.0 == self.view.patch(patch).body);
+                mask |= match (rides, own) {
+                    (Some(_), Some(own)) => {
+                        own.blocked_by(simd, &self.view.occluder_in_body(patch), slack)
+                    }
+                    _ => world.blocked_by(simd, &self.view.occluder(patch), slack),
+                };
+            });
+            if mask == u16::MAX {
+                break;
+            }
+        }
+        mask
+    }
+}
+
+/// Visibility of a pair over `2^log2_count` fixed segments; a pair without candidates is clear
+/// and traces nothing. `key` names the pair and nothing else.
+pub fn visibility(
+    simd: Simd,
+    shaft: &Shaft<'_>,
+    candidates: &Candidates,
+    key: u64,
+    log2_count: u32,
+) -> Visibility {
+    if candidates.is_empty() {
+        return Visibility::CLEAR;
+    }
+    let (a, b) = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
+    let mut tally = Tally::default();
+    for block in 0..(1_u32 << log2_count) / SEGMENTS as u32 {
+        let world = SegmentBundle::new(shaft.a, shaft.b, key, log2_count, block);
+        let own = shaft.own.map(|(_, a, b)| SegmentBundle::new(a, b, key, log2_count, block));
+        let mask = shaft.blocked(simd, candidates, &world, own.as_ref());
+        // Weights from the body's frame where there is one: they must not follow its motion.
+        tally.add(own.as_ref().unwrap_or(&world), mask, a, b);
+    }
+    tally.finish(1 << log2_count, a, b)
+}
+
+/// Visibility of a punctual light (the second end of the shaft) from an element; `segments` come
+/// from [`SegmentBundle::to_light`].
+pub fn light_visibility(
+    simd: Simd,
+    shaft: &Shaft<'_>,
+    candidates: &Candidates,
+    segments: &SegmentBundle,
+) -> Visibility {
+    if candidates.is_empty() {
+        return Visibility::CLEAR;
+    }
+    let mut tally = Tally::default();
+    tally.add(segments, shaft.blocked(simd, candidates, segments, None), shaft.a, shaft.a);
+    let both = tally.finish(SEGMENTS as u32, shaft.a, shaft.a);
+    Visibility { gradient_b: DVec2::ZERO, spread_b: 0.0, ..both }
+}
+
+/// Weighted sums over segments, of all and of the clear ones.
+#[derive(Default)]
+struct Tally {
+    a: SideTally,
+    b: SideTally,
+}
+
+#[derive(Default)]
+struct SideTally {
+    total: [f64; 4],
+    clear: [f64; 4],
+    moment: DVec2,
+    clear_moment: DVec2,
+}
+
+impl SideTally {
+    fn add(&mut self, quadrant: u8, at: DVec2, weight: f64, clear: f64) {
+        self.total[quadrant as usize] += weight;
+        self.clear[quadrant as usize] += clear;
+        self.moment += at * weight;
+        self.clear_moment += at * clear;
+    }
+
+    /// What occlusion adds to the relative gradient: the shift of the centre of what arrives,
+    /// against the element's own second moment.
+    fn gradient(&self, e: &WorldElement) -> DVec2 {
+        let (total, clear): (f64, f64) = (self.total.iter().sum(), self.clear.iter().sum());
+        if clear <= 0.0 {
+            return DVec2::ZERO;
+        }
+        let shift = self.clear_moment / clear - self.moment / total;
+        let corners = e.corners.map(|c| e.offset(c));
+        let [xx, xy, yy] = Shape { corners, len: e.len }.second_moment();
+        let det = (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
+        DVec2::new(shift.x * yy - shift.y * xy, shift.y * xx - shift.x * xy) / det
+    }
+
+    fn spread(&self, value: f64) -> f64 {
+        let total: f64 = self.total.iter().sum();
+        let mut sum = 0.0;
+        for q in 0..4 {
+            if self.total[q] > 0.0 {
+                let off = self.clear[q] / self.total[q] - value;
+                sum += self.total[q] / total * off * off;
+            }
+        }
+        sum.sqrt()
+    }
+}
+
+impl Tally {
+    fn add(&mut self, bundle: &SegmentBundle, mask: u16, a: &WorldElement, b: &WorldElement) {
+        let dark = bundle.weight.iter().all(|&w| w <= 0.0);
+        for k in 0..SEGMENTS {
+            // A pair that hardly faces itself has no weights: all segments count alike.
+            let weight = if dark { f64::MIN_POSITIVE } else { bundle.weight[k] };
+            let clear = if mask >> k & 1 == 1 { 0.0 } else { weight };
+            let (p, q) = bundle.ends(k);
+            self.a.add(bundle.quadrant_a[k], a.offset(p), weight, clear);
+            self.b.add(bundle.quadrant_b[k], b.offset(q), weight, clear);
+        }
+    }
+
+    fn finish(&self, segments: u32, a: &WorldElement, b: &WorldElement) -> Visibility {
+        let (total, clear): (f64, f64) = (self.a.total.iter().sum(), self.a.clear.iter().sum());
+        let value = (clear / total).clamp(0.0, 1.0);
+        Visibility {
+            value,
+            gradient_a: self.a.gradient(a),
+            gradient_b: self.b.gradient(b),
+            spread_a: self.a.spread(value),
+            spread_b: self.b.spread(value),
+            segments,
+        }
+    }
+}
+
+/// Whether the open segment from `p` to `q` meets no patch, ends excluded by `slack_m`.
+pub fn segment_is_clear(
+    view: &WorldView,
+    forest: &Forest,
+    p: DVec3,
+    q: DVec3,
+    slack_m: f64,
+) -> bool {
+    let mut stack = vec![Forest::ROOT];
+    let (pb, qb) = (Aabb { lo: p, hi: p }, Aabb { lo: q, hi: q });
+    while let Some(id) = stack.pop() {
+        let bounds = view.fixed_box(id);
+        if bounds.is_empty() || !shaft_meets_box(&pb, &qb, bounds) {
+            continue;
+        }
+        match forest.patch(id) {
+            Some(patch) if !view.is_hidden_twin(patch) => {
+                if crosses(view, patch, p, q, slack_m) {
+                    return false;
+                }
+            }
+            Some(_) => {}
+            None => stack.extend(forest.children(id).map(ElementId)),
+        }
+    }
+    true
+}
+
+fn crosses(view: &WorldView, patch: PatchId, p: DVec3, q: DVec3, slack_m: f64) -> bool {
+    let occluder = view.occluder(patch);
+    let (s0, s1) = (occluder.plane.distance(p), occluder.plane.distance(q));
+    if s0.min(s1) >= -slack_m || s0.max(s1) <= slack_m {
+        return false;
+    }
+    let x = p + (q - p) * (s0 / (s0 - s1));
+    occluder.edges.iter().all(|e| e.distance(x) >= -1e-12 * (e.offset.abs() + 1e-3))
+}

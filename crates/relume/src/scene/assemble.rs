@@ -46,11 +46,8 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
         }
         let patches = Range { start: first, end: parts.patches.len() as u32 };
         if !patches.is_empty() {
-            parts.bodies.push(Body {
-                name: draft.nodes[node].name.clone(),
-                node: NodeId(node as u32),
-                patches,
-            });
+            let name = draft.nodes[node].name.clone();
+            parts.bodies.push(Body { name, node: NodeId(node as u32), patches });
         }
     }
     notes.append(&mut parts.notes);

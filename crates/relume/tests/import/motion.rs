@@ -76,6 +76,18 @@ fn scales_are_constant_or_switch() {
 }
 
 #[test]
+fn growth_matters_only_where_a_mesh_hangs_below() {
+    let mut g = Gltf::cube();
+    let bone = g.node(json!({"name": "bone"}));
+    g.animate("a", bone, "scale", "LINEAR", &[0.0, 1.0], &[1., 1., 1., 2., 2., 2.]);
+    assert!(!scene_of(&g).unwrap().moves(BodyId(0)));
+    let shape = g.push("nodes", json!({"name": "shape", "mesh": 0}));
+    g.json["nodes"][bone]["children"] = json!([shape]);
+    let grows = scene_of(&g).unwrap_err().to_string();
+    assert!(grows.contains("`bone`") && grows.contains("scale changes"), "{grows}");
+}
+
+#[test]
 fn visibility_pointers_are_presence_and_others_are_noted() {
     let mut g = Gltf::cube();
     let input = g.floats("SCALAR", &[0.0, 1.0]);

@@ -1,6 +1,7 @@
 //! What comes out of a builder: bodies, surfaces, poses and mistakes.
 
-use glam::{DQuat, DVec3};
+use glam::{DMat4, DQuat, DVec3};
+use proptest::prelude::*;
 
 use super::*;
 use crate::geometry::Pose;
@@ -222,4 +223,107 @@ fn mistakes_are_named() {
     );
     let nothing = SceneBuilder::new("void").build().unwrap_err().to_string();
     assert!(nothing.contains("`void` has no polygon"), "{nothing}");
+}
+
+/// A node of a random chain.
+#[derive(Clone, Debug)]
+struct Link {
+    translation: DVec3,
+    rotation: DQuat,
+    scale: DVec3,
+    /// Where it goes and turns to, if it is animated.
+    to: Option<(DVec3, DQuat)>,
+}
+
+fn vector(range: std::ops::Range<f64>) -> impl Strategy<Value = DVec3> {
+    (range.clone(), range.clone(), range).prop_map(|(x, y, z)| DVec3::new(x, y, z))
+}
+
+fn rotation() -> impl Strategy<Value = DQuat> {
+    vector(-1.0..1.0).prop_map(|v| DQuat::from_xyzw(v.x, v.y, v.z, 0.7).normalize())
+}
+
+/// Scales of either sign: even ones for links that may have animated ones below.
+fn scale(even: bool) -> impl Strategy<Value = DVec3> {
+    (vector(0.5..2.0), any::<bool>()).prop_map(move |(v, mirror)| {
+        let v = if even { DVec3::splat(v.x) } else { v };
+        if mirror {
+            DVec3::new(-v.x, v.y, v.z)
+                * DVec3::new(1.0, if even { -1.0 } else { 1.0 }, if even { -1.0 } else { 1.0 })
+        } else {
+            v
+        }
+    })
+}
+
+fn link(even: bool) -> impl Strategy<Value = Link> {
+    let to = proptest::option::of((vector(-2.0..2.0), rotation()));
+    (vector(-2.0..2.0), rotation(), scale(even), to).prop_map(
+        move |(translation, rotation, scale, to)| Link {
+            translation,
+            rotation,
+            scale,
+            to: to.filter(|_| even),
+        },
+    )
+}
+
+impl Link {
+    /// The matrix at time 0 or 1, straight from the definition.
+    fn matrix(&self, time: usize) -> DMat4 {
+        let (t, r) = match self.to {
+            Some(to) if time == 1 => to,
+            _ => (self.translation, self.rotation),
+        };
+        DMat4::from_scale_rotation_translation(self.scale, r, t)
+    }
+}
+
+proptest! {
+    /// Bodies, baked scales and rigid poses together put every corner where the plain product of
+    /// the nodes' matrices puts it, and fronts where mirrors leave them.
+    #[test]
+    fn corners_are_where_the_matrices_put_them(
+        upper in proptest::collection::vec(link(true), 1..4),
+        lower in proptest::collection::vec(link(false), 0..3),
+    ) {
+        let mut b = SceneBuilder::new("s");
+        let m = b.material("m", [0.5; 3], [0.0; 3]);
+        let links: Vec<Link> = upper.into_iter().chain(lower).collect();
+        let mut parent = None;
+        for link in &links {
+            let node = b.node("n", parent, link.translation, link.rotation);
+            b.scale(node, link.scale);
+            if let Some((translation, rotation)) = link.to {
+                let times_s = vec![0.0, 1.0];
+                let interpolation = Interpolation::Linear;
+                let values = vec![link.translation, translation];
+                b.animate_translation(node, Track { times_s: times_s.clone(), values, interpolation });
+                let values = vec![link.rotation, rotation];
+                b.animate_rotation(node, RotationTrack { times_s, values, interpolation });
+            }
+            parent = Some(node);
+        }
+        b.cuboid(parent.unwrap(), "box", m, DVec3::ZERO, DVec3::ONE);
+        let scene = b.build().unwrap();
+        prop_assert_eq!(scene.bodies.len(), 1);
+        prop_assert_eq!(scene.moves(BodyId(0)), links.iter().any(|l| l.to.is_some()));
+        for time in [0, 1] {
+            let world = links.iter().fold(DMat4::IDENTITY, |w, l| w * l.matrix(time));
+            let pose = scene.pose(BodyId(0), time as f64).unwrap();
+            let mut wanted: Vec<DVec3> =
+                (0..8).map(|i| world.transform_point3(DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64))).collect();
+            let middle = world.transform_point3(DVec3::splat(0.5));
+            for p in &scene.patches {
+                prop_assert_eq!(p.corners.len(), 4);
+                let centre = pose.point(p.corners_in_body().sum::<DVec3>() / 4.0);
+                prop_assert!(pose.direction(p.frame.normal).dot(centre - middle) > 0.0);
+                for corner in p.corners_in_body().map(|c| pose.point(c)) {
+                    prop_assert!(wanted.iter().any(|w| w.distance(corner) < 1e-11), "{corner} is not in {wanted:?}");
+                }
+            }
+            wanted.retain(|w| !scene.patches.iter().flat_map(|p| p.corners_in_body()).any(|c| pose.point(c).distance(*w) < 1e-11));
+            prop_assert!(wanted.is_empty());
+        }
+    }
 }

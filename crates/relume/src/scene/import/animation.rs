@@ -25,6 +25,8 @@ pub(super) struct Moves {
     pub(super) rotation: Option<RotationTrack>,
     /// The one scale of all keys, which replaces the node's.
     pub(super) scale: Option<DVec3>,
+    /// How its scale changes, if it does: an error as soon as a mesh hangs below.
+    pub(super) growth: Option<String>,
     pub(super) presence: Vec<(f64, bool)>,
     pub(super) visibility: Vec<(f64, bool)>,
 }
@@ -92,24 +94,22 @@ impl Reader<'_> {
         let name = node_name(self.document, node);
         let of_node =
             moves.get_mut(node).ok_or_else(|| self.document.out_of_range("node", node))?;
-        let taken = match channel.target.path.as_str() {
+        let path = channel.target.path.as_str();
+        let taken = match path {
             "translation" => of_node.translation.is_some(),
             "rotation" => of_node.rotation.is_some(),
-            "scale" => of_node.scale.is_some(),
+            "scale" => of_node.scale.is_some() || of_node.growth.is_some(),
             "weights" => {
-                let message =
-                    "its morph target animation is ignored: it stays in its base shape".to_owned();
-                notes.push(note(Severity::Warning, "morph", &name, 1, message));
+                let message = "its morph target animation is ignored: it stays in its base shape";
+                notes.push(note(Severity::Warning, "morph", &name, 1, message.to_owned()));
                 return Ok(());
             }
             other => {
-                return Err(self.malformed(&format!(
-                    "node `{name}` has an unknown animated property `{other}`"
-                )));
+                let what = format!("node `{name}` has an unknown animated property `{other}`");
+                return Err(self.malformed(&what));
             }
         };
         if taken {
-            let path = &channel.target.path;
             let message = format!(
                 "animation `{}` moves its {path} too; the first animation wins: choose one by name",
                 self.name
@@ -117,28 +117,40 @@ impl Reader<'_> {
             notes.push(note(Severity::Warning, "animation-conflict", &name, 1, message));
             return Ok(());
         }
+        self.property(channel, &name, of_node, notes)
+    }
+
+    /// Reads the keys of a translation, rotation or scale.
+    fn property(
+        &self,
+        channel: &json::Channel,
+        name: &str,
+        of_node: &mut Moves,
+        notes: &mut Vec<Note>,
+    ) -> Result<(), SceneError> {
         let (times_s, interpolation) = self.keys(channel)?;
         let output = self.sampler(channel)?.output;
         match channel.target.path.as_str() {
             "translation" => {
-                let values = self.vectors(output, &name)?;
+                let values = self.vectors(output, name)?;
                 of_node.translation = Some(Track { times_s, values, interpolation });
             }
             "rotation" => {
-                let read = self.document.numbers::<4>(output, &self.owner(&name))?;
+                let read = self.document.numbers::<4>(output, &self.owner(name))?;
                 let values = read.into_iter().map(DQuat::from_array).collect();
                 of_node.rotation = Some(RotationTrack { times_s, values, interpolation });
             }
-            _ => {
-                let values = self.vectors(output, &name)?;
-                let (scale, presence) = switches(&name, &times_s, &values, interpolation)?;
-                if presence.iter().any(|k| !k.1) {
-                    let message = "its scale of 0 is taken as absence".to_owned();
-                    notes.push(note(Severity::Info, "presence", &name, 1, message));
-                    of_node.presence = presence;
+            _ => match switches(&times_s, &self.vectors(output, name)?, interpolation) {
+                Ok((scale, presence)) => {
+                    of_node.scale = Some(scale);
+                    if presence.iter().any(|k| !k.1) {
+                        let message = "its scale of 0 is taken as absence".to_owned();
+                        notes.push(note(Severity::Info, "presence", name, 1, message));
+                        of_node.presence = presence;
+                    }
                 }
-                of_node.scale = Some(scale);
-            }
+                Err(growth) => of_node.growth = Some(growth),
+            },
         }
         Ok(())
     }
@@ -219,53 +231,35 @@ fn frame_time_s(time_s: f64) -> f64 {
     rates.into_iter().map(as_frame).find(|&t| t as f32 == time_s as f32).unwrap_or(time_s)
 }
 
-/// The one size among scale keys, and when the node has it; an error if there are more sizes.
+/// The one size among scale keys, and when the node has it; or how the size changes otherwise.
 fn switches(
-    node: &str,
     times_s: &[f64],
     values: &[DVec3],
     interpolation: Interpolation,
-) -> Result<(DVec3, Vec<(f64, bool)>), SceneError> {
-    let not_rigid = |what: String| {
-        SceneError::NotRigid {
-        node: node.to_owned(),
-        what,
-        remedy: "animate translation and rotation only, or switch the scale between 0 and one value in one step"
-            .into(),
-    }
-    };
+) -> Result<(DVec3, Vec<(f64, bool)>), String> {
     let per_key = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
     if values.len() != times_s.len() * per_key {
-        return Err(not_rigid(format!(
-            "its scale has {} keys but {} values",
+        return Err(format!(
+            "its scale has {} key times but {} values",
             times_s.len(),
             values.len()
-        )));
+        ));
     }
     let keys: Vec<DVec3> = values.chunks(per_key).map(|v| v[per_key / 2]).collect();
     let size = |v: &DVec3| v.abs().max_element();
-    let full = keys
-        .iter()
-        .copied()
-        .fold(DVec3::ZERO, |best, v| if size(&v) > size(&best) { v } else { best });
+    let larger = |best: DVec3, v: DVec3| if size(&v) > size(&best) { v } else { best };
+    let full = keys.iter().copied().fold(DVec3::ZERO, larger);
     let present = |v: &DVec3| size(v) > SAME_SCALE * size(&full);
-    if let Some(other) = keys
-        .iter()
-        .find(|v| present(v) && (**v - full).abs().max_element() > SAME_SCALE * size(&full))
-    {
-        return Err(not_rigid(format!(
-            "its scale changes over time, from ({}, {}, {}) to ({}, {}, {})",
-            other.x, other.y, other.z, full.x, full.y, full.z
-        )));
+    let differs = |v: &DVec3| size(&(*v - full)) > SAME_SCALE * size(&full);
+    if let Some(v) = keys.iter().find(|v| present(v) && differs(v)) {
+        let (v, f) = (v.to_array(), full.to_array());
+        return Err(format!("its scale changes over time, from {v:?} to {f:?}"));
     }
     let presence: Vec<(f64, bool)> =
         times_s.iter().copied().zip(keys.iter().map(present)).collect();
     let slow = presence.windows(2).find(|w| w[0].1 != w[1].1 && w[1].0 - w[0].0 > SWITCH_S);
     if let (Some(w), true) = (slow, interpolation != Interpolation::Step) {
-        return Err(not_rigid(format!(
-            "it grows or shrinks between {} s and {} s",
-            w[0].0, w[1].0
-        )));
+        return Err(format!("it grows or shrinks between {} s and {} s", w[0].0, w[1].0));
     }
     let changes = |i: usize| i == 0 || presence[i].1 != presence[i - 1].1;
     let presence = (0..presence.len()).filter(|&i| changes(i)).map(|i| presence[i]).collect();
@@ -295,19 +289,15 @@ mod tests {
         let step = |keys: &[(f64, DVec3)], interpolation| {
             let times: Vec<f64> = keys.iter().map(|k| k.0).collect();
             let values: Vec<DVec3> = keys.iter().map(|k| k.1).collect();
-            switches("blinker", &times, &values, interpolation)
+            switches(&times, &values, interpolation)
         };
         let blink = [(0.0, s), (1.0, o), (2.0, o), (3.0, s)];
         let (scale, presence) = step(&blink, Interpolation::Step).unwrap();
         assert_eq!((scale, presence), (s, vec![(0.0, true), (1.0, false), (3.0, true)]));
-        let message = step(&blink, Interpolation::Linear).unwrap_err().to_string();
-        assert!(
-            message.contains("`blinker`") && message.contains("between 0 s and 1 s"),
-            "{message}"
-        );
+        let message = step(&blink, Interpolation::Linear).unwrap_err();
+        assert!(message.contains("between 0 s and 1 s"), "{message}");
         assert!(step(&[(0.0, s), (1.0, s), (1.04, o)], Interpolation::Linear).is_ok());
-        let message =
-            step(&[(0.0, s), (1.0, s * 1.5)], Interpolation::Step).unwrap_err().to_string();
+        let message = step(&[(0.0, s), (1.0, s * 1.5)], Interpolation::Step).unwrap_err();
         assert!(message.contains("scale changes"), "{message}");
         assert_eq!(step(&[(0.0, s)], Interpolation::Linear).unwrap().1, [(0.0, true)]);
     }

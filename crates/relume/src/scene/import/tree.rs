@@ -23,6 +23,7 @@ pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draf
         moves,
         meshes: document.root.meshes.iter().map(|_| None).collect(),
         without_material: 0,
+        growing: Vec::new(),
         draft: Draft { materials, animation, ..Draft::default() },
     };
     tree.draft.notes = notes;
@@ -72,6 +73,8 @@ struct Tree<'a> {
     /// Polygons of the meshes read so far.
     meshes: Vec<Option<Vec<Polygons>>>,
     without_material: usize,
+    /// For each node of the draft: the nearest one at or above it whose scale changes, and how.
+    growing: Vec<Option<(usize, String)>>,
     draft: Draft,
 }
 
@@ -126,8 +129,11 @@ impl Tree<'_> {
             (_, true) => moves.presence,
         };
         let me = self.draft.nodes.len();
+        let above = parent.and_then(|p| self.growing[p].clone());
+        self.growing.push(moves.growth.map(|what| (index, what)).or(above));
         if let Some(mesh) = node.mesh {
             placed.surfaces = self.surfaces(mesh, index, node)?;
+            self.check_growth(me)?;
         }
         self.draft.nodes.push(placed);
         let id = NodeId(me as u32);
@@ -140,6 +146,18 @@ impl Tree<'_> {
             self.draft.cameras.push(Camera { name, node: id, projection });
         }
         Ok(me)
+    }
+
+    /// An error if a mesh hangs on a node whose scale changes, or below one.
+    fn check_growth(&self, node: usize) -> Result<(), SceneError> {
+        let Some((index, what)) = &self.growing[node] else { return Ok(()) };
+        Err(SceneError::NotRigid {
+            node: node_name(self.document, *index),
+            what: what.clone(),
+            remedy: "animate translation and rotation only, or switch the scale between 0 and one \
+                     value in one step"
+                .into(),
+        })
     }
 
     /// The surfaces of a mesh on a node, and notes about what is not rigid in it.

@@ -71,6 +71,8 @@ fn bent_folded_and_single_triangles_stay_apart() {
     assert_eq!(soup(&[[o, x, y], [x, bent, y]]).polygons.len(), 2);
     // The same triangle from both sides.
     assert_eq!(soup(&[[o, x, y], [o, y, x]]).polygons.len(), 2);
+    // One folded back over the other along a shared side.
+    assert_eq!(soup(&[[o, x, y], [y, x, DVec3::new(0.1, 0.1, 0.0)]]).polygons.len(), 2);
     // The same triangle twice: three on a side, nothing is merged.
     assert_eq!(soup(&[[o, x, y], [o, x, y], [x, DVec3::new(1., 1., 0.), y]]).polygons.len(), 3);
 }

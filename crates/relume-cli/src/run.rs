@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use indicatif::HumanBytes;
 use relume::scene::{BodyId, Scene};
 use relume::session::{Options, Oracle, Session, SessionError, Snapshot, Update};
 use relume_picture::export::write_glb;
@@ -417,9 +418,21 @@ impl Run<'_> {
     }
 
     fn session_failure(&self, error: SessionError) -> Failure {
-        let failure = Failure::new(error);
-        let finished = !self.report.frames.is_empty() && !self.job.report_paths().is_empty();
-        if finished { failure.help("the frames before it are finished and stay") } else { failure }
+        let kept = !self.report.frames.is_empty() && !self.job.report_paths().is_empty();
+        let kept = if kept { "; the frames before it are finished and stay" } else { "" };
+        match error {
+            SessionError::OutOfMemory { frame, tolerance, limit_bytes, links } => {
+                Failure::new(format_args!(
+                    "frame {frame} at tolerance {tolerance} needs more than the {} of memory \
+                     allowed ({} pairs so far)",
+                    HumanBytes(limit_bytes),
+                    count(links)
+                ))
+                .help(format_args!("raise --max-memory or the tolerance{kept}"))
+            }
+            other if kept.is_empty() => Failure::new(other),
+            other => Failure::new(other).help(kept.trim_start_matches("; ")),
+        }
     }
 
     fn write_report(&mut self) -> Result<(), Failure> {

@@ -223,6 +223,18 @@ fn solve_prints_a_summary_and_writes_a_report() {
 }
 
 #[test]
+fn too_little_memory_is_said_with_the_remedy() {
+    let (_dir, scene) = room();
+    relume(&["solve", text(&scene), "--max-memory", "64K"]).fails(
+        1,
+        &[
+            "error: frame 0 at tolerance 0.02 needs more than the 64.00 KiB of memory allowed",
+            "\n  help: raise --max-memory or the tolerance",
+        ],
+    );
+}
+
+#[test]
 fn quiet_is_quiet() {
     let (_dir, scene) = room();
     let ran = relume(&["solve", text(&scene), "--frames", "0", "--tolerance", "0.3", "--quiet"])

@@ -32,8 +32,20 @@ pub struct Leaf {
     pub corners: [DVec2; 4],
     /// Irradiance H, W/m2, linear RGB.
     pub irradiance: [f32; 3],
+    /// Gradient of the irradiance in the patch's frame, W/m3, linear RGB: along u, then along v.
+    pub irradiance_gradient: [[f32; 3]; 2],
     /// Radiosity B = M + rho H, W/m2, linear RGB.
     pub radiosity: [f32; 3],
+}
+
+impl Leaf {
+    /// Irradiance at a point of the patch's frame: linear over the leaf, never negative; W/m2.
+    pub fn irradiance_at(&self, p: DVec2) -> [f32; 3] {
+        let d = p - crate::element::Shape { corners: self.corners, len: 4 }.centroid();
+        let [x, y] = [d.x as f32, d.y as f32];
+        let [gu, gv] = self.irradiance_gradient;
+        std::array::from_fn(|c| (self.irradiance[c] + gu[c] * x + gv[c] * y).max(0.0))
+    }
 }
 
 impl Snapshot {
@@ -42,6 +54,10 @@ impl Snapshot {
         let i = patch.0 as usize;
         &self.leaves[self.leaf_offsets[i] as usize..self.leaf_offsets[i + 1] as usize]
     }
+}
+
+fn gradient(solved: &Solved, id: ElementId) -> [[f32; 3]; 2] {
+    solved.radiosity.linear_irradiance(id.0).gradient.map(|[r, g, b, _]| [r, g, b])
 }
 
 /// The leaves of a solved forest.
@@ -59,6 +75,7 @@ pub(super) fn take(scene: &Arc<Scene>, forest: &Forest, solved: &Solved) -> Snap
                 leaves.push(Leaf {
                     corners: forest.shape(id).corners,
                     irradiance: solved.radiosity.irradiance(id.0),
+                    irradiance_gradient: gradient(solved, id),
                     radiosity: solved.radiosity.radiosity(id.0),
                 });
             }

@@ -7,7 +7,7 @@
 use glam::{DVec2, DVec3};
 
 use super::kernel::{GaussPoints, Simd, kernel_grid};
-use super::point::form_factor_from_point;
+use super::point::{PointBundle, form_factors_from_points};
 use crate::element::{WorldElement, WorldLight, bilinear};
 use crate::geometry::ConvexPolygon;
 use crate::scene::LightKind;
@@ -71,7 +71,7 @@ pub fn exchange(simd: Simd, a: &WorldElement, b: &WorldElement, meeting: Meeting
     let reach = a.radius + b.radius;
     let near = reach * reach > NEAR * (b.centre - a.centre).length_squared();
     if near || meeting == Meeting::Cut {
-        return near_exchange(a, b);
+        return near_exchange(simd, a, b);
     }
     let grid = kernel_grid(simd, a, b);
     let area_m2 = a.area * b.area * grid.mean;
@@ -146,7 +146,7 @@ const G4: [(f64, f64); 4] = [
 ];
 
 /// The closed form from points of each side to the whole of the other; the area from the smaller.
-fn near_exchange(a: &WorldElement, b: &WorldElement) -> Exchange {
+fn near_exchange(simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
     let slack = a.rounding_m + b.rounding_m;
     let part =
         |e: &WorldElement, plane| ConvexPolygon::new(&e.corners[..e.len]).clipped(plane, slack);
@@ -155,75 +155,81 @@ fn near_exchange(a: &WorldElement, b: &WorldElement) -> Exchange {
         let none = Variation::default();
         return Exchange { area_m2: 0.0, over_a: none, over_b: none };
     }
-    let (from_a, over_a) = integrate_polygon(a, &of_a, of_b.corners());
-    let (from_b, over_b) = integrate_polygon(b, &of_b, of_a.corners());
+    let (from_a, over_a) = integrate_polygon(simd, a, &of_a, of_b.corners());
+    let (from_b, over_b) = integrate_polygon(simd, b, &of_b, of_a.corners());
     Exchange { area_m2: if a.area <= b.area { from_a } else { from_b }, over_a, over_b }
 }
 
 /// Integral over `part` of `e` of the form factor to `seen`, m2, and its variation over `e`.
-fn integrate_polygon(e: &WorldElement, part: &ConvexPolygon, seen: &[DVec3]) -> (f64, Variation) {
-    let normal = e.plane.normal;
+fn integrate_polygon(
+    simd: Simd,
+    e: &WorldElement,
+    part: &ConvexPolygon,
+    seen: &[DVec3],
+) -> (f64, Variation) {
     let c = part.corners();
+    let looker = Looker { simd, e, seen };
     let mut fit = Fit::default();
     let mut sum = 0.0;
     if c.len() == 4 {
-        sum = integrate([c[0], c[1], c[2], c[3]], e, normal, seen, DEPTH, &mut fit);
+        sum = looker.integrate(&[c[0], c[1], c[2], c[3]], DEPTH, &mut fit);
     } else {
         for k in 1..c.len() - 1 {
-            let fan = [c[0], c[k], c[k + 1], c[k + 1]];
-            sum += integrate(fan, e, normal, seen, DEPTH, &mut fit);
+            sum += looker.integrate(&[c[0], c[k], c[k + 1], c[k + 1]], DEPTH, &mut fit);
         }
     }
-    let whole = part.area() >= 0.999 * e.area;
     let variation = fit.variation();
     // Where the other's plane cuts the element, a straight line does not fit what arrives.
-    (
-        sum,
-        Variation {
-            bend: if whole { variation.bend } else { variation.bend.max(1.0) },
-            ..variation
-        },
-    )
+    let whole = part.area() >= 0.999 * e.area;
+    let bend = if whole { variation.bend } else { variation.bend.max(1.0) };
+    (sum, Variation { bend, ..variation })
 }
 
 /// Range of form factors over a quadrilateral above which it is integrated in four parts.
 const STEEP: f64 = 0.5;
 
-/// Integral over a quadrilateral of the form factor from its points to `seen`, m2; in up to 64
-/// parts where the two nearly touch.
-fn integrate(
-    quad: [DVec3; 4],
-    e: &WorldElement,
-    normal: DVec3,
-    seen: &[DVec3],
-    depth: u32,
-    fit: &mut Fit,
-) -> f64 {
-    let mut sum = 0.0;
-    let before = *fit;
-    let (mut lo, mut hi) = (f64::INFINITY, 0.0_f64);
-    for (s, ws) in G4 {
-        for (t, wt) in G4 {
+/// A side of a near pair: an element whose points look at a polygon.
+struct Looker<'a> {
+    simd: Simd,
+    e: &'a WorldElement,
+    seen: &'a [DVec3],
+}
+
+impl Looker<'_> {
+    /// Integral over a quadrilateral of the form factor from its points, m2; in up to 64 parts
+    /// where the two nearly touch. The values go into `fit`.
+    fn integrate(&self, quad: &[DVec3; 4], depth: u32, fit: &mut Fit) -> f64 {
+        let normal = self.e.plane.normal;
+        let mut points = PointBundle::default();
+        let mut weights = [0.0; 16];
+        for k in 0..16 {
+            let ((s, ws), (t, wt)) = (G4[k & 3], G4[k >> 2]);
             let ds = (quad[1] - quad[0]) * (1.0 - t) + (quad[2] - quad[3]) * t;
             let dt = (quad[3] - quad[0]) * (1.0 - s) + (quad[2] - quad[1]) * s;
-            let weight = ws * wt * ds.cross(dt).dot(normal);
-            let point = bilinear(&quad, s, t);
-            let f = form_factor_from_point(point, normal, seen);
-            fit.add(e.offset(point), weight, f);
-            (lo, hi) = (lo.min(f), hi.max(f));
-            sum += weight * f;
+            weights[k] = ws * wt * ds.cross(dt).dot(normal);
+            let p = bilinear(quad, s, t);
+            (points.x[k], points.y[k], points.z[k]) = (p.x, p.y, p.z);
         }
+        let factors = form_factors_from_points(self.simd, &points, normal, self.seen);
+        let lo = factors.iter().copied().fold(f64::INFINITY, f64::min);
+        let hi = factors.iter().copied().fold(0.0, f64::max);
+        if hi - lo > STEEP && depth > 0 {
+            let parts = [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)];
+            let part = |s, t| [(s, t), (s + 0.5, t), (s + 0.5, t + 0.5), (s, t + 0.5)];
+            let place = |(s, t)| bilinear(quad, s, t);
+            return parts
+                .map(|(s, t)| self.integrate(&part(s, t).map(place), depth - 1, fit))
+                .iter()
+                .sum();
+        }
+        let mut sum = 0.0;
+        for k in 0..16 {
+            let p = DVec3::new(points.x[k], points.y[k], points.z[k]);
+            fit.add(self.e.offset(p), weights[k], factors[k]);
+            sum += weights[k] * factors[k];
+        }
+        sum
     }
-    if hi - lo <= STEEP || depth == 0 {
-        return sum;
-    }
-    *fit = before;
-    let at = |s: f64, t: f64| bilinear(&quad, s, t);
-    let part = |s: f64, t: f64| [at(s, t), at(s + 0.5, t), at(s + 0.5, t + 0.5), at(s, t + 0.5)];
-    [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)]
-        .into_iter()
-        .map(|(s, t)| integrate(part(s, t), e, normal, seen, depth - 1, fit))
-        .sum()
 }
 
 /// Halvings of a quadrilateral in the near field.
@@ -333,8 +339,8 @@ mod tests {
                     let c = face.corners();
                     for k in 1..c.len() - 1 {
                         let tri = [c[0], c[k], c[k + 1], c[k + 1]];
-                        let fit = &mut Fit::default();
-                        sum += integrate(tri, a, a.plane.normal, seen.corners(), 0, fit);
+                        let looker = Looker { simd: Simd::detect(), e: a, seen: seen.corners() };
+                        sum += looker.integrate(&tri, 0, &mut Fit::default());
                     }
                 }
             }

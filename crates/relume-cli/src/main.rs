@@ -1,3 +1,42 @@
-//! The `relume` command.
+//! The `relume` command: a thin layer over the engine, the pictures and the exports.
 
-fn main() {}
+mod args;
+mod check;
+mod demo;
+mod failure;
+mod frames;
+mod info;
+mod interrupt;
+mod output;
+mod progress;
+mod report;
+mod resume;
+mod run;
+mod scene_file;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Cli, Command};
+use failure::Failure;
+
+fn main() -> ExitCode {
+    match execute(Cli::parse().command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            output::complain(&failure.to_string());
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}
+
+fn execute(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::Info(args) => info::info(&args),
+        Command::Check(args) => check::check(&args),
+        Command::Solve(args) => interrupt::listen().and_then(|()| run::solve(args)),
+        Command::Render(args) => interrupt::listen().and_then(|()| run::render(args)),
+        Command::Demo(args) => interrupt::listen().and_then(|()| run::demo(args)),
+    }
+}

@@ -2,4 +2,5 @@
 //!
 //! Nothing here is ever written back into the solution.
 
+pub mod export;
 pub mod picture;

@@ -211,6 +211,7 @@ mod tests {
         Leaf {
             corners: [at(0.0, 0.0), at(w, 0.0), at(w, h), at(0.0, h)],
             irradiance: [0.0; 3],
+            irradiance_gradient: [[0.0; 3]; 2],
             radiosity: [value; 3],
         }
     }
@@ -272,6 +273,7 @@ mod tests {
         let leaf = |a, b, c, value| Leaf {
             corners: [a, b, c, c],
             irradiance: [0.0; 3],
+            irradiance_gradient: [[0.0; 3]; 2],
             radiosity: [value; 3],
         };
         let leaves = [

@@ -208,7 +208,12 @@ pub(crate) fn snapshot(
             let normal = pose.direction(patch.frame.normal);
             let material = &scene.materials[patch.material.0 as usize];
             let radiosity = radiosity(centre, normal, material);
-            leaves.push(Leaf { corners: c, irradiance: [0.0; 3], radiosity });
+            leaves.push(Leaf {
+                corners: c,
+                irradiance: [0.0; 3],
+                irradiance_gradient: [[0.0; 3]; 2],
+                radiosity,
+            });
         }
         leaf_offsets.push(leaves.len() as u32);
     }

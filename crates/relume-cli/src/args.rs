@@ -1,0 +1,460 @@
+//! The command line as a value: names, defaults, units and ranges. Knows no scene and no engine
+//! state; whatever can be judged from the text alone is judged here.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use serde::{Deserialize, Serialize};
+
+use crate::frames::FrameSpec;
+
+/// Largest picture side, pixels.
+const SIZE_MAX: u32 = 16_384;
+/// Most threads that can be asked for.
+const THREADS_MAX: usize = 1_024;
+
+/// `relume ...`
+#[derive(Debug, Parser)]
+#[command(
+    name = "relume",
+    version,
+    about = "Diffuse light of animated glTF scenes, frame by frame (hierarchical radiosity)",
+    after_help = "Start with:  relume demo room\n\
+                  Exit codes:  0 done, 1 an error (or an error found by `check`), 2 wrong usage, 130 interrupted",
+    arg_required_else_help = true,
+    max_term_width = 100
+)]
+pub(crate) struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Write a scene that ships with relume as .glb and render it.
+    ///
+    /// The two scenes are the sequences of the paper: a corridor with a box under a light that
+    /// moves in the plane of the ceiling (109 frames), and a closed room with a light that circles
+    /// below the ceiling (20 frames).
+    Demo(DemoArgs),
+    /// Solve a scene and write one PNG a frame: DIR/frame-0000.png ...
+    Render(RenderArgs),
+    /// Solve a scene without pictures.
+    Solve(SolveArgs),
+    /// Say what was read: bodies, patches, materials, emitters, animations, cameras, lights.
+    Info(InfoArgs),
+    /// Say what is wrong with a scene, and what to do about it.
+    ///
+    /// Exit code 1 if an error is found; warnings alone leave it at 0.
+    Check(CheckArgs),
+}
+
+/// `relume demo`
+#[derive(Debug, Args)]
+pub(crate) struct DemoArgs {
+    /// Which scene.
+    #[arg(value_enum)]
+    pub(crate) scene: DemoScene,
+    /// Directory for the scene, the pictures and report.json; made if missing
+    /// [default: relume-demo-corridor or relume-demo-room].
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) solve: SolveFlags,
+    #[command(flatten)]
+    pub(crate) picture: PictureFlags,
+}
+
+/// The scenes that ship with the command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DemoScene {
+    /// Three walls, a floor, no ceiling, a box, a light moving in the plane of the ceiling:
+    /// 109 frames, Gouraud shaded.
+    Corridor,
+    /// A closed cubical room, a light circling below the ceiling: 20 frames, flat shaded.
+    Room,
+}
+
+/// `relume render`
+#[derive(Debug, Args)]
+pub(crate) struct RenderArgs {
+    /// The scene, a .glb or .gltf file.
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+    /// Directory for the pictures and report.json; made if missing. Give each task of a job array
+    /// its own.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) solve: SolveFlags,
+    #[command(flatten)]
+    pub(crate) picture: PictureFlags,
+}
+
+/// `relume solve`
+#[derive(Debug, Args)]
+pub(crate) struct SolveArgs {
+    /// The scene, a .glb or .gltf file.
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+    /// Directory for report.json; made if missing.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) solve: SolveFlags,
+}
+
+/// `relume info`
+#[derive(Debug, Args)]
+pub(crate) struct InfoArgs {
+    /// The scene, a .glb or .gltf file.
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+    #[command(flatten)]
+    pub(crate) animation: AnimationFlag,
+    /// Frames a second at which the animation's frames are counted.
+    #[arg(long, value_name = "FPS", default_value = "24", value_parser = parse_fps)]
+    pub(crate) fps: f64,
+}
+
+/// `relume check`
+#[derive(Debug, Args)]
+pub(crate) struct CheckArgs {
+    /// The scene, a .glb or .gltf file.
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+    #[command(flatten)]
+    pub(crate) animation: AnimationFlag,
+}
+
+/// Which animation plays.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct AnimationFlag {
+    /// Name of the animation to play; all of them together if left out.
+    #[arg(long = "animation", value_name = "NAME")]
+    pub(crate) name: Option<String>,
+}
+
+/// What every command that solves takes.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct SolveFlags {
+    /// Frames to solve, inclusive: 0-24, every sixth 0-24x6, a list 3,7. Frame k is the time k / fps
+    /// [default: the whole animation].
+    #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
+    pub(crate) frames: Option<FrameSpec>,
+    /// Frames a second.
+    #[arg(long, value_name = "FPS", default_value = "24", value_parser = parse_fps, allow_negative_numbers = true)]
+    pub(crate) fps: f64,
+    #[command(flatten)]
+    pub(crate) animation: AnimationFlag,
+    /// Relative error of irradiance aimed at (root mean square), between 0 and 1: 0.1 is quick,
+    /// 0.005 is fine [default: 0.02].
+    #[arg(long, value_name = "ERROR", value_parser = parse_tolerance, allow_negative_numbers = true)]
+    pub(crate) tolerance: Option<f64>,
+    /// What decides whether two elements are linked: `error`, the estimated error of irradiance, or
+    /// `form-factor=EPS[,MINAREA]`, as in the paper: a link where the form factor is below EPS,
+    /// elements not refined below MINAREA m2 (left out: 1/5000 of the scene's area). Example:
+    /// form-factor=0.02,0.001.
+    #[arg(long, value_name = "ORACLE", default_value = "error")]
+    pub(crate) oracle: OracleFlag,
+    /// How the links follow the motion: `scratch` builds them anew in every frame.
+    #[arg(long, value_name = "STRATEGY", value_enum, default_value = "scratch")]
+    pub(crate) update: UpdateFlag,
+    /// Threads to use; the result has the same bits for any number [default: all cores].
+    #[arg(long, value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
+    pub(crate) threads: Option<usize>,
+    /// Limit on the memory of the engine, in bytes or with K, M, G or T (powers of 1024): 4G, 512M
+    /// [default: no limit].
+    #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
+    pub(crate) max_memory: Option<MemorySize>,
+    /// Also write the report to this file.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) report: Option<PathBuf>,
+    /// Skip the frames that an earlier run finished in DIR (or in the report file, where there is no
+    /// DIR), after checking that scene and options are the same.
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// No progress bar, no warnings, no summary; errors only.
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+/// What every command that renders takes.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct PictureFlags {
+    /// Width x height of the pictures in pixels.
+    #[arg(long, value_name = "WxH", default_value = "640x480")]
+    pub(crate) size: Size,
+    /// `flat`: one value an element. `gouraud`: interpolated over a Delaunay triangulation in each
+    /// face's own frame [default: gouraud; flat for `demo room`].
+    #[arg(long, value_enum)]
+    pub(crate) shading: Option<Shading>,
+    /// Name of the camera in the file [default: the first; an overview where there is none].
+    #[arg(long, value_name = "NAME")]
+    pub(crate) camera: Option<String>,
+    /// Exposure in stops, fixed over the clip: at 0 a radiance of 1 W/m2/sr is full white, +1 is twice
+    /// as bright. `auto` chooses it once, at the first frame of the animation in which anything
+    /// emits, whichever frames are asked for; report.json says what it chose.
+    #[arg(long, value_name = "EV", default_value = "auto", allow_negative_numbers = true)]
+    pub(crate) exposure: ExposureFlag,
+    /// Draw the outlines of the elements over the picture.
+    #[arg(long)]
+    pub(crate) mesh: bool,
+}
+
+/// Width and height in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Size {
+    /// Pixels across.
+    pub(crate) width: u32,
+    /// Pixels down.
+    pub(crate) height: u32,
+}
+
+/// How elements become colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Shading {
+    /// One value an element.
+    Flat,
+    /// Interpolated over a triangulation.
+    Gouraud,
+}
+
+/// `--exposure`
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum ExposureFlag {
+    /// Chosen once for the clip.
+    Auto,
+    /// Stops.
+    Stops(f64),
+}
+
+/// `--oracle`
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum OracleFlag {
+    /// The estimated error of irradiance.
+    Error,
+    /// The paper's threshold.
+    FormFactor {
+        /// Largest form factor of a link.
+        epsilon: f64,
+        /// Smallest element that is refined, m2; `None`: a share of the scene's area.
+        min_area_m2: Option<f64>,
+    },
+}
+
+/// `--update`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum UpdateFlag {
+    /// Rebuild everything in every frame.
+    Scratch,
+}
+
+/// `--max-memory`
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct MemorySize {
+    /// Bytes.
+    pub(crate) bytes: u64,
+}
+
+fn parse_fps(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(fps) if fps.is_finite() && fps > 0.0 => Ok(fps),
+        _ => Err("frames a second must be a number above 0, such as 24 or 29.97".into()),
+    }
+}
+
+fn parse_tolerance(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(tolerance) if tolerance > 0.0 && tolerance < 1.0 => Ok(tolerance),
+        _ => Err("the tolerance is a relative error between 0 and 1, such as 0.02 for 2 %".into()),
+    }
+}
+
+fn parse_threads(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(threads) if (1..=THREADS_MAX).contains(&threads) => Ok(threads),
+        _ => Err(format!("give a number of threads from 1 to {THREADS_MAX}")),
+    }
+}
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Size, String> {
+        let side = |piece: &str| piece.parse().ok().filter(|s| (1..=SIZE_MAX).contains(s));
+        text.split_once(['x', 'X'])
+            .and_then(|(w, h)| Some(Size { width: side(w)?, height: side(h)? }))
+            .ok_or_else(|| format!("write WIDTHxHEIGHT in pixels, each 1 to {SIZE_MAX}: 640x480"))
+    }
+}
+
+impl fmt::Display for Size {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}x{}", self.width, self.height)
+    }
+}
+
+impl FromStr for ExposureFlag {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<ExposureFlag, String> {
+        if text == "auto" {
+            return Ok(ExposureFlag::Auto);
+        }
+        match text.parse::<f64>() {
+            Ok(stops) if stops.abs() <= 100.0 => Ok(ExposureFlag::Stops(stops)),
+            _ => Err("write `auto` or a number of stops from -100 to 100, such as 1.5".into()),
+        }
+    }
+}
+
+impl fmt::Display for ExposureFlag {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ExposureFlag::Auto => f.write_str("auto"),
+            ExposureFlag::Stops(stops) => write!(f, "{stops}"),
+        }
+    }
+}
+
+impl FromStr for OracleFlag {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<OracleFlag, String> {
+        if text == "error" {
+            return Ok(OracleFlag::Error);
+        }
+        let Some(numbers) = text.strip_prefix("form-factor=") else {
+            return Err(
+                "write `error` or `form-factor=EPS[,MINAREA]`: form-factor=0.02,0.001".into()
+            );
+        };
+        let (epsilon, area) = match numbers.split_once(',') {
+            Some((epsilon, area)) => (epsilon, Some(area)),
+            None => (numbers, None),
+        };
+        let epsilon = epsilon
+            .parse::<f64>()
+            .ok()
+            .filter(|e| *e > 0.0 && *e < 1.0)
+            .ok_or("EPS is a form factor between 0 and 1, such as 0.02")?;
+        let min_area_m2 = area
+            .map(|area| {
+                area.parse::<f64>()
+                    .ok()
+                    .filter(|a| a.is_finite() && *a > 0.0)
+                    .ok_or("MINAREA is an area in m2 above 0, such as 0.001")
+            })
+            .transpose()?;
+        Ok(OracleFlag::FormFactor { epsilon, min_area_m2 })
+    }
+}
+
+impl fmt::Display for OracleFlag {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            OracleFlag::Error => f.write_str("error"),
+            OracleFlag::FormFactor { epsilon, min_area_m2: None } => {
+                write!(f, "form-factor={epsilon}")
+            }
+            OracleFlag::FormFactor { epsilon, min_area_m2: Some(area) } => {
+                write!(f, "form-factor={epsilon},{area}")
+            }
+        }
+    }
+}
+
+impl UpdateFlag {
+    /// The name on the command line and in the report.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            UpdateFlag::Scratch => "scratch",
+        }
+    }
+}
+
+impl FromStr for MemorySize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<MemorySize, String> {
+        let wrong = || "write a number of bytes, or with K, M, G or T: 4G, 512M, 1.5G".to_owned();
+        let upper = text.trim().to_ascii_uppercase();
+        let unit = upper.trim_end_matches("IB").trim_end_matches('B');
+        let (number, scale) = match unit.chars().last() {
+            Some('K') => (&unit[..unit.len() - 1], 1u64 << 10),
+            Some('M') => (&unit[..unit.len() - 1], 1 << 20),
+            Some('G') => (&unit[..unit.len() - 1], 1 << 30),
+            Some('T') => (&unit[..unit.len() - 1], 1 << 40),
+            _ => (unit, 1),
+        };
+        let number: f64 = number.trim().parse().map_err(|_| wrong())?;
+        let bytes = number * scale as f64;
+        if !(bytes >= 1.0 && bytes < 2f64.powi(63)) {
+            return Err(wrong());
+        }
+        Ok(MemorySize { bytes: bytes as u64 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_of_memory() {
+        let bytes = |text: &str| text.parse::<MemorySize>().map(|m| m.bytes);
+        assert_eq!(bytes("4G"), Ok(4 << 30));
+        assert_eq!(bytes("512M"), Ok(512 << 20));
+        assert_eq!(bytes("1.5GiB"), Ok(3 << 29));
+        assert_eq!(bytes("64kb"), Ok(64 << 10));
+        assert_eq!(bytes("1000"), Ok(1000));
+        for wrong in ["", "G", "-1G", "0", "NaN", "inf", "four", "1e40"] {
+            assert!(bytes(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn oracles() {
+        let oracle = |text: &str| text.parse::<OracleFlag>();
+        assert_eq!(oracle("error"), Ok(OracleFlag::Error));
+        assert_eq!(
+            oracle("form-factor=0.02"),
+            Ok(OracleFlag::FormFactor { epsilon: 0.02, min_area_m2: None })
+        );
+        assert_eq!(
+            oracle("form-factor=0.02,0.001"),
+            Ok(OracleFlag::FormFactor { epsilon: 0.02, min_area_m2: Some(0.001) })
+        );
+        for wrong in ["", "bf", "form-factor", "form-factor=", "form-factor=2", "form-factor=0.1,0"]
+        {
+            assert!(oracle(wrong).is_err(), "{wrong}");
+        }
+        for text in ["error", "form-factor=0.02", "form-factor=0.02,0.001"] {
+            assert_eq!(oracle(text).unwrap().to_string(), text);
+        }
+    }
+
+    #[test]
+    fn sizes_and_exposures() {
+        assert_eq!("640x480".parse(), Ok(Size { width: 640, height: 480 }));
+        for wrong in ["640", "0x480", "640x99999", "axb", "-1x3"] {
+            assert!(wrong.parse::<Size>().is_err(), "{wrong}");
+        }
+        assert_eq!("auto".parse(), Ok(ExposureFlag::Auto));
+        assert_eq!("-1.5".parse(), Ok(ExposureFlag::Stops(-1.5)));
+        assert!("NaN".parse::<ExposureFlag>().is_err());
+    }
+}

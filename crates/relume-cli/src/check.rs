@@ -1,0 +1,84 @@
+//! `relume check`: what is wrong with a scene, and what to do about it.
+
+use std::cmp::Reverse;
+
+use relume::scene::{self, Note, Scene, Severity};
+
+use crate::args::CheckArgs;
+use crate::failure::Failure;
+use crate::output::{self, counted};
+use crate::scene_file;
+
+/// Runs the command. An error among the findings is a failure; warnings are not.
+pub(crate) fn check(args: &CheckArgs) -> Result<(), Failure> {
+    let scene = scene_file::load(&args.scene, &args.animation)?;
+    let notes = findings(&scene);
+    output::print(&text(&scene.name, &notes))?;
+    let errors = count_of(&notes, Severity::Error);
+    if errors > 0 {
+        return Err(Failure::new(format_args!(
+            "{} in {}",
+            counted(errors, "error"),
+            args.scene.display()
+        ))
+        .help("mend what is listed above and check again"));
+    }
+    Ok(())
+}
+
+/// What the importer noticed and what a look at the scene shows, worst first, each once.
+fn findings(scene: &Scene) -> Vec<Note> {
+    let mut notes: Vec<Note> = Vec::new();
+    for note in scene.notes.iter().cloned().chain(scene::check(scene)) {
+        if !notes.contains(&note) {
+            notes.push(note);
+        }
+    }
+    // Stable: within a severity in the order they were found.
+    notes.sort_by_key(|note| Reverse(note.severity));
+    notes
+}
+
+fn count_of(notes: &[Note], severity: Severity) -> usize {
+    notes.iter().filter(|note| note.severity == severity).count()
+}
+
+/// The findings as text, a line each, and the count of them.
+fn text(name: &str, notes: &[Note]) -> String {
+    let mut text: String = notes.iter().map(|note| scene_file::line(note) + "\n").collect();
+    let (errors, warnings) = (count_of(notes, Severity::Error), count_of(notes, Severity::Warning));
+    text += &match (errors, warnings) {
+        (0, 0) => format!("{name}: nothing wrong found\n"),
+        _ => format!("{name}: {}, {}\n", counted(errors, "error"), counted(warnings, "warning")),
+    };
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn note(severity: Severity, count: usize) -> Note {
+        let (code, subject, message) = ("open", "wall".to_owned(), "it is open".to_owned());
+        Note { severity, code, subject, count, message }
+    }
+
+    #[test]
+    fn notes_alone_are_nothing_wrong() {
+        assert_eq!(text("room", &[]), "room: nothing wrong found\n");
+        assert_eq!(
+            text("room", &[note(Severity::Info, 1)]),
+            "note[open]: wall: it is open\nroom: nothing wrong found\n"
+        );
+    }
+
+    #[test]
+    fn findings_are_counted() {
+        let notes = [note(Severity::Error, 1), note(Severity::Warning, 3)];
+        assert_eq!(
+            text("room", &notes),
+            "error[open]: wall: it is open\nwarning[open]: wall: it is open (3 x)\n\
+             room: 1 error, 1 warning\n"
+        );
+    }
+}

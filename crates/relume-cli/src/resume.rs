@@ -1,0 +1,262 @@
+//! Whether an earlier run may be continued: the same scene, the same options.
+//!
+//! What may differ: the frames asked for, the number of threads and the memory limit, since none
+//! of them changes a bit of a frame that was finished.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::failure::Failure;
+use crate::report::Report;
+
+/// Fields that may differ between the runs.
+const FREE: [&str; 4] = [
+    "options.frames",
+    "options.threads",
+    "options.max_memory_bytes",
+    // Taken from the earlier run; what was asked for is compared.
+    "options.picture.exposure_ev",
+];
+
+/// Takes over what `earlier`, read from `path`, has finished, after checking that it belongs to
+/// the same scene and options as `now`.
+///
+/// `is_whole` tells whether the files of a frame are there.
+pub(crate) fn take_over(
+    now: &mut Report,
+    earlier: Report,
+    path: &Path,
+    is_whole: impl Fn(u32) -> bool,
+) -> Result<(), Failure> {
+    let differences = differences(&earlier, now);
+    if !differences.is_empty() {
+        return Err(Failure::new(format_args!(
+            "cannot resume from {}: {}",
+            path.display(),
+            differences.join("; ")
+        ))
+        .help(
+            "use the scene and options of the earlier run, or leave out --resume to start anew",
+        ));
+    }
+    if let (Some(now), Some(then)) = (&mut now.options.picture, &earlier.options.picture) {
+        now.exposure_ev = then.exposure_ev;
+    }
+    now.frames = earlier.frames.into_iter().filter(|(frame, _)| is_whole(*frame)).collect();
+    now.peak_memory_bytes = earlier.peak_memory_bytes;
+    Ok(())
+}
+
+/// What differs, in words, one entry a field.
+fn differences(then: &Report, now: &Report) -> Vec<String> {
+    if then.scene.content != now.scene.content {
+        return vec!["the scene file or a file it refers to has changed".into()];
+    }
+    let fields = |report: &Report| {
+        let mut fields = Vec::new();
+        let value = serde_json::json!({ "options": report.options, "version": report.version });
+        flatten(String::new(), &value, &mut fields);
+        fields
+    };
+    let (then, now) = (fields(then), fields(now));
+    let value_of = |fields: &[(String, String)], key: &str| {
+        fields.iter().find(|f| f.0 == key).map_or("nothing".to_owned(), |f| f.1.clone())
+    };
+    let mut keys: Vec<&String> = then.iter().chain(&now).map(|f| &f.0).collect();
+    keys.sort();
+    keys.dedup();
+    keys.into_iter()
+        .filter(|key| !FREE.contains(&key.as_str()))
+        .filter_map(|key| {
+            let (then, now) = (value_of(&then, key), value_of(&now, key));
+            let name = key.trim_start_matches("options.").trim_start_matches("picture.");
+            (then != now).then(|| format!("{name} was {then} and is {now} now"))
+        })
+        .collect()
+}
+
+/// Leaves of a JSON value with dotted names; null counts as not there.
+fn flatten(name: String, value: &Value, into: &mut Vec<(String, String)>) {
+    match value {
+        Value::Null => {}
+        Value::Object(map) => {
+            for (key, value) in map {
+                let inner = if name.is_empty() { key.clone() } else { format!("{name}.{key}") };
+                flatten(inner, value, into);
+            }
+        }
+        Value::String(text) => into.push((name, text.clone())),
+        other => into.push((name, other.to_string())),
+    }
+}
+
+/// Hash over the bytes of a scene file and of the files it refers to, 16 hexadecimal digits.
+///
+/// FNV-1a over 64 bits: it tells an edited file from the same one, and is no protection against
+/// somebody who wants to deceive.
+pub(crate) fn content_hash(scene: &Path) -> Result<String, Failure> {
+    let bytes = fs::read(scene).map_err(|error| Failure::read(scene, &error))?;
+    let mut hash = Fnv::new();
+    hash.add(&bytes);
+    for file in referred_files(scene, &bytes) {
+        // A file that is missing is the importer's to complain about.
+        if let Ok(bytes) = fs::read(&file) {
+            hash.add(&bytes);
+        }
+    }
+    Ok(format!("{:016x}", hash.0))
+}
+
+/// Files that a `.gltf` names by `uri`, in the order of the document; none for other files.
+fn referred_files(scene: &Path, bytes: &[u8]) -> Vec<PathBuf> {
+    let Ok(document) = serde_json::from_slice::<Value>(bytes) else { return Vec::new() };
+    let directory = scene.parent().unwrap_or(Path::new(""));
+    ["buffers", "images"]
+        .iter()
+        .filter_map(|kind| document.get(kind)?.as_array())
+        .flatten()
+        .filter_map(|entry| entry.get("uri")?.as_str())
+        .filter(|uri| !uri.starts_with("data:"))
+        .map(|uri| directory.join(percent_decoded(uri)))
+        .collect()
+}
+
+/// `%20` and its like as the characters they stand for.
+fn percent_decoded(uri: &str) -> String {
+    let hex = |digit: u8| (digit as char).to_digit(16);
+    let (bytes, mut decoded, mut at) = (uri.as_bytes(), Vec::new(), 0);
+    while at < bytes.len() {
+        let code = match bytes[at..] {
+            [b'%', high, low, ..] => hex(high).zip(hex(low)).map(|(h, l)| (h * 16 + l) as u8),
+            _ => None,
+        };
+        decoded.push(code.unwrap_or(bytes[at]));
+        at += if code.is_some() { 3 } else { 1 };
+    }
+    String::from_utf8_lossy(&decoded).into_owned()
+}
+
+/// FNV-1a, 64 bits.
+struct Fnv(u64);
+
+impl Fnv {
+    fn new() -> Fnv {
+        Fnv(0xcbf2_9ce4_8422_2325)
+    }
+
+    /// Adds a file: its length too, so that bytes cannot wander from one file to the next.
+    fn add(&mut self, bytes: &[u8]) {
+        for byte in (bytes.len() as u64).to_le_bytes().iter().chain(bytes) {
+            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use relume::session::FrameReport;
+
+    use super::*;
+    use crate::args::Shading;
+    use crate::report::{PictureOptions, RunOptions, SceneSummary};
+
+    fn report() -> Report {
+        let scene = SceneSummary {
+            name: "room".into(),
+            bodies: 2,
+            patches: 7,
+            area_m2: 54.0,
+            bounds: None,
+            content: "00ff".into(),
+        };
+        let options = RunOptions {
+            frames: "all".into(),
+            fps: 24.0,
+            animation: None,
+            tolerance: 0.02,
+            oracle: "error".into(),
+            update: "scratch".into(),
+            threads: 2,
+            max_memory_bytes: None,
+            picture: Some(PictureOptions {
+                size: "640x480".into(),
+                shading: Shading::Flat,
+                camera: None,
+                exposure: "auto".into(),
+                exposure_ev: Some(1.25),
+                mesh: false,
+            }),
+        };
+        Report::new(scene, options)
+    }
+
+    fn with(change: impl FnOnce(&mut Report)) -> Report {
+        let mut report = report();
+        change(&mut report);
+        report
+    }
+
+    fn refusal(change: impl FnOnce(&mut Report)) -> String {
+        let mut now = with(change);
+        take_over(&mut now, report(), Path::new("report.json"), |_| true).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn whole_frames_and_the_exposure_are_taken_over() {
+        let mut earlier = report();
+        for frame in [0, 1, 2] {
+            earlier.add(&FrameReport { frame, ..FrameReport::default() }).unwrap();
+        }
+        earlier.peak_memory_bytes = 77;
+        let mut now = with(|r| {
+            r.options.frames = "0-40".into();
+            r.options.threads = 16;
+            r.options.max_memory_bytes = Some(1);
+            r.options.picture.as_mut().unwrap().exposure_ev = None;
+        });
+        take_over(&mut now, earlier, Path::new("report.json"), |frame| frame != 1).unwrap();
+        assert_eq!(now.frames.keys().copied().collect::<Vec<_>>(), [0, 2]);
+        assert_eq!(now.options.picture.unwrap().exposure_ev, Some(1.25));
+        assert_eq!(now.peak_memory_bytes, 77);
+    }
+
+    #[test]
+    fn what_differs_is_named() {
+        let text = refusal(|r| r.options.tolerance = 0.01);
+        assert!(text.contains("tolerance was 0.02 and is 0.01 now"), "{text}");
+        let text = refusal(|r| r.options.picture.as_mut().unwrap().size = "320x240".into());
+        assert!(text.contains("size was 640x480 and is 320x240 now"), "{text}");
+        let text = refusal(|r| r.options.picture.as_mut().unwrap().camera = Some("top".into()));
+        assert!(text.contains("camera was nothing and is top now"), "{text}");
+        let text = refusal(|r| r.options.picture = None);
+        assert!(text.contains("shading was flat and is nothing now"), "{text}");
+        let text = refusal(|r| r.version = "9.9.9".into());
+        assert!(text.contains("and is 9.9.9 now"), "{text}");
+        let text = refusal(|r| r.scene.content = "ff00".into());
+        assert!(text.contains("the scene file or a file it refers to has changed"), "{text}");
+    }
+
+    #[test]
+    fn content_covers_the_files_a_scene_refers_to() {
+        let dir = tempfile::tempdir().unwrap();
+        let scene = dir.path().join("a.gltf");
+        let buffer = dir.path().join("my buffer.bin");
+        let text = r#"{"buffers": [{"uri": "my%20buffer.bin"}, {"uri": "data:,x"}]}"#;
+        fs::write(&scene, text).unwrap();
+        fs::write(&buffer, "one").unwrap();
+        let first = content_hash(&scene).unwrap();
+        assert_eq!(content_hash(&scene).unwrap(), first);
+        fs::write(&buffer, "two").unwrap();
+        assert_ne!(content_hash(&scene).unwrap(), first);
+        assert!(content_hash(&dir.path().join("missing.glb")).is_err());
+    }
+
+    #[test]
+    fn percent_codes() {
+        assert_eq!(percent_decoded("a%20b%2Fc%C3%A4"), "a b/cä");
+        assert_eq!(percent_decoded("100%"), "100%");
+        assert_eq!(percent_decoded("%zz%2"), "%zz%2");
+    }
+}

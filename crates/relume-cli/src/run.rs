@@ -1,0 +1,523 @@
+//! `relume render`, `solve` and `demo`: frame after frame, each finished before the next begins.
+//!
+//! A frame is finished when its picture is written and then its entry stands in the report, both
+//! in one step each. Whatever ends a run, the directory holds finished frames and a report of
+//! exactly those.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use indicatif::HumanBytes;
+use relume::scene::{BodyId, Scene};
+use relume::session::{Options, Oracle, Session, SessionError, Snapshot, Update};
+use relume_picture::export::write_glb;
+use relume_picture::picture::{self, Exposure, Settings, Viewpoint};
+
+use crate::args::{
+    DemoArgs, ExposureFlag, OracleFlag, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags,
+    UpdateFlag,
+};
+use crate::demo;
+use crate::failure::Failure;
+use crate::frames;
+use crate::interrupt;
+use crate::output::{self, count, counted};
+use crate::progress::Progress;
+use crate::report::{PictureOptions, Report, RunOptions, SceneSummary, peak_memory_bytes};
+use crate::resume;
+use crate::scene_file;
+
+/// Default tolerance, relative error of irradiance.
+const TOLERANCE: f64 = 0.02;
+
+/// Share of the scene's area below which the form-factor oracle does not refine, unless it is told
+/// an area. A share, so that a scene in other units gives the same elements; with it a closed cube
+/// has at most 6 x 4^5 elements, about as many as the paper draws.
+const MIN_AREA_SHARE: f64 = 1.0 / 5_000.0;
+
+/// The report is written again after a frame if the last time was this long ago. A run that is
+/// killed outright computes the frames of this time again when it is resumed.
+const REPORT_INTERVAL: Duration = Duration::from_secs(1);
+/// At most one part in so many of a run is spent on writing reports, however long they grow.
+const REPORT_SHARE: u32 = 20;
+
+/// `relume demo`
+pub(crate) fn demo(args: DemoArgs) -> Result<(), Failure> {
+    let demo = demo::demo(args.scene);
+    let dir = args.output.unwrap_or_else(|| format!("relume-demo-{}", demo.name).into());
+    let scene = (demo.build)().map_err(scene_file::failure)?;
+    make_directory(&dir)?;
+    let path = dir.join(format!("{}.glb", demo.name));
+    {
+        let _guard = interrupt::writing();
+        write_glb(&scene, &path).map_err(|error| {
+            Failure::new(error).help("choose another place with -o, or check its permissions")
+        })?;
+    }
+    let job = Job {
+        scene: path,
+        dir: Some(dir),
+        tolerance: args.solve.tolerance.unwrap_or(demo.tolerance),
+        picture: Some((args.picture.shading.unwrap_or(demo.shading), args.picture)),
+        solve: args.solve,
+    };
+    job.run()
+}
+
+/// `relume render`
+pub(crate) fn render(args: RenderArgs) -> Result<(), Failure> {
+    let job = Job {
+        scene: args.scene,
+        dir: Some(args.output),
+        tolerance: args.solve.tolerance.unwrap_or(TOLERANCE),
+        picture: Some((args.picture.shading.unwrap_or(Shading::Gouraud), args.picture)),
+        solve: args.solve,
+    };
+    job.run()
+}
+
+/// `relume solve`
+pub(crate) fn solve(args: SolveArgs) -> Result<(), Failure> {
+    let job = Job {
+        scene: args.scene,
+        dir: args.output,
+        tolerance: args.solve.tolerance.unwrap_or(TOLERANCE),
+        picture: None,
+        solve: args.solve,
+    };
+    job.run()
+}
+
+/// One run as asked for.
+struct Job {
+    scene: PathBuf,
+    dir: Option<PathBuf>,
+    tolerance: f64,
+    picture: Option<(Shading, PictureFlags)>,
+    solve: SolveFlags,
+}
+
+impl Job {
+    fn run(self) -> Result<(), Failure> {
+        let started = now();
+        if self.solve.resume && self.report_paths().is_empty() {
+            return Err(Failure::usage("there is nothing to resume from").help(
+                "give the directory of the earlier run with -o, or its report with --report",
+            ));
+        }
+        let scene = scene_file::load(&self.scene, &self.solve.animation)?;
+        let wanted =
+            frames::resolve(self.solve.frames.as_ref(), scene.motion.duration_s, self.solve.fps)
+                .map_err(|error| Failure::new(error).help("`relume info` lists the frames"))?;
+        let camera = self.picture.as_ref().map(|(_, flags)| {
+            Viewpoint::new(&scene, flags.camera.as_deref()).map_err(Failure::new)
+        });
+        let camera = camera.transpose()?;
+        if !self.solve.quiet {
+            scene_file::warn(&scene);
+        }
+        let threads = use_threads(self.solve.threads)?;
+        if let Some(dir) = &self.dir {
+            make_directory(dir)?;
+        }
+        let report = self.open_report(&scene, threads)?;
+        let pending: Vec<u32> =
+            wanted.iter().copied().filter(|frame| !report.frames.contains_key(frame)).collect();
+        if !self.solve.quiet {
+            self.warn_of_old_pictures(&wanted, &report);
+        }
+        let session =
+            Session::new(Arc::new(scene), self.options_for(&report)).map_err(Failure::new)?;
+        let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.solve.quiet);
+        let mut run = Run { job: &self, session, camera, report, progress, links: 0 };
+        let outcome = run.frames(&pending);
+        run.progress.clear();
+        // Also where a frame failed: what was finished stays.
+        run.write_report()?;
+        let finished = wanted.iter().filter(|f| run.report.frames.contains_key(f)).count();
+        match outcome? {
+            Outcome::Interrupted => Err(self.interrupted(finished, wanted.len())),
+            Outcome::Done => self.summary(&wanted, &pending, run.links, started.elapsed()),
+        }
+    }
+
+    fn options_for(&self, report: &Report) -> Options {
+        let oracle = match self.solve.oracle {
+            OracleFlag::Error => Oracle::Error,
+            OracleFlag::FormFactor { epsilon, min_area_m2 } => Oracle::FormFactor {
+                epsilon,
+                min_area_m2: min_area_m2.unwrap_or(report.scene.area_m2 * MIN_AREA_SHARE),
+            },
+        };
+        let update = match self.solve.update {
+            UpdateFlag::Scratch => Update::Scratch,
+        };
+        Options {
+            tolerance: self.tolerance,
+            oracle,
+            update,
+            max_memory_bytes: self.solve.max_memory.map(|memory| memory.bytes),
+        }
+    }
+
+    /// Where the report goes.
+    fn report_paths(&self) -> Vec<PathBuf> {
+        let in_dir = self.dir.as_ref().map(|dir| dir.join("report.json"));
+        in_dir.into_iter().chain(self.solve.report.clone()).collect()
+    }
+
+    /// The report of this run, with what an earlier one finished. Written at once: that proves that
+    /// it can be, and an older report no longer describes files that are about to be replaced.
+    fn open_report(&self, scene: &Scene, threads: usize) -> Result<Report, Failure> {
+        let summary = SceneSummary::new(scene, resume::content_hash(&self.scene)?);
+        let mut report = Report::new(summary, self.run_options(threads));
+        let paths = self.report_paths();
+        if self.solve.resume
+            && let Some(earlier) = Report::read(&paths[0])?
+        {
+            resume::take_over(&mut report, earlier, &paths[0], |f| self.picture_is_whole(f))?;
+        }
+        for path in &paths {
+            report.write(path)?;
+        }
+        Ok(report)
+    }
+
+    fn run_options(&self, threads: usize) -> RunOptions {
+        let picture = self.picture.as_ref().map(|(shading, flags)| PictureOptions {
+            size: flags.size.to_string(),
+            shading: *shading,
+            camera: flags.camera.clone(),
+            exposure: flags.exposure.to_string(),
+            exposure_ev: match flags.exposure {
+                ExposureFlag::Auto => None,
+                ExposureFlag::Stops(stops) => Some(stops),
+            },
+            mesh: flags.mesh,
+        });
+        RunOptions {
+            frames: self.solve.frames.as_ref().map_or("all".into(), ToString::to_string),
+            fps: self.solve.fps,
+            animation: self.solve.animation.name.clone(),
+            tolerance: self.tolerance,
+            oracle: self.solve.oracle.to_string(),
+            update: self.solve.update.name().to_owned(),
+            threads,
+            max_memory_bytes: self.solve.max_memory.map(|memory| memory.bytes),
+            picture,
+        }
+    }
+
+    /// Path of a frame's picture, if this run makes pictures.
+    fn picture_path(&self, frame: u32) -> Option<PathBuf> {
+        self.picture.as_ref()?;
+        Some(self.dir.as_ref()?.join(format!("frame-{frame:04}.png")))
+    }
+
+    /// Pictures appear whole or not at all, so being there is enough.
+    fn picture_is_whole(&self, frame: u32) -> bool {
+        self.picture_path(frame).is_none_or(|path| path.is_file())
+    }
+
+    /// Pictures in the directory that no run described by the report has made.
+    fn warn_of_old_pictures(&self, wanted: &[u32], report: &Report) {
+        let (Some(dir), Some(_)) = (&self.dir, &self.picture) else { return };
+        let Ok(entries) = fs::read_dir(dir) else { return };
+        let number = |name: &str| -> Option<u32> {
+            name.strip_prefix("frame-")?.strip_suffix(".png")?.parse().ok()
+        };
+        let mut old: Vec<u32> = entries
+            .flatten()
+            .filter_map(|entry| number(entry.file_name().to_str()?))
+            .filter(|frame| wanted.binary_search(frame).is_err())
+            .filter(|frame| !report.frames.contains_key(frame))
+            .collect();
+        old.sort_unstable();
+        if !old.is_empty() {
+            output::complain(&format!(
+                "warning: {} also holds pictures of an earlier run: frames {}",
+                dir.display(),
+                frames::describe(&old)
+            ));
+        }
+    }
+
+    fn interrupted(&self, finished: usize, wanted: usize) -> Failure {
+        let failure = Failure::interrupted(format_args!(
+            "stopped: {} of {} finished",
+            count(finished as u64),
+            counted(wanted, "frame")
+        ));
+        if self.report_paths().is_empty() {
+            failure.help("with -o DIR or --report FILE a stopped run can be resumed")
+        } else {
+            failure.help("the same command with --resume goes on from here")
+        }
+    }
+
+    /// The line at the end, on stdout.
+    fn summary(
+        &self,
+        wanted: &[u32],
+        pending: &[u32],
+        links: u64,
+        elapsed: Duration,
+    ) -> Result<(), Failure> {
+        if self.solve.quiet {
+            return Ok(());
+        }
+        let mut line = counted(wanted.len(), "frame");
+        let kept = wanted.len() - pending.len();
+        if kept > 0 {
+            line += &format!(" ({} finished before)", count(kept as u64));
+        }
+        if !pending.is_empty() {
+            line += &format!(", {} links, {:.1} s", count(links), elapsed.as_secs_f64());
+        }
+        match (&self.dir, &self.picture) {
+            (Some(dir), Some(_)) => line += &format!(", pictures in {}", dir.display()),
+            (Some(dir), None) => line += &format!(", report in {}", dir.display()),
+            (None, _) => {}
+        }
+        output::print(&(line + "\n"))
+    }
+}
+
+/// How a run ended.
+enum Outcome {
+    Done,
+    Interrupted,
+}
+
+/// A run under way.
+struct Run<'a> {
+    job: &'a Job,
+    session: Session,
+    camera: Option<Viewpoint>,
+    report: Report,
+    progress: Progress,
+    /// Links of the last frame.
+    links: u64,
+}
+
+impl Run<'_> {
+    /// Solves and draws the frames that are not finished yet, in order.
+    fn frames(&mut self, pending: &[u32]) -> Result<Outcome, Failure> {
+        let (mut written, mut interval) = (now(), REPORT_INTERVAL);
+        for &frame in pending {
+            if interrupt::requested() {
+                return Ok(Outcome::Interrupted);
+            }
+            self.fix_exposure(frame)?;
+            if interrupt::requested() {
+                return Ok(Outcome::Interrupted);
+            }
+            self.frame(frame)?;
+            self.progress.finish_frame();
+            if written.elapsed() >= interval {
+                let before = now();
+                self.write_report()?;
+                written = now();
+                interval = REPORT_INTERVAL.max(before.elapsed() * REPORT_SHARE);
+            }
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn frame(&mut self, frame: u32) -> Result<(), Failure> {
+        self.progress.start(frame, self.links, self.session.memory_bytes());
+        let entry = self
+            .session
+            .step(frame, frames::time_of(frame, self.job.solve.fps))
+            .map_err(|error| self.session_failure(error))?;
+        self.links = entry.links;
+        if let Some(path) = self.job.picture_path(frame) {
+            self.draw(frame, &path)?;
+        }
+        self.report.add(&entry)
+    }
+
+    fn draw(&mut self, frame: u32, path: &Path) -> Result<(), Failure> {
+        let snapshot = self.session.snapshot();
+        if self.exposure_is_open() {
+            self.choose_exposure(frame, &snapshot)?;
+        }
+        let Some((view, options, flags)) = self.view(frame)? else { return Ok(()) };
+        let settings = Settings {
+            width: flags.size.width,
+            height: flags.size.height,
+            shading: match options.shading {
+                Shading::Flat => picture::Shading::Flat,
+                Shading::Gouraud => picture::Shading::Gouraud,
+            },
+            exposure: options.exposure_ev.map_or(Exposure::Automatic, fixed),
+            mesh: flags.mesh,
+            ..Settings::default()
+        };
+        let image = picture::render(&snapshot, &view, &settings);
+        let _guard = interrupt::writing();
+        image.write_png(path).map_err(|error| {
+            Failure::new(error)
+                .help("free some space or check the permissions, then run again with --resume")
+        })
+    }
+
+    /// What pictures of a frame are made with, if any are made.
+    fn view(
+        &self,
+        frame: u32,
+    ) -> Result<Option<(picture::View, &PictureOptions, &PictureFlags)>, Failure> {
+        let parts = (&self.camera, &self.report.options.picture, &self.job.picture);
+        let (Some(camera), Some(options), Some((_, flags))) = parts else { return Ok(None) };
+        let time_s = frames::time_of(frame, self.job.solve.fps);
+        let view = camera.at(self.session.scene(), time_s).map_err(Failure::new)?;
+        Ok(Some((view, options, flags)))
+    }
+
+    /// Chooses the automatic exposure once, before the first picture.
+    ///
+    /// It is that of the first frame of the whole animation in which anything emits, whichever
+    /// frames were asked for: so that the parts of a clip that were made by different runs match.
+    /// Where that frame is not the one that comes next it costs one more solution, in a session of
+    /// its own, so that the counters of this one stay what they would be.
+    fn fix_exposure(&mut self, next: u32) -> Result<(), Failure> {
+        if !self.exposure_is_open() {
+            return Ok(());
+        }
+        let fps = self.job.solve.fps;
+        let scene = Arc::clone(self.session.scene());
+        let frame = first_lit_frame(&scene, fps).unwrap_or(next);
+        if frame == next {
+            // Left to `draw`, which has the solution.
+            return Ok(());
+        }
+        self.progress.start(frame, 0, 0);
+        let options = self.session.options().clone();
+        let mut session = Session::new(scene, options).map_err(Failure::new)?;
+        session
+            .step(frame, frames::time_of(frame, fps))
+            .map_err(|error| self.session_failure(error))?;
+        self.choose_exposure(frame, &session.snapshot())
+    }
+
+    fn exposure_is_open(&self) -> bool {
+        self.report.options.picture.as_ref().is_some_and(|options| options.exposure_ev.is_none())
+    }
+
+    fn choose_exposure(&mut self, frame: u32, snapshot: &Snapshot) -> Result<(), Failure> {
+        let Some((view, ..)) = self.view(frame)? else { return Ok(()) };
+        let exposure = Exposure::automatic(snapshot, &view);
+        if let (Exposure::Fixed(scale), Some(options)) =
+            (exposure, &mut self.report.options.picture)
+        {
+            options.exposure_ev = Some(stops(scale));
+        }
+        Ok(())
+    }
+
+    fn session_failure(&self, error: SessionError) -> Failure {
+        let kept = !self.report.frames.is_empty() && !self.job.report_paths().is_empty();
+        let kept = if kept { "; the frames before it are finished and stay" } else { "" };
+        match error {
+            SessionError::OutOfMemory { frame, tolerance, limit_bytes, links } => {
+                Failure::new(format_args!(
+                    "frame {frame} at tolerance {tolerance} needs more than the {} of memory \
+                     allowed ({} pairs so far)",
+                    HumanBytes(limit_bytes),
+                    count(links)
+                ))
+                .help(format_args!("raise --max-memory or the tolerance{kept}"))
+            }
+            other if kept.is_empty() => Failure::new(other),
+            other => Failure::new(other).help(kept.trim_start_matches("; ")),
+        }
+    }
+
+    fn write_report(&mut self) -> Result<(), Failure> {
+        let peak = peak_memory_bytes().unwrap_or_else(|| self.session.memory_bytes());
+        self.report.peak_memory_bytes = self.report.peak_memory_bytes.max(peak);
+        self.job.report_paths().iter().try_for_each(|path| self.report.write(path))
+    }
+}
+
+/// Wall-clock time, for the summary and for how often the report is written; no result uses it.
+fn now() -> Instant {
+    Instant::now()
+}
+
+/// The first frame of the animation in which a surface or a light emits; `None` if none does.
+///
+/// Cost: one pose for each emitting body and frame, until one is found.
+fn first_lit_frame(scene: &Scene, fps: f64) -> Option<u32> {
+    let count = frames::frame_count(scene.motion.duration_s, fps).ok()?;
+    let emits = |body: &BodyId| {
+        scene.patches_of(*body).any(|(_, patch)| {
+            scene.materials[patch.material.0 as usize].exitance.iter().any(|m| *m > 0.0)
+        })
+    };
+    let bodies: Vec<BodyId> =
+        (0..scene.bodies.len() as u32).map(BodyId).filter(|body| emits(body)).collect();
+    (0..count).find(|&frame| {
+        let time_s = frames::time_of(frame, fps);
+        bodies.iter().any(|body| scene.pose(*body, time_s).is_some())
+            || scene.lights.iter().any(|l| scene.motion.pose(l.node, time_s).is_some())
+    })
+}
+
+/// Display value = radiance (W/m2/sr) x 2^EV.
+fn fixed(stops: f64) -> Exposure {
+    Exposure::Fixed(stops.exp2())
+}
+
+/// The stops of a scale, rounded to a thousandth so that what the report says is what was used.
+fn stops(scale: f64) -> f64 {
+    let stops = scale.log2();
+    if stops.is_finite() { (stops * 1000.0).round() / 1000.0 } else { 0.0 }
+}
+
+/// Sets the number of threads of the process; the number in use.
+fn use_threads(threads: Option<usize>) -> Result<usize, Failure> {
+    if let Some(threads) = threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(|error| {
+            Failure::new(format_args!("cannot start {}: {error}", counted(threads, "thread")))
+                .help("ask for fewer with --threads")
+        })?;
+    }
+    Ok(rayon::current_num_threads())
+}
+
+fn make_directory(dir: &Path) -> Result<(), Failure> {
+    if dir.exists() && !dir.is_dir() {
+        return Err(Failure::new(format_args!("{} is a file, not a directory", dir.display()))
+            .help("choose another directory with -o"));
+    }
+    fs::create_dir_all(dir).map_err(|error| Failure::write(dir, &error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::args::DemoScene;
+
+    #[test]
+    fn the_exposure_frame_is_the_first_with_light() {
+        let mut scene = (demo::demo(DemoScene::Room).build)().unwrap();
+        assert_eq!(first_lit_frame(&scene, 24.0), Some(0));
+        let lamp = scene.motion.nodes.iter_mut().find(|n| n.name == "lamp").unwrap();
+        lamp.presence = vec![(0.0, false), (0.25, true)];
+        assert_eq!(first_lit_frame(&scene, 24.0), Some(6));
+        for material in &mut scene.materials {
+            material.exitance = [0.0; 3];
+        }
+        assert_eq!(first_lit_frame(&scene, 24.0), None);
+    }
+
+    #[test]
+    fn stops_and_scales() {
+        assert_eq!(fixed(-1.0), Exposure::Fixed(0.5));
+        assert_eq!(stops(8.0), 3.0);
+        assert_eq!(stops(0.0), 0.0);
+    }
+}

@@ -1,0 +1,60 @@
+//! A scene from a file, or the message that says why not.
+
+use std::path::Path;
+
+use relume::scene::{ImportOptions, Note, Scene, SceneError, Severity, check, import};
+
+use crate::args::AnimationFlag;
+use crate::failure::Failure;
+use crate::output;
+
+/// Reads a scene.
+pub(crate) fn load(path: &Path, animation: &AnimationFlag) -> Result<Scene, Failure> {
+    import(path, &ImportOptions { animation: animation.name.clone() }).map_err(failure)
+}
+
+/// The message of a scene error, its remedy on a line of its own.
+pub(crate) fn failure(error: SceneError) -> Failure {
+    let text = error.to_string();
+    let remedy = match &error {
+        SceneError::Read { remedy, .. }
+        | SceneError::Format { remedy, .. }
+        | SceneError::Extension { remedy, .. }
+        | SceneError::Geometry { remedy, .. }
+        | SceneError::Material { remedy, .. }
+        | SceneError::Hierarchy { remedy, .. }
+        | SceneError::NotRigid { remedy, .. }
+        | SceneError::Animation { remedy, .. }
+        | SceneError::Empty { remedy, .. } => remedy,
+    };
+    match text.strip_suffix(remedy.as_str()) {
+        Some(what) if !remedy.is_empty() => {
+            Failure::new(what.trim_end_matches([' ', ';', ':'])).help(remedy)
+        }
+        _ => Failure::new(text),
+    }
+}
+
+/// Says on stderr, before a scene is solved, what was noticed while reading, unless it is merely
+/// worth knowing, and what `relume check` would call an error.
+pub(crate) fn warn(scene: &Scene) {
+    let read = scene.notes.iter().filter(|note| note.severity > Severity::Info).cloned();
+    let found = check(scene).into_iter().filter(|note| note.severity == Severity::Error);
+    for note in read.chain(found) {
+        // The run goes on, so it is no more than a warning here.
+        output::complain(&line(&Note { severity: Severity::Warning, ..note }));
+    }
+}
+
+/// One line about a note: severity, subject, message.
+pub(crate) fn line(note: &Note) -> String {
+    let severity = match note.severity {
+        Severity::Info => "note",
+        Severity::Warning => "warning",
+        Severity::Error => "error",
+    };
+    let count = if note.count > 1 { format!(" ({} x)", note.count) } else { String::new() };
+    let subject =
+        if note.subject.is_empty() { String::new() } else { format!("{}: ", note.subject) };
+    format!("{severity}[{}]: {subject}{}{count}", note.code, note.message)
+}

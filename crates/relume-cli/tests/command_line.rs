@@ -1,0 +1,313 @@
+//! The command as a user meets it: messages, exit codes, files.
+//!
+//! Runs the binary itself. Scenes are the demonstrations, written into a temporary directory.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// What a run printed, and its exit code.
+struct Ran {
+    code: Option<i32>,
+    out: String,
+    err: String,
+}
+
+impl Ran {
+    /// Asserts an exit code and that stderr holds each of the texts.
+    #[track_caller]
+    fn fails(&self, code: i32, texts: &[&str]) {
+        assert_eq!(self.code, Some(code), "{}{}", self.out, self.err);
+        assert!(!self.err.contains("panicked"), "{}", self.err);
+        for text in texts {
+            assert!(self.err.contains(text), "`{text}` is missing in:\n{}", self.err);
+        }
+    }
+
+    #[track_caller]
+    fn succeeds(self) -> Ran {
+        assert_eq!(self.code, Some(0), "{}{}", self.out, self.err);
+        self
+    }
+}
+
+fn relume(arguments: &[&str]) -> Ran {
+    let Output { status, stdout, stderr } =
+        Command::new(env!("CARGO_BIN_EXE_relume")).args(arguments).output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    Ran { code: status.code(), out: text(stdout), err: text(stderr) }
+}
+
+/// A directory with `room.glb` in it.
+fn room() -> (TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    // The scene is written before anything is solved; frame 99 does not exist, so nothing is.
+    let out = dir.path().to_str().unwrap();
+    relume(&["demo", "room", "-o", out, "--frames", "99"]).fails(1, &["frame 99"]);
+    let scene = dir.path().join("room.glb");
+    assert!(scene.is_file());
+    (dir, scene)
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn frames_of(report: &Value) -> Vec<u64> {
+    report["frames"].as_array().unwrap().iter().map(|f| f["frame"].as_u64().unwrap()).collect()
+}
+
+fn names_in(dir: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(dir)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn wrong_usage_is_explained() {
+    relume(&[]).fails(2, &["Usage: relume <COMMAND>", "demo", "render"]);
+    relume(&["solve"]).fails(2, &["SCENE"]);
+    relume(&["render", "a.glb"]).fails(2, &["--output"]);
+    for (flag, value, message) in [
+        ("--tolerance", "0", "between 0 and 1"),
+        ("--tolerance", "-0.1", "between 0 and 1"),
+        ("--tolerance", "1", "between 0 and 1"),
+        ("--tolerance", "NaN", "between 0 and 1"),
+        ("--frames", "9-3", "runs backwards: write 3-9"),
+        ("--frames", "", "write frames like"),
+        ("--frames", "-3", "is not a frame number"),
+        ("--fps", "0", "above 0"),
+        ("--oracle", "magic", "form-factor=EPS"),
+        ("--update", "magic", "scratch"),
+        ("--threads", "0", "from 1 to"),
+        ("--max-memory", "lots", "4G"),
+    ] {
+        relume(&["solve", "a.glb", flag, value]).fails(2, &[message]);
+    }
+    for (flag, value, message) in
+        [("--size", "0x0", "640x480"), ("--exposure", "bright", "auto"), ("--shading", "x", "flat")]
+    {
+        relume(&["render", "a.glb", "-o", "out", flag, value]).fails(2, &[message]);
+    }
+    relume(&["solve", "a.glb", "--resume"]).fails(2, &["nothing to resume from", "help:"]);
+}
+
+#[test]
+fn help_states_units_defaults_and_examples() {
+    let help = relume(&["render", "--help"]).succeeds().out;
+    for part in ["0-24x6", "[default: 24]", "0.02", "4G", "640x480", "[default: auto]", "gouraud"] {
+        assert!(help.contains(part), "{part}");
+    }
+    assert!(relume(&["--version"]).succeeds().out.starts_with("relume "));
+}
+
+#[test]
+fn a_file_that_is_missing_or_broken_is_one_clear_message() {
+    let dir = tempfile::tempdir().unwrap();
+    let missing = dir.path().join("missing.glb");
+    let broken = dir.path().join("broken.glb");
+    fs::write(&broken, b"glTF\x02\0\0\0 and then nothing").unwrap();
+    for command in ["info", "check", "solve"] {
+        for file in [&missing, &broken, &dir.path().to_owned()] {
+            let ran = relume(&[command, text(file)]);
+            ran.fails(1, &["error: ", text(file), "\n  help: "]);
+            assert_eq!(ran.out, "");
+        }
+    }
+    let out = dir.path().join("out");
+    relume(&["render", text(&missing), "-o", text(&out)]).fails(1, &["missing.glb"]);
+    assert!(!out.exists(), "nothing may be left behind");
+}
+
+#[test]
+fn info_says_what_was_read() {
+    let (_dir, scene) = room();
+    let out = relume(&["info", text(&scene)]).succeeds().out;
+    for part in [
+        "scene      room",
+        "7 bodies, 7 surfaces, 7 patches",
+        "frames 0-19 at 24 fps (20 in all), 1 of 7 bodies moving",
+        "left wall",
+        "sum 81.59, from 0.49 m2",
+        "perspective, 74.0 degrees high",
+    ] {
+        assert!(out.contains(part), "`{part}` is missing in:\n{out}");
+    }
+}
+
+#[test]
+fn check_finds_nothing_wrong_with_the_demonstrations() {
+    let (_dir, scene) = room();
+    let out = relume(&["check", text(&scene)]).succeeds().out;
+    assert!(out.ends_with("room: nothing wrong found\n"), "{out}");
+}
+
+#[test]
+fn frames_outside_the_animation_are_refused() {
+    let (_dir, scene) = room();
+    relume(&["solve", text(&scene), "--frames", "0-30"])
+        .fails(1, &["frame 30 is outside the animation, which has frames 0-19 at 24 fps", "help:"]);
+}
+
+#[test]
+fn solve_prints_a_summary_and_writes_a_report() {
+    let (dir, scene) = room();
+    let file = dir.path().join("own.json");
+    let out_dir = dir.path().join("out");
+    let ran = relume(&[
+        "solve",
+        text(&scene),
+        "-o",
+        text(&out_dir),
+        "--frames",
+        "0-4x2",
+        "--tolerance",
+        "0.3",
+        "--report",
+        text(&file),
+    ])
+    .succeeds();
+    assert!(ran.out.starts_with("3 frames, "), "{}", ran.out);
+    assert_eq!(ran.err, "");
+    assert_eq!(names_in(&out_dir), ["report.json"]);
+    let report = json(&out_dir.join("report.json"));
+    assert_eq!(report, json(&file));
+    assert_eq!(report["schema"], "relume-report/1");
+    assert_eq!(report["version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(report["scene"]["name"], "room");
+    assert_eq!(report["scene"]["bodies"], 7);
+    assert_eq!(report["scene"]["patches"], 7);
+    assert_eq!(report["scene"]["bounds"]["max"][1], 3.0);
+    assert_eq!(report["options"]["tolerance"], 0.3);
+    assert_eq!(report["options"]["frames"], "0-4x2");
+    assert!(report["peak_memory_bytes"].as_u64().unwrap() > 0);
+    assert_eq!(frames_of(&report), [0, 2, 4]);
+    let frame = report["frames"][1].as_object().unwrap();
+    let keys: Vec<&str> = frame.keys().map(String::as_str).collect();
+    let mut expected = [
+        "frame",
+        "time_s",
+        "moved",
+        "elements",
+        "links",
+        "dynamic_links",
+        "pairs",
+        "examined",
+        "reevaluated",
+        "visibility_only",
+        "promoted",
+        "demoted",
+        "occlusion_changed",
+        "segments",
+        "elements_made",
+        "elements_reaped",
+        "sweeps",
+        "residual",
+        "row_sum_error",
+        "energy",
+        "hash",
+        "seconds",
+    ];
+    expected.sort_unstable();
+    assert_eq!(keys, expected);
+}
+
+#[test]
+fn too_little_memory_is_said_with_the_remedy() {
+    let (_dir, scene) = room();
+    relume(&["solve", text(&scene), "--max-memory", "64K"]).fails(
+        1,
+        &[
+            "error: frame 0 at tolerance 0.02 needs more than the 64.00 KiB of memory allowed",
+            "\n  help: raise --max-memory or the tolerance",
+        ],
+    );
+}
+
+#[test]
+fn quiet_is_quiet() {
+    let (_dir, scene) = room();
+    let ran = relume(&["solve", text(&scene), "--frames", "0", "--tolerance", "0.3", "--quiet"])
+        .succeeds();
+    assert_eq!((ran.out.as_str(), ran.err.as_str()), ("", ""));
+}
+
+#[test]
+fn resuming_keeps_finished_frames_and_refuses_other_options() {
+    let (dir, scene) = room();
+    let out = dir.path().join("out");
+    let solve = |more: &[&str]| {
+        let fixed = ["solve", text(&scene), "-o", text(&out), "--tolerance", "0.3"];
+        relume(&[&fixed, more].concat())
+    };
+    // Nothing to resume from yet: that is no error, so scripts can always say --resume.
+    solve(&["--frames", "0-1", "--resume"]).succeeds();
+    let path = out.join("report.json");
+    // A mark in a finished frame shows that it was kept, not computed again.
+    let marked = fs::read_to_string(&path).unwrap().replacen("\"time_s\":0.0", "\"time_s\":9.5", 1);
+    assert!(marked.contains("9.5"));
+    fs::write(&path, marked).unwrap();
+    let ran = solve(&["--frames", "0-2", "--resume", "--threads", "1"]).succeeds();
+    assert!(ran.out.starts_with("3 frames (2 finished before), "), "{}", ran.out);
+    let report = json(&path);
+    assert_eq!(frames_of(&report), [0, 1, 2]);
+    assert_eq!(report["frames"][0]["time_s"], 9.5);
+
+    let before = fs::read(&path).unwrap();
+    solve(&["--resume", "--fps", "12"]).fails(
+        1,
+        &["cannot resume from", "fps was 24.0 and is 12.0 now", "help: use the scene and options"],
+    );
+    assert_eq!(fs::read(&path).unwrap(), before, "a refused run leaves everything as it was");
+
+    let mut changed = fs::read(&scene).unwrap();
+    let at = changed.windows(7).position(|w| w == b"ceiling").unwrap();
+    changed[at] = b'C';
+    fs::write(&scene, changed).unwrap();
+    solve(&["--resume"]).fails(1, &["the scene file or a file it refers to has changed"]);
+
+    fs::write(&path, "{ half a rep").unwrap();
+    solve(&["--resume"]).fails(1, &["is not a report of relume", "leave out --resume"]);
+}
+
+#[test]
+fn places_that_cannot_be_written_are_named() {
+    let (dir, scene) = room();
+    let file = dir.path().join("taken");
+    fs::write(&file, "mine").unwrap();
+    relume(&["solve", text(&scene), "-o", text(&file)])
+        .fails(1, &["taken is a file, not a directory", "help: choose another directory"]);
+    let below = file.join("below");
+    relume(&["solve", text(&scene), "-o", text(&below)]).fails(1, &["cannot write", "below"]);
+    let nowhere = dir.path().join("no/such/report.json");
+    relume(&["solve", text(&scene), "--report", text(&nowhere)])
+        .fails(1, &["cannot write", "report.json", "help:"]);
+    assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    use std::process::Stdio;
+    let (_dir, scene) = room();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_relume"))
+        .args(["info", text(&scene)])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let ran = child.wait_with_output().unwrap();
+    assert_eq!(String::from_utf8(ran.stderr).unwrap(), "");
+    assert!(ran.status.success());
+}

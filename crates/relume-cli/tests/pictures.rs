@@ -1,0 +1,161 @@
+//! Runs that make pictures: what lies in the directory, whatever ends the run.
+//!
+//! Runs the binary itself on the demonstrations, small and coarse. What the pictures show is tested
+//! where they are drawn.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+const QUICK: [&str; 4] = ["--size", "64x48", "--tolerance", "0.3"];
+
+fn relume(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_relume")).args(arguments).args(QUICK).output().unwrap()
+}
+
+#[track_caller]
+fn succeeded(output: &Output) -> String {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
+    text(&output.stdout)
+}
+
+fn report(dir: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(dir.join("report.json")).unwrap()).unwrap()
+}
+
+fn frames_of(report: &Value) -> Vec<u64> {
+    report["frames"].as_array().unwrap().iter().map(|f| f["frame"].as_u64().unwrap()).collect()
+}
+
+/// Names in a directory, hidden ones too: nothing half-written may be left.
+fn names_in(dir: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(dir)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_demonstration_writes_scene_pictures_and_report() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().to_str().unwrap();
+    let text = succeeded(&relume(&["demo", "room", "-o", out, "--frames", "0-2"]));
+    assert!(text.starts_with("3 frames, "), "{text}");
+    assert!(text.ends_with(&format!(" s, pictures in {out}\n")), "{text}");
+    assert_eq!(
+        names_in(dir.path()),
+        ["frame-0000.png", "frame-0001.png", "frame-0002.png", "report.json", "room.glb"]
+    );
+    let report = report(dir.path());
+    assert_eq!(frames_of(&report), [0, 1, 2]);
+    assert_eq!(report["options"]["picture"]["size"], "64x48");
+    assert_eq!(report["options"]["picture"]["shading"], "flat");
+    assert!(report["options"]["picture"]["exposure_ev"].is_f64());
+    let png = fs::read(dir.path().join("frame-0001.png")).unwrap();
+    assert_eq!(&png[1..4], b"PNG");
+    assert_eq!(&png[16..24], [0, 0, 0, 64, 0, 0, 0, 48]);
+}
+
+#[test]
+fn parts_of_a_clip_match_the_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (whole, part) = (path("whole"), path("part"));
+    succeeded(&relume(&["demo", "room", "-o", &whole, "--frames", "0-6x3"]));
+    let scene = format!("{whole}/room.glb");
+    // Frame 6 alone: the exposure is still that of frame 0.
+    let render = ["render", &scene, "-o", &part, "--frames", "6", "--shading", "flat"];
+    succeeded(&relume(&render));
+    let picture = |dir: &str| fs::read(format!("{dir}/frame-0006.png")).unwrap();
+    assert!(picture(&whole) == picture(&part), "the pictures differ");
+    let ev = |dir: &str| report(Path::new(dir))["options"]["picture"]["exposure_ev"].clone();
+    assert_eq!(ev(&whole), ev(&part));
+    let hash = |dir: &str, at: usize| report(Path::new(dir))["frames"][at]["hash"].clone();
+    assert_eq!(hash(&whole, 2), hash(&part, 0));
+}
+
+#[test]
+fn resuming_makes_what_is_missing_and_nothing_else() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().to_str().unwrap();
+    let demo = ["demo", "room", "-o", out, "--resume", "--frames"];
+    succeeded(&relume(&[&demo[..], &["0-1"]].concat()));
+    let picture = |frame: u32| dir.path().join(format!("frame-000{frame}.png"));
+    let lost = fs::read(picture(0)).unwrap();
+    fs::remove_file(picture(0)).unwrap();
+    // Another picture in its place shows that it is not made again.
+    fs::write(picture(1), "kept").unwrap();
+    let text = succeeded(&relume(&[&demo[..], &["0-2"]].concat()));
+    assert!(text.starts_with("3 frames (1 finished before), "), "{text}");
+    assert!(fs::read(picture(0)).unwrap() == lost, "the same frame, the same picture");
+    assert_eq!(fs::read(picture(1)).unwrap(), b"kept");
+    assert_eq!(frames_of(&report(dir.path())), [0, 1, 2]);
+
+    let refused = relume(&[&demo[..], &["0-2", "--shading", "gouraud"]].concat());
+    assert_eq!(refused.status.code(), Some(1));
+    let message = String::from_utf8(refused.stderr).unwrap();
+    assert!(message.contains("shading was flat and is gouraud now"), "{message}");
+}
+
+#[test]
+fn old_pictures_and_unknown_cameras_are_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().to_str().unwrap();
+    fs::write(dir.path().join("frame-0017.png"), "old").unwrap();
+    let ran = relume(&["demo", "room", "-o", out, "--frames", "0", "--mesh", "--exposure", "-3"]);
+    succeeded(&ran);
+    let message = String::from_utf8(ran.stderr).unwrap();
+    assert!(message.contains("pictures of an earlier run: frames 17"), "{message}");
+    let ran = relume(&["demo", "room", "-o", out, "--camera", "attic"]);
+    assert_eq!(ran.status.code(), Some(1));
+    let message = String::from_utf8(ran.stderr).unwrap();
+    assert!(message.contains("no camera is called \"attic\""), "{message}");
+}
+
+/// The first Ctrl-C leaves finished frames, a report of exactly those, and no rest of any other.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_can_be_resumed() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().to_str().unwrap();
+    // More frames than could be made in the time before the signal.
+    let demo = ["demo", "room", "-o", out, "--fps", "24000"];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_relume"))
+        .args(demo)
+        .args(QUICK)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let started = Instant::now();
+    while !dir.path().join("frame-0001.png").exists() {
+        let ended = child.try_wait().unwrap();
+        assert!(ended.is_none(), "it ended by itself: {ended:?}");
+        assert!(started.elapsed() < Duration::from_secs(60), "no frame in a minute");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    let ran = child.wait_with_output().unwrap();
+    let message = String::from_utf8(ran.stderr).unwrap();
+    assert_eq!(ran.status.code(), Some(130), "{message}");
+    assert!(message.contains("stopping after this frame"), "{message}");
+    assert!(message.contains(" of 19,001 frames finished"), "{message}");
+    assert!(message.contains("the same command with --resume"), "{message}");
+    let finished = frames_of(&report(dir.path()));
+    assert!(finished.len() >= 2);
+    let mut expected: Vec<String> =
+        finished.iter().map(|frame| format!("frame-{frame:04}.png")).collect();
+    expected.extend(["report.json".into(), "room.glb".into()]);
+    assert_eq!(names_in(dir.path()), expected);
+    let last = finished.len().to_string();
+    let text = succeeded(&relume(&[&demo[..], &["--resume", "--frames", &last]].concat()));
+    assert!(text.starts_with("1 frame, "), "{text}");
+    assert_eq!(frames_of(&report(dir.path())).len(), finished.len() + 1);
+}

@@ -1,0 +1,9 @@
+//! Scenes and solutions as files that other programs read.
+//!
+//! Every file appears whole or not at all.
+
+mod file;
+mod glb;
+
+pub use file::write_atomically;
+pub use glb::{ExportError, glb, write_glb};

@@ -1,0 +1,182 @@
+//! The order of the rooms, checked from the source: each uses only the rooms above it.
+//!
+//! Read from the text of every file, not from its `use` lines alone, so that a path written out
+//! in the middle of a function counts too. Comments do not: a doc link downwards is harmless.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The rooms of the engine, from the ground up. A room may use those before it.
+const ROOMS: [&str; 8] =
+    ["geometry", "scene", "element", "transport", "pair", "event", "solver", "session"];
+
+/// The crates from the ground up, with the names they have in source text.
+const CRATES: [(&str, &str); 3] =
+    [("relume", "relume"), ("relume-picture", "relume_picture"), ("relume-cli", "relume_cli")];
+
+/// Text without comments, with line breaks kept so that lines can be counted.
+fn without_comments(text: &str) -> String {
+    text.lines()
+        .map(|line| line.split_once("//").map_or(line, |(code, _)| code))
+        .collect::<Vec<_>>()
+        .join("\n")
+}
+
+/// Every identifier that directly follows `crate::` in `text`, braces of a `use` list expanded,
+/// with its line number from 1.
+fn rooms_used(text: &str) -> Vec<(usize, String)> {
+    let code = without_comments(text);
+    let mut found = Vec::new();
+    let mut rest_from = 0;
+    while let Some(at) = code[rest_from..].find("crate::") {
+        let start = rest_from + at + "crate::".len();
+        let line = code[..start].matches('\n').count() + 1;
+        rest_from = start;
+        // `$crate::` counts as well; `other_crate::` does not.
+        let before = code[..start - "crate::".len()].chars().next_back();
+        if before.is_some_and(|c| c.is_alphanumeric() || c == '_') {
+            continue;
+        }
+        for name in heads(&code[start..]) {
+            found.push((line, name));
+        }
+    }
+    found
+}
+
+/// First path segments of what follows `crate::`: one identifier, or those of a `{...}` list.
+fn heads(rest: &str) -> Vec<String> {
+    let identifier = |s: &str| -> String {
+        s.trim_start().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
+    };
+    let Some(list) = rest.trim_start().strip_prefix('{') else {
+        return vec![identifier(rest)];
+    };
+    let mut names = Vec::new();
+    let (mut depth, mut item) = (0, String::new());
+    for c in list.chars() {
+        match c {
+            '{' => depth += 1,
+            '}' if depth == 0 => break,
+            '}' => depth -= 1,
+            ',' if depth == 0 => names.push(identifier(&std::mem::take(&mut item))),
+            _ if depth == 0 => item.push(c),
+            _ => {}
+        }
+    }
+    names.push(identifier(&item));
+    names.retain(|name| !name.is_empty());
+    names
+}
+
+/// What is wrong with `text`, a file of `room`: one line for each use of a room below.
+fn violations(room: &str, file: &str, text: &str) -> Vec<String> {
+    let Some(level) = ROOMS.iter().position(|r| *r == room) else {
+        return vec![format!("{file}: `{room}` is not a room: put it into ROOMS in layers.rs")];
+    };
+    let mut wrong: Vec<String> = rooms_used(text)
+        .into_iter()
+        .filter_map(|(line, name)| {
+            let used = ROOMS.iter().position(|r| *r == name)?;
+            (used > level)
+                .then(|| format!("{file}:{line}: `{room}` uses `{name}`, which is below it"))
+        })
+        .collect();
+    for (number, line) in without_comments(text).lines().enumerate() {
+        // Leaving the room by `super::super` would escape the check above.
+        if line.contains("super::super::super") {
+            wrong.push(format!("{file}:{}: write `crate::...` instead", number + 1));
+        }
+    }
+    wrong
+}
+
+/// All `.rs` files below `dir`, in name order.
+fn sources(dir: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut entries: Vec<PathBuf> =
+        fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path()).collect();
+    entries.sort();
+    for path in entries {
+        if path.is_dir() {
+            found.extend(sources(&path));
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+    found
+}
+
+fn crates_dir() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
+}
+
+#[test]
+fn each_room_uses_only_rooms_above_it() {
+    let src = crates_dir().join("relume/src");
+    let mut wrong = Vec::new();
+    let mut rooms_seen = 0;
+    for file in sources(&src) {
+        let relative = file.strip_prefix(&src).unwrap();
+        let first = relative.components().next().unwrap().as_os_str().to_str().unwrap();
+        let room = first.strip_suffix(".rs").unwrap_or(first);
+        if room == "lib" {
+            continue;
+        }
+        rooms_seen += 1;
+        let text = fs::read_to_string(&file).unwrap();
+        wrong.extend(violations(room, &relative.display().to_string(), &text));
+    }
+    assert!(rooms_seen >= 3, "the engine's source was not found");
+    assert!(wrong.is_empty(), "rooms out of order:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn each_crate_uses_only_crates_above_it() {
+    let mut wrong = Vec::new();
+    for (level, (dir, _)) in CRATES.iter().enumerate() {
+        let manifest = fs::read_to_string(crates_dir().join(dir).join("Cargo.toml")).unwrap();
+        let dependencies =
+            manifest.split_once("[dependencies]").map_or("", |(_, rest)| rest).to_owned();
+        for (below, ident) in &CRATES[level + 1..] {
+            if dependencies.contains(below) {
+                wrong.push(format!("{dir}/Cargo.toml depends on {below}, which is below it"));
+            }
+            for file in sources(&crates_dir().join(dir).join("src")) {
+                let text = without_comments(&fs::read_to_string(&file).unwrap());
+                if text.contains(&format!("{ident}::")) {
+                    wrong.push(format!("{} uses {below}, which is below {dir}", file.display()));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "crates out of order:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn checker_finds_a_use_of_a_room_below() {
+    for bad in [
+        "use crate::solver::gather;",
+        "use crate::{geometry::Pose, solver::gather};",
+        "use crate::{\n    geometry::{Pose, Bounds},\n    session::Session,\n};",
+        "fn f() { let x = crate::session::Options::default(); }",
+        "pub use crate::pair;",
+    ] {
+        assert_eq!(violations("transport", "bad.rs", bad).len(), 1, "{bad}");
+    }
+    assert_eq!(violations("nowhere", "bad.rs", "").len(), 1);
+    assert_eq!(violations("pair", "bad.rs", "use super::super::super::session::X;").len(), 1);
+}
+
+#[test]
+fn checker_accepts_what_is_in_order() {
+    for good in [
+        "use crate::geometry::Pose;\nuse crate::{scene::Scene, element::Element};",
+        "// use crate::session::Session;",
+        "/// See [`crate::solver`].",
+        "use my_crate::session::Session;",
+        "use crate::transport::exchange;",
+    ] {
+        assert_eq!(violations("transport", "good.rs", good), Vec::<String>::new(), "{good}");
+    }
+}

@@ -25,12 +25,12 @@ impl Session {
             let leaf = self.forest.children(element).is_empty();
             match self.forest.kind(element) {
                 Kind::Element if leaf => {
-                    let f = self.from_element(solved, element, point, normal);
+                    let f = self.gather_element(solved, element, point, normal);
                     let b = solved.radiosity.radiosity(id);
                     (0..3).for_each(|c| sum[c] += f * f64::from(b[c]));
                 }
                 Kind::Light => {
-                    let e = self.from_light(solved, element, point, normal);
+                    let e = self.gather_light(solved, element, point, normal);
                     (0..3).for_each(|c| sum[c] += e[c]);
                 }
                 _ => {}
@@ -39,7 +39,7 @@ impl Session {
         sum
     }
 
-    fn from_light(&self, solved: &Solved, id: ElementId, point: DVec3, normal: DVec3) -> [f64; 3] {
+    fn gather_light(&self, solved: &Solved, id: ElementId, point: DVec3, normal: DVec3) -> [f64; 3] {
         let index = self.forest.light(id).expect("a light has an index");
         let Some(light) = solved.view.light(index) else { return [0.0; 3] };
         let e = light_at(light, point, normal);
@@ -53,7 +53,7 @@ impl Session {
         self.scene.lights[index].intensity.map(|i| if clear { i * e } else { 0.0 })
     }
 
-    fn from_element(&self, solved: &Solved, id: ElementId, point: DVec3, normal: DVec3) -> f64 {
+    fn gather_element(&self, solved: &Solved, id: ElementId, point: DVec3, normal: DVec3) -> f64 {
         let patch = self.forest.patch(id).expect("elements have patches");
         let e = WorldElement::new(&solved.view, &self.forest, id, false);
         let absent = !solved.view.is_present(solved.view.patch(patch).body);

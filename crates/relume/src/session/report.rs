@@ -13,6 +13,8 @@ pub struct FrameReport {
     pub moved: Vec<String>,
     /// Elements alive: every node of the forest that can carry radiosity.
     pub elements: u64,
+    /// Elements without children: what is drawn.
+    pub leaves: u64,
     /// Active pairs: links, each used in both directions.
     pub links: u64,
     /// Links with a moved end.

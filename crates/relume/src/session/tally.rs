@@ -36,16 +36,19 @@ pub(super) fn fill(
     report.reevaluated = work.examined;
     report.segments = work.segments;
     report.elements_made = work.elements_made;
-    report.elements = element_count(forest);
+    (report.elements, report.leaves) = element_counts(forest);
     report.sweeps = solved.radiosity.sweeps;
     report.residual = solved.radiosity.residual;
     (report.row_sum_error, report.energy) = balance(scene, forest, solved);
     report.dynamic_links = dynamic_links(report, scene, forest, solved);
 }
 
-fn element_count(forest: &Forest) -> u64 {
-    let is_element = |id: &u32| forest.kind(ElementId(*id)) == Kind::Element;
-    (0..forest.len() as u32).filter(is_element).count() as u64
+fn element_counts(forest: &Forest) -> (u64, u64) {
+    let elements =
+        (0..forest.len() as u32).map(ElementId).filter(|&id| forest.kind(id) == Kind::Element);
+    elements.fold((0, 0), |(all, leaves), id| {
+        (all + 1, leaves + u64::from(forest.children(id).is_empty()))
+    })
 }
 
 fn dynamic_links(report: &FrameReport, scene: &Scene, forest: &Forest, solved: &Solved) -> u64 {

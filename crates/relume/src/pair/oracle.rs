@@ -57,9 +57,13 @@ impl Estimate {
     }
 }
 
-/// Weight of the variation of visibility over an end: few of a receiver's links have an edge of a
-/// shadow within it, while all have a bend.
-const EDGE: f64 = 0.1;
+/// Weight of the variation of visibility over a receiver, for emitted light: few of a receiver's
+/// links have the edge of a lamp's shadow within it, while all have a bend.
+const EDGE_EMITTED: f64 = 0.1;
+
+/// The same for reflected light: where something nearly touches a receiver, it hides many sources
+/// along the same edge, and their errors have one sign.
+const EDGE_REFLECTED: f64 = 0.4;
 
 /// Weight of the sampling error of V: it is independent from link to link and averages out.
 const NOISE: f64 = 0.2;
@@ -84,35 +88,57 @@ pub(super) fn estimate(
     } else {
         ((v.value * (1.0 - v.value) + 0.02) / f64::from(v.segments)).sqrt() * NOISE
     };
-    let receives = |over: &Variation, spread: f64| (v.value * over.bend).hypot(EDGE * spread);
     let sends = |over: &Variation, spread: f64| (v.value * (over.slope + over.bend)).hypot(spread);
-    let (ra, rb) = (receives(&x.over_a, v.spread_a), receives(&x.over_b, v.spread_b));
-    let (sa, sb) = (sends(&x.over_a, v.spread_a), sends(&x.over_b, v.spread_b));
-    let (on_a, by_a, by_b) = one_way(x.area_m2, a, b, (ra, sb, noise), reference_area);
-    let (on_b, cy_b, cy_a) = one_way(x.area_m2, b, a, (rb, sa, noise), reference_area);
+    let over = |over: &Variation, edge: f64| Uneven {
+        bend: v.value * over.bend,
+        edge,
+        sends: sends(over, edge),
+    };
+    let (over_a, over_b) = (over(&x.over_a, v.spread_a), over(&x.over_b, v.spread_b));
+    let link = LinkSize { exchange: x.area_m2, noise, reference_area };
+    let (on_a, by_a, by_b) = one_way(&link, (a, &over_a), (b, &over_b));
+    let (on_b, cy_b, cy_a) = one_way(&link, (b, &over_b), (a, &over_a));
     Estimate { error: on_a.max(on_b), mends: (by_a + cy_a, by_b + cy_b) }
+}
+
+/// What both directions of a link share.
+struct LinkSize {
+    exchange: f64,
+    noise: f64,
+    reference_area: f64,
+}
+
+/// Standard deviations over one end of what crosses a link, relative to the mean without occlusion.
+struct Uneven {
+    /// Of the kernel, beyond its gradient.
+    bend: f64,
+    /// Of the visibility.
+    edge: f64,
+    /// Of both, with the gradient: what uneven radiosity is weighed with.
+    sends: f64,
 }
 
 /// Error on the receiver, and the parts of it that splitting receiver and source would mend.
 fn one_way(
-    x: f64,
-    receiver: &End,
-    source: &End,
-    (uneven_receiver, uneven_source, noise): (f64, f64, f64),
-    reference_area: f64,
+    link: &LinkSize,
+    (receiver, over_receiver): (&End, &Uneven),
+    (source, over_source): (&End, &Uneven),
 ) -> (f64, f64, f64) {
     if receiver.area <= 0.0 {
         return (0.0, 0.0, 0.0);
     }
-    let weight = (receiver.area / reference_area).sqrt() / receiver.light.irradiance;
-    let per_radiosity = x / receiver.area * weight;
-    let varies = SOURCE_VARIATION * (source.area / reference_area).min(4.0);
+    let weight = (receiver.area / link.reference_area).sqrt() / receiver.light.irradiance;
+    let per_radiosity = link.exchange / receiver.area * weight;
+    let Light { radiosity, reflected, .. } = source.light;
+    let varies = SOURCE_VARIATION * (source.area / link.reference_area).min(4.0);
     // What a small source does unevenly its neighbours do too, in the same sense: splitting the
     // source does not mend it, so it counts as if the source were as large as the receiver.
     let whole = if source.area > 0.0 { (receiver.area / source.area).max(1.0) } else { 1.0 };
-    let by_receiver = per_radiosity * source.light.radiosity * uneven_receiver * whole;
-    let by_source = per_radiosity * source.light.reflected * varies * uneven_source;
-    let by_noise = per_radiosity * source.light.radiosity * noise;
+    let edge = EDGE_EMITTED * (radiosity - reflected) + EDGE_REFLECTED * reflected;
+    let uneven = (radiosity * over_receiver.bend).hypot(edge * over_receiver.edge);
+    let by_receiver = per_radiosity * uneven * whole;
+    let by_source = per_radiosity * reflected * varies * over_source.sends;
+    let by_noise = per_radiosity * radiosity * link.noise;
     let error = (by_receiver.powi(2) + by_source.powi(2) + by_noise.powi(2)).sqrt();
     (error, by_receiver, by_source)
 }

@@ -119,6 +119,20 @@ impl Shaft<'_> {
         }
     }
 
+    /// Visits the patches among and below `candidates`, which this shaft has narrowed: patches among
+    /// them are known to be in the way, only clusters are looked into.
+    fn open(&self, candidates: &Candidates, visit: &mut dyn FnMut(PatchId)) {
+        for &candidate in candidates {
+            let id = ElementId(candidate);
+            match self.forest.patch(id) {
+                Some(patch) => visit(patch),
+                None => self.walk(id, -1.0, &mut |id| {
+                    visit(self.forest.patch(id).expect("a walk ends at patches"));
+                }),
+            }
+        }
+    }
+
     /// The segments of `bundle` (in the world; `own` in the body's frame) that are blocked.
     fn blocked(
         &self,
@@ -129,24 +143,18 @@ impl Shaft<'_> {
     ) -> u16 {
         let mut mask = 0_u16;
         let slack = 2.0 * self.slack();
-        for &candidate in candidates {
-            self.walk(ElementId(candidate), -1.0, &mut |id| {
-                if mask == u16::MAX {
-                    return;
-                }
-                let patch = self.forest.patch(id).expect("walk ends at patches");
-                let rides = self.own.filter(|o| o.0 == self.view.patch(patch).body);
-                mask |= match (rides, own) {
-                    (Some(_), Some(own)) => {
-                        own.blocked_by(simd, &self.view.occluder_in_body(patch), slack)
-                    }
-                    _ => world.blocked_by(simd, &self.view.occluder(patch), slack),
-                };
-            });
+        self.open(candidates, &mut |patch| {
             if mask == u16::MAX {
-                break;
+                return;
             }
-        }
+            let rides = self.own.filter(|o| o.0 == self.view.patch(patch).body);
+            mask |= match (rides, own) {
+                (Some(_), Some(own)) => {
+                    own.blocked_by(simd, &self.view.occluder_in_body(patch), slack)
+                }
+                _ => world.blocked_by(simd, &self.view.occluder(patch), slack),
+            };
+        });
         mask
     }
 }
@@ -179,19 +187,18 @@ pub fn visibility(
 const CLIPPED_MAX: usize = 12;
 
 /// Visibility of a pair by clipping, exact from four points, if at most twelve polygons stand in
-/// its shaft; `None` if there are more.
+/// its shaft; `None` if there are more. `candidates` must have been narrowed by this shaft.
 pub fn exact_visibility(shaft: &Shaft<'_>, candidates: &Candidates) -> Option<Visibility> {
     if candidates.is_empty() {
         return Some(Visibility::CLEAR);
     }
     let mut polygons = Vec::new();
-    for &candidate in candidates {
-        shaft.walk(ElementId(candidate), -1.0, &mut |id| {
-            polygons.push(shaft.forest.patch(id).expect("walk ends at patches"));
-        });
-        if polygons.len() > CLIPPED_MAX {
-            return None;
-        }
+    if candidates.len() > CLIPPED_MAX {
+        return None;
+    }
+    shaft.open(candidates, &mut |patch| polygons.push(patch));
+    if polygons.len() > CLIPPED_MAX {
+        return None;
     }
     if polygons.is_empty() {
         return Some(Visibility::CLEAR);

@@ -153,7 +153,7 @@ fn quantile(errors: &[f64], share: f64) -> f64 {
 
 #[test]
 fn sensors_of_the_animated_room() {
-    let tolerances = [0.1, 0.02];
+    let tolerances: [f64; 2] = [0.1, 0.02];
     // Gathering at the default takes long: two frames here, all four in the test below.
     let found = [at_sensors(0.1, &FRAMES), at_sensors(0.02, &[8, 24])];
     for ((g, m), tolerance) in found.iter().zip(tolerances) {

@@ -194,7 +194,8 @@ fn sensors_keep_the_default_tolerance_with_those_in_the_gap() {
 
 /// RMS and mean relative error of the patch means of the static room, and the links they took.
 fn patch_means(tolerance: f64) -> (f64, f64, u64) {
-    const POINTS: u32 = 8;
+    // Where a penumbra is, 8 x 8 points alone make an error of 0.6 %.
+    const POINTS: u32 = 32;
     let (session, report) = solved(shipped("room_box_static.glb"), at_tolerance(tolerance));
     let snapshot = session.snapshot();
     let off = |row: &Vec<f64>| {

@@ -22,8 +22,17 @@ fn main() {
     );
     println!(
         "{:<24} {:>8} {:>10} {:>9} {:>8} {:>8} {:>9} {:>11} {:>8} {:>8} {:>9}",
-        "oracle", "threads", "links", "pairs", "leaves", "seconds", "links/s", "segments", "build %",
-        "solve %", "bytes/lnk"
+        "oracle",
+        "threads",
+        "links",
+        "pairs",
+        "leaves",
+        "seconds",
+        "links/s",
+        "segments",
+        "build %",
+        "solve %",
+        "bytes/lnk"
     );
     for (name, oracle, tolerance) in [
         ("form-factor 0.05", form_factor(0.05, 4e-3), 0.02),

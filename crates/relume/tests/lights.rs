@@ -132,7 +132,7 @@ fn the_flux_of_a_point_light_is_its_solid_angle_less_the_shadow() {
         println!("free flux {:.6} exact {exact:.6}", flux(&free, "floor"));
         assert!((flux(&free, "floor") / exact - 1.0).abs() < 1e-3);
         let scene = lit_floor(LightKind::Point, at, DVec3::X, true);
-        let (shaded, report) = solved(scene, at_tolerance(0.5));
+        let (shaded, report) = solved(scene, at_tolerance(0.05));
         let left = exact - I[0] * quad_sr(at, &shade());
         println!(
             "shaded flux {:.6} exact {left:.6}, {} links",
@@ -156,7 +156,7 @@ fn a_shadow_has_its_edge_where_it_belongs() {
         if name == "near point" {
             continue;
         }
-        let (session, _) = solved(lit_floor(kind, at, along, true), at_tolerance(0.3));
+        let (session, _) = solved(lit_floor(kind, at, along, true), at_tolerance(0.1));
         // Where the light sends a point of the plate's plane.
         let thrown = |p: DVec3| match kind {
             LightKind::Directional => p + along / -along.z * p.z,
@@ -177,8 +177,9 @@ fn a_shadow_has_its_edge_where_it_belongs() {
         let dark = |p: DVec3| shading(p).x.abs().max(shading(p).y.abs()) < 0.3;
         let exact = |p| if dark(p) { 0.0 } else { on_floor(kind, at, along, p) };
         let lit = mesh_error(&session, exact);
-        println!("{name}: mesh with shadow {lit:.2} RMS of the mean irradiance at tolerance 0.3");
-        assert!(lit < 0.35, "{name}: {lit}");
+        println!("{name}: mesh with shadow {lit:.2} RMS of the mean irradiance at tolerance 0.1");
+        // The spot lights a fifth of the floor: its own irradiance is far above the mean.
+        assert!(lit < 0.5, "{name}: {lit}");
     }
 }
 
@@ -215,7 +216,6 @@ fn a_closed_room_takes_all_light_in() {
 }
 
 #[test]
-#[ignore = "engine: the umbra is refined without end, 17 million links where 64 MiB hold a million"]
 fn a_shadow_at_default_tolerance_takes_few_links() {
     let scene = lit_floor(LightKind::Point, v(0.0, 0.0, 2.0), DVec3::X, true);
     let options = Options { max_memory_bytes: Some(64 << 20), ..Options::default() };

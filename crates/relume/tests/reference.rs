@@ -183,7 +183,6 @@ fn sensors_of_the_animated_room() {
 }
 
 #[test]
-#[ignore = "engine: parts of less than 2e-4 are seen wholly or not at all, which is too coarse in the gap"]
 fn sensors_keep_the_default_tolerance_with_those_in_the_gap() {
     let (coarse, fine) = (at_sensors(0.1, &FRAMES).0, at_sensors(0.02, &FRAMES).0);
     assert!(rms(&fine.all) <= 0.02, "{}", rms(&fine.all));

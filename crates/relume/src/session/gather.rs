@@ -39,7 +39,13 @@ impl Session {
         sum
     }
 
-    fn gather_light(&self, solved: &Solved, id: ElementId, point: DVec3, normal: DVec3) -> [f64; 3] {
+    fn gather_light(
+        &self,
+        solved: &Solved,
+        id: ElementId,
+        point: DVec3,
+        normal: DVec3,
+    ) -> [f64; 3] {
         let index = self.forest.light(id).expect("a light has an index");
         let Some(light) = solved.view.light(index) else { return [0.0; 3] };
         let e = light_at(light, point, normal);

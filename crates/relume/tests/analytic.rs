@@ -1,6 +1,9 @@
 //! Form factors with exact answers, as sums over the links of a session; and the irradiance at a
 //! point. Figures are printed (`--nocapture`).
 
+// Reference values may use the platform's functions.
+#![allow(clippy::disallowed_methods)]
+
 mod common;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

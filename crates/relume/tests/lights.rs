@@ -1,6 +1,9 @@
 //! Punctual lights against closed forms: irradiance, flux, shadows, energy; and bodies that are
 //! absent. Figures are printed (`--nocapture`).
 
+// Reference values may use the platform's functions.
+#![allow(clippy::disallowed_methods)]
+
 mod common;
 
 use std::f64::consts::PI;

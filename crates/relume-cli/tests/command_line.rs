@@ -199,6 +199,7 @@ fn solve_prints_a_summary_and_writes_a_report() {
         "time_s",
         "moved",
         "elements",
+        "leaves",
         "links",
         "dynamic_links",
         "pairs",

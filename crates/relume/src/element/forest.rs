@@ -338,17 +338,6 @@ impl Forest {
         parent.child_count = shapes.len() as u16;
         (self.children(id), true)
     }
-
-    /// Forgets all quadtree elements.
-    pub fn clear(&mut self) {
-        self.nodes.truncate(self.fixed_len as usize);
-        for node in &mut self.nodes {
-            if node.kind == Kind::Element {
-                node.child_count = 0;
-            }
-            node.coarse = NONE;
-        }
-    }
 }
 
 impl Node {

@@ -55,7 +55,7 @@ pub trait Hierarchy {
 /// What the pair tree asks of the space it works in.
 pub trait Judge: Hierarchy + Sync {
     /// Judges a pair. `candidates` are the possible occluders of the pair above; those of this
-    /// pair are appended to `narrowed`. A pure function of the space.
+    /// pair are appended to `narrowed`, whose present content belongs to other pairs. A pure function of the space.
     fn judge(
         &self,
         a: ElementId,

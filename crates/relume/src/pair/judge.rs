@@ -184,8 +184,8 @@ impl Placed<'_> {
         } else {
             self.shaft((&own_a, &own_b), None, patches)
         };
-        shaft.narrow(candidates, narrowed);
-        let blockers = narrowed.split_off(0);
+        let mut blockers = Vec::new();
+        shaft.narrow(candidates, &mut blockers);
         let judgement = self.decide((a, b), (&own_a, &own_b), met, &shaft, &blockers);
         narrowed.extend(blockers);
         judgement
@@ -229,7 +229,7 @@ impl Placed<'_> {
                 return passing(Verdict::Refine(side), 0);
             }
         }
-        let v = exact_visibility(shaft, blockers)
+        let v = exact_visibility(shaft, blockers, 1)
             .unwrap_or_else(|| visibility(self.simd, shaft, blockers, key, 4));
         let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
         else {
@@ -247,17 +247,38 @@ impl Placed<'_> {
         {
             return passing(Verdict::Refine(side), v.segments);
         }
-        let v = self.settle(v, shaft, blockers, key);
+        let stake = x.area_m2 / place_a.area.min(place_b.area) / threshold;
+        let v = self.settle(v, shaft, blockers, key, stake);
         carrying(Verdict::Link, &x, &v, (place_a, place_b))
     }
 
-    /// A link whose segments are partly blocked gets more of them.
-    fn settle(&self, v: Visibility, shaft: &Shaft<'_>, blockers: &[u32], key: u64) -> Visibility {
-        if v.segments < SEGMENTS as u32 || v.value <= 0.0 || v.value >= 1.0 {
+    /// A link that is partly blocked is looked at more closely, the more so the larger
+    /// its form factor: `stake` is that over what a link may err by.
+    fn settle(
+        &self,
+        v: Visibility,
+        shaft: &Shaft<'_>,
+        blockers: &[u32],
+        key: u64,
+        stake: f64,
+    ) -> Visibility {
+        if blockers.is_empty() || v.segments == 0 {
             return v;
         }
-        let fine = visibility(self.simd, shaft, blockers, key, 6);
-        Visibility { segments: v.segments + fine.segments, ..fine }
+        let again = if v.segments >= SEGMENTS as u32 {
+            visibility(self.simd, shaft, blockers, key, 6)
+        } else {
+            // The error of n x n points on a function with kinks falls as 1 / n^2.
+            let spread = if shaft.a.area <= shaft.b.area { v.spread_a } else { v.spread_b };
+            let cells = match stake * spread.max(UNSEEN) {
+                s if s <= CLOSER => return v,
+                s if s <= 4.0 * CLOSER => 2,
+                s if s <= 16.0 * CLOSER => 4,
+                _ => 8,
+            };
+            exact_visibility(shaft, blockers, cells).unwrap_or(v)
+        };
+        Visibility { segments: v.segments + again.segments, ..again }
     }
 
     /// The side that is above the coarse level, if one is; the larger first.
@@ -322,10 +343,12 @@ impl Placed<'_> {
         }
         let place = LightPlace::new(lamp, &e, self.view.fixed_box(Forest::ROOT));
         let shaft = self.shaft((&e, &place.stand_in), None, (patch, patch));
-        shaft.narrow(candidates, narrowed);
+        let mut blockers = Vec::new();
+        shaft.narrow(candidates, &mut blockers);
         let key = pair_key(self.forest.key(element), self.forest.key(light));
         let segments = place.segments(lamp, &e, key);
-        let v = light_visibility(self.simd, &shaft, narrowed, &segments);
+        let v = light_visibility(self.simd, &shaft, &blockers, &segments);
+        narrowed.extend(blockers);
         let verdict = match (self.stage, self.oracle) {
             (Stage::Coarse, _) => Verdict::Hold,
             (Stage::Fine(brightness), Oracle::Error { threshold }) => {
@@ -349,6 +372,12 @@ impl Placed<'_> {
         if wanted { Verdict::Refine(side) } else { Verdict::Link }
     }
 }
+
+/// Spread of visibility that four points which agree may have overlooked.
+const UNSEEN: f64 = 0.05;
+
+/// Stake times spread of visibility above which a link is clipped from more points.
+const CLOSER: f64 = 0.05;
 
 /// A punctual light as the far end of a shaft.
 struct LightPlace {

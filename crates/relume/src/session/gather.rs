@@ -20,10 +20,10 @@ impl Session {
     pub fn irradiance_at(&self, point: DVec3, normal: DVec3) -> [f64; 3] {
         let solved = self.solved.as_ref().expect("a step comes before a query");
         let mut sum = [0.0; 3];
-        for id in 0..self.forest.len() as u32 {
+        for id in 0..solved.forest.len() as u32 {
             let element = ElementId(id);
-            let leaf = self.forest.children(element).is_empty();
-            match self.forest.kind(element) {
+            let leaf = solved.forest.children(element).is_empty();
+            match solved.forest.kind(element) {
                 Kind::Element if leaf => {
                     let f = self.gather_element(solved, element, point, normal);
                     let b = solved.radiosity.radiosity(id);
@@ -46,7 +46,7 @@ impl Session {
         point: DVec3,
         normal: DVec3,
     ) -> [f64; 3] {
-        let index = self.forest.light(id).expect("a light has an index");
+        let index = solved.forest.light(id).expect("a light has an index");
         let Some(light) = solved.view.light(index) else { return [0.0; 3] };
         let e = light_at(light, point, normal);
         let away = solved.view.fixed_box(Forest::ROOT).diagonal() * 1.5;
@@ -55,18 +55,18 @@ impl Session {
             _ => light.position,
         };
         let clear =
-            e > 0.0 && segment_is_clear(&solved.view, &self.forest, point, end, 1e-9 * away);
+            e > 0.0 && segment_is_clear(&solved.view, &solved.forest, point, end, 1e-9 * away);
         self.scene.lights[index].intensity.map(|i| if clear { i * e } else { 0.0 })
     }
 
     fn gather_element(&self, solved: &Solved, id: ElementId, point: DVec3, normal: DVec3) -> f64 {
-        let patch = self.forest.patch(id).expect("elements have patches");
-        let e = WorldElement::new(&solved.view, &self.forest, id, false);
+        let patch = solved.forest.patch(id).expect("elements have patches");
+        let e = WorldElement::new(&solved.view, &solved.forest, id, false);
         let absent = !solved.view.is_present(solved.view.patch(patch).body);
         if absent || e.plane.distance(point) <= e.rounding_m {
             return 0.0;
         }
-        let look = Look { solved, forest: &self.forest, point, normal, plane: e.plane };
+        let look = Look { solved, forest: &solved.forest, point, normal, plane: e.plane };
         look.at(&ConvexPolygon::new(&e.corners[..e.len]), SPLITS)
     }
 }

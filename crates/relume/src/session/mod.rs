@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::element::{Forest, WorldView};
 use crate::pair::{self, Brightness, Frontier, PairTree, Placed, Stage, Work, grow, resume};
-use crate::scene::Scene;
+use crate::scene::{BodyId, Scene};
 use crate::solver::{Links, Radiosity, Stop};
 use crate::transport::Simd;
 
@@ -50,13 +50,15 @@ pub struct Session {
     scene: Arc<Scene>,
     options: Options,
     simd: Simd,
-    forest: Forest,
+    /// The fixed part of the forest, where every build starts.
+    seed: Forest,
     solved: Option<Solved>,
 }
 
 /// What the last step left.
 struct Solved {
     time_s: f64,
+    forest: Forest,
     view: WorldView,
     tree: PairTree,
     links: Links,
@@ -77,8 +79,8 @@ impl Session {
     /// [`SessionError::Option`] if an option is out of its range.
     pub fn new(scene: Arc<Scene>, options: Options) -> Result<Session, SessionError> {
         options.validate()?;
-        let forest = Forest::new(&scene);
-        Ok(Session { scene, options, simd: Simd::detect(), forest, solved: None })
+        let seed = Forest::new(&scene);
+        Ok(Session { scene, options, simd: Simd::detect(), seed, solved: None })
     }
 
     /// The scene being solved.
@@ -99,24 +101,24 @@ impl Session {
         let mut clock = Clock::start();
         let mut report = FrameReport { frame, time_s, ..FrameReport::default() };
         report.moved = self.moved_since_last(time_s);
-        self.forest.clear();
-        let view = WorldView::new(&self.scene, &self.forest, time_s);
+        let mut forest = self.seed.clone();
+        let view = WorldView::new(&self.scene, &forest, time_s);
         report.seconds.moving = clock.lap();
 
         let mut tree = PairTree::new(Forest::ROOT);
         let mut work = Work::default();
-        let (start, coarse) = self.build(&view, &mut tree, &mut work, frame)?;
+        let (start, coarse) = self.build(&mut forest, &view, &mut tree, &mut work, frame)?;
         report.seconds.evaluate = clock.lap();
 
-        let links = surfaces::links_of(&self.forest, tree.links());
-        let lit = LitForest::new(&self.scene, &self.forest);
+        let links = surfaces::links_of(&forest, tree.links());
+        let lit = LitForest::new(&self.scene, &forest);
         let stop = Stop::Residual(self.options.tolerance * RESIDUAL_SHARE);
-        let guess = |id: u32| coarse::radiosity_at(&self.forest, &start, &coarse, id, &lit);
+        let guess = |id: u32| coarse::radiosity_at(&forest, &start, &coarse, id, &lit);
         let radiosity = Radiosity::solve(&lit, &links, Some(&guess), stop);
         report.seconds.solve = clock.lap();
 
-        let solved = Solved { time_s, view, tree, links, radiosity };
-        tally::fill(&mut report, &self.scene, &self.forest, &solved, &work);
+        let solved = Solved { time_s, forest, view, tree, links, radiosity };
+        tally::fill(&mut report, &self.scene, &solved, &work);
         report.seconds.total = clock.total();
         self.solved = Some(solved);
         Ok(report)
@@ -124,7 +126,8 @@ impl Session {
 
     /// Grows the pair tree of the present poses; returns the coarse solution on the way.
     fn build(
-        &mut self,
+        &self,
+        forest: &mut Forest,
         view: &WorldView,
         tree: &mut PairTree,
         work: &mut Work,
@@ -138,16 +141,11 @@ impl Session {
         };
         let oracle = self.options.pair_oracle();
         let coarse = match oracle {
-            pair::Oracle::Error { .. } => coarse::number(&self.scene, &mut self.forest),
+            pair::Oracle::Error { .. } => coarse::number(&self.scene, forest),
             pair::Oracle::FormFactor { .. } => Vec::new(),
         };
-        let mut placed = Placed {
-            forest: &mut self.forest,
-            view,
-            stage: Stage::Coarse,
-            oracle,
-            simd: self.simd,
-        };
+        let mut placed =
+            Placed { forest: &mut *forest, view, stage: Stage::Coarse, oracle, simd: self.simd };
         let root = [Forest::ROOT.0];
         let (frontier, start, brightness);
         if coarse.is_empty() {
@@ -157,9 +155,9 @@ impl Session {
         } else {
             let held = grow(tree, &mut placed, &root, work, &enough);
             let held = held.ok_or_else(|| self.too_large(tree, limit, frame))?;
-            (start, brightness) = coarse::solve(&self.scene, &self.forest, tree, &held, &coarse);
+            (start, brightness) = coarse::solve(&self.scene, placed.forest, tree, &held, &coarse);
             let mut placed = Placed {
-                forest: &mut self.forest,
+                forest: &mut *forest,
                 view,
                 stage: Stage::Fine(&brightness),
                 oracle,
@@ -180,10 +178,10 @@ impl Session {
 
     fn moved_since_last(&self, time_s: f64) -> Vec<String> {
         let Some(last) = &self.solved else { return Vec::new() };
-        let bodies = self.scene.bodies.iter().zip(last.view.poses());
-        bodies
-            .filter(|(body, pose)| self.scene.motion.pose(body.node, time_s) != **pose)
-            .map(|(body, _)| body.name.clone())
+        let moved = |b: &usize| self.scene.pose(BodyId(*b as u32), time_s) != last.view.poses()[*b];
+        (0..self.scene.bodies.len())
+            .filter(moved)
+            .map(|b| self.scene.bodies[b].name.clone())
             .collect()
     }
 
@@ -193,7 +191,7 @@ impl Session {
     /// Before the first [`Session::step`].
     pub fn snapshot(&self) -> Snapshot {
         let solved = self.solved.as_ref().expect("a step comes before a snapshot");
-        snapshot::take(&self.scene, &self.forest, solved)
+        snapshot::take(&self.scene, solved)
     }
 
     /// The pair tree of the present solution, with the forest its elements are in.
@@ -202,7 +200,7 @@ impl Session {
     /// Before the first [`Session::step`].
     pub fn pairs(&self) -> (&PairTree, &Forest) {
         let solved = self.solved.as_ref().expect("a step comes before a look at the pairs");
-        (&solved.tree, &self.forest)
+        (&solved.tree, &solved.forest)
     }
 
     /// Sum of the form factors from a leaf element; 1 in a closed scene, up to the links' errors.
@@ -217,9 +215,12 @@ impl Session {
     /// Bytes that the engine's structures hold now.
     pub fn memory_bytes(&self) -> u64 {
         let solved = self.solved.as_ref().map_or(0, |s| {
-            s.tree.memory_bytes() + s.links.memory_bytes() + s.radiosity.memory_bytes()
+            s.tree.memory_bytes()
+                + s.links.memory_bytes()
+                + s.radiosity.memory_bytes()
+                + s.forest.memory_bytes()
         });
-        self.forest.memory_bytes() + solved
+        self.seed.memory_bytes() + solved
     }
 }
 

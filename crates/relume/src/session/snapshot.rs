@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use crate::element::{ElementId, Forest};
+use crate::element::ElementId;
 use crate::geometry::Pose;
 use crate::scene::{PatchId, Scene};
 
@@ -61,7 +61,8 @@ fn gradient(solved: &Solved, id: ElementId) -> [[f32; 3]; 2] {
 }
 
 /// The leaves of a solved forest.
-pub(super) fn take(scene: &Arc<Scene>, forest: &Forest, solved: &Solved) -> Snapshot {
+pub(super) fn take(scene: &Arc<Scene>, solved: &Solved) -> Snapshot {
+    let forest = &solved.forest;
     let mut leaves = Vec::new();
     let mut leaf_offsets = vec![0];
     for (k, patch) in scene.patches.iter().enumerate() {

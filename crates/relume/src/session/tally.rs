@@ -10,13 +10,8 @@ use super::surfaces::LitForest;
 use crate::solver::Surfaces;
 
 /// Fills in everything but the times.
-pub(super) fn fill(
-    report: &mut FrameReport,
-    scene: &Scene,
-    forest: &Forest,
-    solved: &Solved,
-    work: &Work,
-) {
+pub(super) fn fill(report: &mut FrameReport, scene: &Scene, solved: &Solved, work: &Work) {
+    let forest = &solved.forest;
     let mut hash = PairHash::default();
     let mut counts = PairCounts::default();
     for pair in solved.tree.pairs() {

@@ -1,4 +1,4 @@
-//! Partial visibility by clipping: exact from each of four points of the smaller end.
+//! Partial visibility by clipping: exact from each of a few points of the smaller end.
 //!
 //! Seen from a point, an occluding polygon hides a pyramid. What is left of the larger end after
 //! all pyramids are cut off is a set of convex fragments, whose form factors are known in closed
@@ -17,11 +17,13 @@ const G: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 /// Fragments after which what is left is taken as it is: a guard, never met with few occluders.
 const FRAGMENTS_MAX: usize = 256;
 
-/// Visibility of `a` and `b` past convex occluders, all in one frame.
+/// Visibility of `a` and `b` past convex occluders, all in one frame: from 2 x 2 Gauss points in
+/// each of `cells` x `cells` parts of the smaller end.
 pub(super) fn clipped_visibility(
     a: &WorldElement,
     b: &WorldElement,
     occluders: &[Vec<DVec3>],
+    cells: u32,
 ) -> Visibility {
     let slack = a.rounding_m + b.rounding_m;
     let a_looks = a.area <= b.area;
@@ -33,8 +35,10 @@ pub(super) fn clipped_visibility(
         .filter(|o| o.corners().len() >= 3)
         .collect();
     let mut sums = Sums::default();
-    for (s, t) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-        let point = small.point(G[s], G[t]);
+    let side = 2 * cells;
+    let at = |k: u32| (f64::from(k / 2) + G[k as usize & 1]) / f64::from(cells);
+    for k in 0..side * side {
+        let point = small.point(at(k % side), at(k / side));
         if large.plane.distance(point) > 0.0 && target.corners().len() >= 3 {
             sums.look(point, small, large, &target, &between);
         }
@@ -46,7 +50,7 @@ pub(super) fn clipped_visibility(
         if a_looks { (over_small, over_large) } else { (over_large, over_small) };
     let (of_small, of_large) = sums.spreads(value);
     let (spread_a, spread_b) = if a_looks { (of_small, of_large) } else { (of_large, of_small) };
-    Visibility { value, gradient_a, gradient_b, spread_a, spread_b, segments: POINTS }
+    Visibility { value, gradient_a, gradient_b, spread_a, spread_b, segments: side * side }
 }
 
 /// Form factor from a point to the part of a convex polygon (wholly in front of the point's tangent
@@ -90,9 +94,6 @@ struct Sums {
     /// Sum over the points of their clear part squared over all.
     clear2: f64,
 }
-
-/// Points of the smaller end; each counts as a segment.
-const POINTS: u32 = 4;
 
 impl Sums {
     fn look(
@@ -239,7 +240,7 @@ mod tests {
         let half: Vec<DVec3> = [(0.0, -9.0), (9.0, -9.0), (9.0, 9.0), (0.0, 9.0)]
             .map(|(x, y)| DVec3::new(x, y, 0.5))
             .into();
-        let v = clipped_visibility(&a, &b, &[half]);
+        let v = clipped_visibility(&a, &b, &[half], 1);
         assert!((v.value - 0.5).abs() < 1e-3, "{v:?}");
         // Points further from the half plane see more.
         assert!(v.gradient_a.x < 0.0 && v.gradient_a.y.abs() < 1e-6, "{v:?}");
@@ -248,19 +249,19 @@ mod tests {
     #[test]
     fn overlapping_occluders_hide_their_union() {
         let (a, b) = (square(0.0, 0.0, 1.0, true), square(2.0, 0.0, 1.0, false));
-        let one = clipped_visibility(&a, &b, &[blocker(1.0, 0.2, 0.6)]).value;
+        let one = clipped_visibility(&a, &b, &[blocker(1.0, 0.2, 0.6)], 1).value;
         let twice =
-            clipped_visibility(&a, &b, &[blocker(1.0, 0.2, 0.6), blocker(1.0, 0.3, 0.5)]).value;
+            clipped_visibility(&a, &b, &[blocker(1.0, 0.2, 0.6), blocker(1.0, 0.3, 0.5)], 1).value;
         assert!((one - twice).abs() < 1e-12);
-        let more = clipped_visibility(&a, &b, &[blocker(1.0, 0.2, 0.6), blocker(0.5, 0.3, 0.8)]);
+        let more = clipped_visibility(&a, &b, &[blocker(1.0, 0.2, 0.6), blocker(0.5, 0.3, 0.8)], 1);
         assert!(more.value < one - 0.01);
     }
 
     #[test]
     fn an_occluder_over_everything_hides_everything_and_one_beside_nothing() {
         let (a, b) = (square(0.0, 0.0, 1.0, true), square(2.0, 0.0, 1.0, false));
-        assert_eq!(clipped_visibility(&a, &b, &[blocker(1.0, -9.0, 9.0)]).value, 0.0);
-        assert_eq!(clipped_visibility(&a, &b, &[blocker(1.0, 2.0, 3.0)]).value, 1.0);
-        assert_eq!(clipped_visibility(&a, &b, &[blocker(2.5, 0.0, 1.0)]).value, 1.0);
+        assert_eq!(clipped_visibility(&a, &b, &[blocker(1.0, -9.0, 9.0)], 1).value, 0.0);
+        assert_eq!(clipped_visibility(&a, &b, &[blocker(1.0, 2.0, 3.0)], 1).value, 1.0);
+        assert_eq!(clipped_visibility(&a, &b, &[blocker(2.5, 0.0, 1.0)], 1).value, 1.0);
     }
 }

@@ -61,7 +61,8 @@ pub fn meeting(a: &WorldElement, b: &WorldElement) -> Meeting {
 }
 
 /// (sum of the radii / distance)^2 below which the Gauss points are accurate to 0.2 %.
-const NEAR: f64 = 0.12;
+/// A value that quadtree elements of equal planes do not meet exactly.
+const NEAR: f64 = 0.1193;
 
 /// Exchange area of two elements that meet as `meeting` says, not [`Meeting::Away`].
 ///

@@ -186,9 +186,14 @@ pub fn visibility(
 /// Occluding polygons up to which partial visibility is found by clipping.
 const CLIPPED_MAX: usize = 12;
 
-/// Visibility of a pair by clipping, exact from four points, if at most twelve polygons stand in
+/// Visibility of a pair by clipping, exact from 2 x 2 points in each of `cells` x `cells` parts of
+/// its smaller end (each counts as a segment), if at most twelve polygons stand in
 /// its shaft; `None` if there are more. `candidates` must have been narrowed by this shaft.
-pub fn exact_visibility(shaft: &Shaft<'_>, candidates: &Candidates) -> Option<Visibility> {
+pub fn exact_visibility(
+    shaft: &Shaft<'_>,
+    candidates: &Candidates,
+    cells: u32,
+) -> Option<Visibility> {
     if candidates.is_empty() {
         return Some(Visibility::CLEAR);
     }
@@ -218,7 +223,7 @@ pub fn exact_visibility(shaft: &Shaft<'_>, candidates: &Candidates) -> Option<Vi
         }
     };
     let occluders: Vec<Vec<DVec3>> = polygons.into_iter().map(place).collect();
-    Some(clipped_visibility(a, b, &occluders))
+    Some(clipped_visibility(a, b, &occluders, cells))
 }
 
 /// Visibility of a punctual light (the second end of the shaft) from an element; `segments` come

@@ -116,7 +116,6 @@ fn the_hash_changes_when_something_moves_and_with_the_tolerance() {
 }
 
 #[test]
-#[ignore = "engine: bodies that never move are named too where their node is off the origin"]
 fn moved_names_what_moved_and_nothing_else() {
     let scene = Arc::new(lit_room());
     let mut s = session(&scene, &at_tolerance(0.3));

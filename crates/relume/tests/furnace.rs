@@ -129,7 +129,6 @@ fn near_enough_at_every_frame() {
 }
 
 #[test]
-#[ignore = "engine: patch means are off by up to 8e-3 at default tolerance"]
 fn within_a_thousandth_at_every_frame() {
     let mut session = Session::new(Arc::new(furnace(0.2)), Options::default()).unwrap();
     for frame in 0..=8 {

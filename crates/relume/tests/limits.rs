@@ -102,7 +102,6 @@ fn a_session_that_ran_out_of_memory_goes_on() {
 }
 
 #[test]
-#[ignore = "engine: a step that fails changes the solution that is kept"]
 fn a_session_that_ran_out_of_memory_keeps_its_last_solution_and_goes_on() {
     let scene = crowded_later();
     let mut session = Session::new(Arc::clone(&scene), tight(&scene)).unwrap();

@@ -247,7 +247,7 @@ impl Placed<'_> {
         {
             return passing(Verdict::Refine(side), v.segments);
         }
-        let stake = x.area_m2 / place_a.area.min(place_b.area) / threshold;
+        let stake = x.area_m2 / place_a.area.min(place_b.area) / threshold.max(FINEST);
         let v = self.settle(v, shaft, blockers, key, stake);
         carrying(Verdict::Link, &x, &v, (place_a, place_b))
     }
@@ -375,6 +375,9 @@ impl Placed<'_> {
 
 /// Spread of visibility that four points which agree may have overlooked.
 const UNSEEN: f64 = 0.05;
+
+/// Thresholds below this ask for no more points a link: elements shrink instead.
+const FINEST: f64 = 0.005;
 
 /// Stake times spread of visibility above which a link is clipped from more points.
 const CLOSER: f64 = 0.05;

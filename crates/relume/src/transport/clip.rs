@@ -62,11 +62,9 @@ pub fn visible_form_factor(
     target: &ConvexPolygon,
     occluders: &[ConvexPolygon],
 ) -> f64 {
-    let mut fragments = vec![*target];
-    for occluder in occluders {
-        fragments = without_pyramid(point, occluder, fragments);
-    }
-    fragments.iter().map(|f| form_factor_from_point(point, normal, f.corners())).sum()
+    let mut cutter = Cutter::default();
+    cutter.cut(point, target, occluders);
+    cutter.left.iter().map(|f| form_factor_from_point(point, normal, f.corners())).sum()
 }
 
 /// The part of an occluder in front of both ends' planes.
@@ -93,6 +91,7 @@ struct Sums {
     at_large_clear: DVec2,
     /// Sum over the points of their clear part squared over all.
     clear2: f64,
+    cutter: Cutter,
 }
 
 impl Sums {
@@ -106,16 +105,13 @@ impl Sums {
     ) {
         let normal = small.plane.normal;
         let all = form_factor_from_point(point, normal, target.corners());
-        let mut fragments = vec![*target];
-        for occluder in occluders {
-            fragments = without_pyramid(point, occluder, fragments);
-        }
+        self.cutter.cut(point, target, occluders);
         let at = small.offset(point);
         self.all += all;
         self.at_small += at * all;
         self.at_large += large.offset(centroid(target)) * all;
         let before = self.clear;
-        for fragment in &fragments {
+        for fragment in &self.cutter.left {
             let f = form_factor_from_point(point, normal, fragment.corners());
             self.clear += f;
             self.at_small_clear += at * f;
@@ -151,46 +147,72 @@ fn gradient(e: &WorldElement, at: DVec2, at_clear: DVec2, all: f64, clear: f64) 
     DVec2::new(shift.x * yy - shift.y * xy, shift.y * xx - shift.x * xy) / det
 }
 
-/// The fragments with the pyramid from `point` over `occluder` cut out.
-fn without_pyramid(
-    point: DVec3,
-    occluder: &ConvexPolygon,
-    fragments: Vec<ConvexPolygon>,
-) -> Vec<ConvexPolygon> {
-    let corners = occluder.corners();
-    // The pyramid's inside is in front of all planes, whichever way the polygon is seen.
-    let facing = occluder.area_vector2().dot(corners[0] - point);
-    if facing == 0.0 {
-        return fragments;
-    }
-    let sign = facing.signum();
-    let mut planes = [Plane { normal: DVec3::ZERO, offset: 0.0 }; ConvexPolygon::ROOM];
-    for (k, &p) in corners.iter().enumerate() {
-        let q = corners[(k + 1) % corners.len()];
-        // Unit length does not matter: only signs and ratios are used.
-        planes[k] = Plane::through(point, (p - point).cross(q - point) * sign);
-    }
-    let planes = &planes[..corners.len()];
-    let mut out = Vec::with_capacity(fragments.len() + 4);
-    for fragment in fragments {
-        let outside = |plane: &Plane| fragment.corners().iter().all(|&c| plane.distance(c) <= 0.0);
-        if planes.iter().any(outside) || out.len() > FRAGMENTS_MAX {
-            out.push(fragment);
-            continue;
-        }
-        let mut rest = fragment;
-        for plane in planes {
-            let (inside, beyond) = rest.split(plane);
-            if beyond.corners().len() >= 3 {
-                out.push(beyond);
+/// Cuts pyramids out of a polygon; its buffers serve many points.
+#[derive(Default)]
+struct Cutter {
+    /// The fragments that are left.
+    left: Vec<ConvexPolygon>,
+    next: Vec<ConvexPolygon>,
+    planes: Vec<Plane>,
+}
+
+impl Cutter {
+    /// Leaves what is seen of `target` from `point` past the occluders.
+    fn cut(&mut self, point: DVec3, target: &ConvexPolygon, occluders: &[ConvexPolygon]) {
+        self.left.clear();
+        self.left.push(*target);
+        for occluder in occluders {
+            if self.left.is_empty() || self.left.len() > FRAGMENTS_MAX {
+                return;
             }
-            rest = inside;
-            if rest.corners().len() < 3 {
-                break;
+            if self.raise_pyramid(point, occluder) && !self.misses(target) {
+                self.cut_pyramid();
             }
         }
     }
-    out
+
+    /// The sides of the pyramid from `point` over `occluder`, its inside in front of all; false
+    /// where the occluder is seen edge on.
+    fn raise_pyramid(&mut self, point: DVec3, occluder: &ConvexPolygon) -> bool {
+        let corners = occluder.corners();
+        let facing = occluder.area_vector2().dot(corners[0] - point);
+        self.planes.clear();
+        let mut p = corners[corners.len() - 1] - point;
+        for &corner in corners {
+            let q = corner - point;
+            // Unit length does not matter: only signs and ratios are used.
+            self.planes.push(Plane::through(point, p.cross(q) * facing.signum()));
+            p = q;
+        }
+        facing != 0.0
+    }
+
+    fn misses(&self, polygon: &ConvexPolygon) -> bool {
+        let outside = |plane: &Plane| polygon.corners().iter().all(|&c| plane.distance(c) <= 0.0);
+        self.planes.iter().any(outside)
+    }
+
+    fn cut_pyramid(&mut self) {
+        self.next.clear();
+        for k in 0..self.left.len() {
+            if self.misses(&self.left[k]) {
+                self.next.push(self.left[k]);
+                continue;
+            }
+            let mut rest = self.left[k];
+            for plane in &self.planes {
+                let (inside, beyond) = rest.split(plane);
+                if beyond.corners().len() >= 3 {
+                    self.next.push(beyond);
+                }
+                rest = inside;
+                if rest.corners().len() < 3 {
+                    break;
+                }
+            }
+        }
+        std::mem::swap(&mut self.left, &mut self.next);
+    }
 }
 
 fn centroid(polygon: &ConvexPolygon) -> DVec3 {

@@ -104,10 +104,12 @@ pub(crate) struct PictureOptions {
     pub(crate) mesh: bool,
 }
 
-/// The number of a frame, from its entry.
+/// The number of a frame, from its entry; an entry without a hash is none.
 #[derive(Deserialize)]
 struct Numbered {
     frame: u32,
+    #[serde(rename = "hash")]
+    _hash: String,
 }
 
 fn as_list<S: Serializer>(

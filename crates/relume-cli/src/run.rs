@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use indicatif::HumanBytes;
 use relume::scene::{BodyId, Scene};
 use relume::session::{Options, Oracle, Session, SessionError, Snapshot, Update};
-use relume_picture::export::write_glb;
+use relume_picture::export::{probe, write_glb};
 use relume_picture::picture::{self, Exposure, Settings, Viewpoint};
 
 use crate::args::{
@@ -132,10 +132,12 @@ impl Job {
             Session::new(Arc::new(scene), self.options_for(&report)).map_err(Failure::new)?;
         let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.solve.quiet);
         let mut run = Run { job: &self, session, camera, report, progress, links: 0 };
-        let outcome = run.frames(&pending);
+        let outcome = run.frames(&wanted, &pending);
         run.progress.clear();
         // Also where a frame failed: what was finished stays.
-        run.write_report()?;
+        if !run.report.frames.is_empty() {
+            run.write_report()?;
+        }
         let finished = wanted.iter().filter(|f| run.report.frames.contains_key(f)).count();
         match outcome? {
             Outcome::Interrupted => Err(self.interrupted(finished, wanted.len())),
@@ -168,8 +170,8 @@ impl Job {
         in_dir.into_iter().chain(self.solve.report.clone()).collect()
     }
 
-    /// The report of this run, with what an earlier one finished. Written at once: that proves that
-    /// it can be, and an older report no longer describes files that are about to be replaced.
+    /// The report of this run, with what an earlier one finished. An older report stays until a
+    /// frame is finished; that it can be replaced is tried at once.
     fn open_report(&self, scene: &Scene, threads: usize) -> Result<Report, Failure> {
         let summary = SceneSummary::new(scene, resume::content_hash(&self.scene)?);
         let mut report = Report::new(summary, self.run_options(threads));
@@ -180,7 +182,7 @@ impl Job {
             resume::take_over(&mut report, earlier, &paths[0], |f| self.picture_is_whole(f))?;
         }
         for path in &paths {
-            report.write(path)?;
+            probe(path).map_err(|error| Failure::write(path, &error))?;
         }
         Ok(report)
     }
@@ -216,9 +218,12 @@ impl Job {
         Some(self.dir.as_ref()?.join(format!("frame-{frame:04}.png")))
     }
 
-    /// Pictures appear whole or not at all, so being there is enough.
+    /// Whether a frame's picture is there and is a PNG from its first bytes to its last.
     fn picture_is_whole(&self, frame: u32) -> bool {
-        self.picture_path(frame).is_none_or(|path| path.is_file())
+        let whole = |bytes: Vec<u8>| {
+            bytes.starts_with(b"\x89PNG\r\n\x1a\n") && bytes.ends_with(b"IEND\xaeB`\x82")
+        };
+        self.picture_path(frame).is_none_or(|path| fs::read(path).is_ok_and(whole))
     }
 
     /// Pictures in the directory that no run described by the report has made.
@@ -304,8 +309,9 @@ struct Run<'a> {
 
 impl Run<'_> {
     /// Solves and draws the frames that are not finished yet, in order.
-    fn frames(&mut self, pending: &[u32]) -> Result<Outcome, Failure> {
-        let (mut written, mut interval) = (now(), REPORT_INTERVAL);
+    fn frames(&mut self, wanted: &[u32], pending: &[u32]) -> Result<Outcome, Failure> {
+        // The first finished frame is written down at once: an older report ends there.
+        let (mut written, mut interval) = (None::<Instant>, REPORT_INTERVAL);
         for &frame in pending {
             if interrupt::requested() {
                 return Ok(Outcome::Interrupted);
@@ -314,12 +320,14 @@ impl Run<'_> {
             if interrupt::requested() {
                 return Ok(Outcome::Interrupted);
             }
+            let before = wanted.iter().rev().find(|&&earlier| earlier < frame);
+            self.session.came_from(before.map(|&f| frames::time_of(f, self.job.solve.fps)));
             self.frame(frame)?;
             self.progress.finish_frame();
-            if written.elapsed() >= interval {
+            if written.is_none_or(|at| at.elapsed() >= interval) {
                 let before = now();
                 self.write_report()?;
-                written = now();
+                written = Some(now());
                 interval = REPORT_INTERVAL.max(before.elapsed() * REPORT_SHARE);
             }
         }

@@ -90,12 +90,27 @@ fn resuming_makes_what_is_missing_and_nothing_else() {
     let lost = fs::read(picture(0)).unwrap();
     fs::remove_file(picture(0)).unwrap();
     // Another picture in its place shows that it is not made again.
-    fs::write(picture(1), "kept").unwrap();
+    fs::write(picture(1), &lost).unwrap();
     let text = succeeded(&relume(&[&demo[..], &["0-2"]].concat()));
     assert!(text.starts_with("3 frames (1 finished before), "), "{text}");
     assert!(fs::read(picture(0)).unwrap() == lost, "the same frame, the same picture");
-    assert_eq!(fs::read(picture(1)).unwrap(), b"kept");
+    assert!(fs::read(picture(1)).unwrap() == lost);
     assert_eq!(frames_of(&report(dir.path())), [0, 1, 2]);
+    // The lamp moved between frames 1 and 2, although this run began with frame 0.
+    assert_eq!(report(dir.path())["frames"][2]["moved"], serde_json::json!(["lamp"]));
+
+    // What is no picture is made again, and what moved is still told.
+    fs::write(picture(2), "garbage").unwrap();
+    let text = succeeded(&relume(&[&demo[..], &["0-2"]].concat()));
+    assert!(text.starts_with("3 frames (2 finished before), "), "{text}");
+    assert!(fs::read(picture(2)).unwrap().starts_with(b"\x89PNG"));
+    assert_eq!(report(dir.path())["frames"][2]["moved"], serde_json::json!(["lamp"]));
+
+    // A run that fails before its first frame leaves the report of the last.
+    let before = fs::read(dir.path().join("report.json")).unwrap();
+    let small = ["demo", "room", "-o", out, "--frames", "0-2", "--max-memory", "100K"];
+    assert_eq!(relume(&small).status.code(), Some(1));
+    assert!(fs::read(dir.path().join("report.json")).unwrap() == before);
 
     let refused = relume(&[&demo[..], &["0-2", "--shading", "gouraud"]].concat());
     assert_eq!(refused.status.code(), Some(1));

@@ -9,8 +9,14 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// place of `path` in one step.
 ///
 /// A reader sees the old content or the new one, never a part. On failure the temporary file is
-/// removed and whatever stood at `path` stays.
+/// removed and whatever stood at `path` stays. A symbolic link is followed; what is neither a file
+/// nor a directory (a device, a pipe) is written to as it is.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let target = fs::canonicalize(path);
+    let path = target.as_deref().unwrap_or(path);
+    if fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+        return fs::OpenOptions::new().write(true).open(path)?.write_all(bytes);
+    }
     let temporary = temporary_beside(path)?;
     let written = fs::File::create_new(&temporary).and_then(|mut file| {
         file.write_all(bytes)?;
@@ -23,6 +29,21 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
         let _ = fs::remove_file(&temporary);
     }
     written
+}
+
+/// Whether [`write_atomically`] could write to `path` now: makes a temporary file beside it and
+/// takes it away again.
+pub fn probe(path: &Path) -> io::Result<()> {
+    let target = fs::canonicalize(path);
+    let path = target.as_deref().unwrap_or(path);
+    match fs::metadata(path) {
+        Ok(m) if m.is_dir() => return Err(io::Error::from(io::ErrorKind::IsADirectory)),
+        Ok(m) if !m.is_file() => return Ok(()),
+        _ => {}
+    }
+    let temporary = temporary_beside(path)?;
+    fs::File::create_new(&temporary)?;
+    fs::remove_file(&temporary)
 }
 
 /// A name in the directory of `path` that no other write uses: hidden, with the process's id and a
@@ -60,6 +81,23 @@ mod tests {
         write_atomically(&path, b"two").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"two");
         assert_eq!(names(dir.path()), ["a.txt"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_and_devices_stay_devices() {
+        let dir = tempfile::tempdir().unwrap();
+        let (file, link) = (dir.path().join("file"), dir.path().join("link"));
+        fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_atomically(&link, b"new").unwrap();
+        assert_eq!(fs::read(&file).unwrap(), b"new");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        let null = Path::new("/dev/null");
+        write_atomically(null, b"x").unwrap();
+        assert!(!fs::metadata(null).unwrap().is_file());
+        assert!(probe(null).is_ok() && probe(&file).is_ok() && probe(dir.path()).is_err());
+        assert_eq!(names(dir.path()), ["file", "link"]);
     }
 
     #[test]

@@ -28,7 +28,7 @@ use surfaces::LitForest;
 pub enum SessionError {
     /// The links of this tolerance do not fit into the memory allowed.
     #[error(
-        "frame {frame} at tolerance {tolerance} needs more than the {limit_bytes} bytes of memory allowed ({links} pairs so far): raise --max-memory or the tolerance"
+        "frame {frame} at tolerance {tolerance} needs more than the {limit_bytes} bytes of memory allowed ({links} pairs so far): raise --max-memory or the tolerance (with the form-factor oracle its EPS; where the scene has very many polygons, use fewer)"
     )]
     OutOfMemory {
         /// The frame being computed.
@@ -53,6 +53,8 @@ pub struct Session {
     /// The fixed part of the forest, where every build starts.
     seed: Forest,
     solved: Option<Solved>,
+    /// Time that `moved` compares with, where it is not that of the last step.
+    came_from: Option<f64>,
 }
 
 /// What the last step left.
@@ -80,7 +82,7 @@ impl Session {
     pub fn new(scene: Arc<Scene>, options: Options) -> Result<Session, SessionError> {
         options.validate()?;
         let seed = Forest::new(&scene);
-        Ok(Session { scene, options, simd: Simd::detect(), seed, solved: None })
+        Ok(Session { scene, options, simd: Simd::detect(), seed, solved: None, came_from: None })
     }
 
     /// The scene being solved.
@@ -120,6 +122,7 @@ impl Session {
         let solved = Solved { time_s, forest, view, tree, links, radiosity };
         tally::fill(&mut report, &self.scene, &solved, &work);
         report.seconds.total = clock.total();
+        self.came_from = None;
         self.solved = Some(solved);
         Ok(report)
     }
@@ -176,9 +179,20 @@ impl Session {
         SessionError::OutOfMemory { frame, tolerance, limit_bytes, links: tree.len() as u64 }
     }
 
+    /// Says at which time the frame before the next step was, where that is not the last step:
+    /// [`FrameReport::moved`] and [`FrameReport::dynamic_links`] count from there. Nothing else
+    /// depends on it.
+    pub fn came_from(&mut self, time_s: Option<f64>) {
+        self.came_from = time_s;
+    }
+
     fn moved_since_last(&self, time_s: f64) -> Vec<String> {
-        let Some(last) = &self.solved else { return Vec::new() };
-        let moved = |b: &usize| self.scene.pose(BodyId(*b as u32), time_s) != last.view.poses()[*b];
+        let last = self.came_from.or(self.solved.as_ref().map(|s| s.time_s));
+        let Some(last_s) = last else { return Vec::new() };
+        let moved = |b: &usize| {
+            let body = BodyId(*b as u32);
+            self.scene.pose(body, time_s) != self.scene.pose(body, last_s)
+        };
         (0..self.scene.bodies.len())
             .filter(moved)
             .map(|b| self.scene.bodies[b].name.clone())

@@ -14,7 +14,7 @@ mod topology;
 /// Reflectances from here on are reported: real paints stay below.
 const REFLECTANCE_HIGH: f64 = 0.95;
 /// Diagonals outside this range, in metres, are likely a mistaken unit.
-const DIAGONAL_M: (f64, f64) = (1e-3, 1e4);
+const DIAGONAL_M: (f64, f64) = (1e-2, 1e3);
 /// Exitance from here on is likely a mistaken unit, W/m2: a glowing filament has about this.
 const EXITANCE_HIGH: f64 = 1e6;
 /// The same for directional lights, W/m2: ten suns.

@@ -36,7 +36,7 @@ fn main() {
     );
     for (name, oracle, tolerance) in [
         ("form-factor 0.05", form_factor(0.05, 4e-3), 0.02),
-        ("form-factor 0.0145", form_factor(0.0145, 4e-4), 0.02),
+        ("form-factor 0.017", form_factor(0.017, 4e-4), 0.02),
         ("error 0.1", Oracle::Error, 0.1),
         ("error 0.02", Oracle::Error, 0.02),
         ("error 0.005", Oracle::Error, 0.005),

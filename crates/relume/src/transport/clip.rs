@@ -201,6 +201,9 @@ impl Cutter {
             }
             let mut rest = self.left[k];
             for plane in &self.planes {
+                if rest.corners().iter().all(|&c| plane.distance(c) >= 0.0) {
+                    continue;
+                }
                 let (inside, beyond) = rest.split(plane);
                 if beyond.corners().len() >= 3 {
                     self.next.push(beyond);

@@ -29,6 +29,7 @@ const SUN_HIGH: f64 = 1.4e4;
 /// | `open-object` | info | an object within it that is not closed |
 /// | `flipped-normals` | warning | neighbours that face opposite ways; closed objects inside out |
 /// | `duplicate` | warning | polygons that coincide |
+/// | `non-planar` | info | triangles that are nearly, but not quite, in one plane |
 /// | `reflectance` | warning | a reflectance of 0.95 or more |
 /// | `units` | warning | a size or a brightness that suggests a mistaken unit |
 ///

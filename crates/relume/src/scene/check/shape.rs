@@ -18,6 +18,39 @@ pub(super) fn shape(scene: &Scene, notes: &mut Vec<Note>) {
     turned(scene, &topology, notes);
     inside_out(scene, &topology, &parts, notes);
     duplicates(scene, &topology, notes);
+    bent(scene, &topology, notes);
+}
+
+/// Angles between neighbouring triangles, radians, that suggest a polygon that was meant to be flat.
+const BENT: (f64, f64) = (1e-5, 0.02);
+
+/// Triangles of one surface that meet at a very small angle: likely a polygon that is not planar,
+/// cut in two by the export. Merging leaves them apart, so the scene has more patches than meant.
+fn bent(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
+    let mut counts: BTreeMap<&str, (usize, f64)> = BTreeMap::new();
+    for group in &topology.sides {
+        let [one, two] = group[..] else { continue };
+        let patch = |side: &super::topology::Side| {
+            &scene.patches[topology.polygons[side.polygon as usize].patch.0 as usize]
+        };
+        let (a, b) = (patch(&one), patch(&two));
+        if a.surface != b.surface || a.corners.len() != 3 || b.corners.len() != 3 {
+            continue;
+        }
+        let angle = libm::asin(a.frame.normal.cross(b.frame.normal).length().min(1.0));
+        let alike = a.frame.normal.dot(b.frame.normal) > 0.0;
+        if alike && angle > BENT.0 && angle < BENT.1 {
+            let entry = counts.entry(object(scene, topology, one.polygon)).or_default();
+            *entry = (entry.0 + 1, entry.1.max(angle));
+        }
+    }
+    for (name, (count, angle)) in counts {
+        let message = format!(
+            "triangles meet at angles of up to {angle:.1e} radians, as the halves of polygons that are not \
+             planar do; each half is a patch of its own: make the polygons flat to have fewer"
+        );
+        notes.push(note(Severity::Info, "non-planar", name, count, message));
+    }
 }
 
 /// What hangs together along sides.

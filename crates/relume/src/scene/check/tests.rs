@@ -41,6 +41,22 @@ fn found(notes: &[Note], code: &str) -> Vec<(Severity, String, usize)> {
 }
 
 #[test]
+fn a_polygon_that_is_not_quite_flat_is_named() {
+    let bent = |lift: f64| {
+        notes(|b, _, grey| {
+            let node = b.node("sheet", None, DVec3::splat(0.6), DQuat::IDENTITY);
+            let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z) * 0.2;
+            b.polygon(node, "sheet", grey, &[at(0., 0., 0.), at(1., 0., 0.), at(1., 1., lift)]);
+            b.polygon(node, "sheet", grey, &[at(0., 0., 0.), at(1., 1., lift), at(0., 1., 0.)]);
+        })
+    };
+    let expected = vec![(Severity::Info, "sheet".to_owned(), 1)];
+    assert_eq!(found(&bent(0.003), "non-planar"), expected);
+    assert_eq!(found(&bent(0.0), "non-planar"), []);
+    assert_eq!(found(&bent(0.2), "non-planar"), []);
+}
+
+#[test]
 fn a_sound_room_has_no_findings() {
     assert_eq!(notes(|_, _, _| ()), []);
 }

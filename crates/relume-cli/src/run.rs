@@ -107,6 +107,8 @@ impl Job {
                 "give the directory of the earlier run with -o, or its report with --report",
             ));
         }
+        // Before anything runs in parallel: choosing a view does.
+        let threads = use_threads(self.solve.threads)?;
         let scene = scene_file::load(&self.scene, &self.solve.animation)?;
         let wanted =
             frames::resolve(self.solve.frames.as_ref(), scene.motion.duration_s, self.solve.fps)
@@ -118,7 +120,6 @@ impl Job {
         if !self.solve.quiet {
             scene_file::warn(&scene);
         }
-        let threads = use_threads(self.solve.threads)?;
         if let Some(dir) = &self.dir {
             make_directory(dir)?;
         }

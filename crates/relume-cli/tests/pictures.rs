@@ -80,6 +80,26 @@ fn parts_of_a_clip_match_the_whole() {
     assert_eq!(hash(&whole, 2), hash(&part, 0));
 }
 
+/// A scene without a camera, so that a view is chosen: that runs in parallel too.
+#[test]
+fn any_number_of_threads_gives_the_same_pictures_and_links() {
+    let scene = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../relume/tests/data/cornell_moving_box_and_lamp.glb"
+    );
+    let dir = tempfile::tempdir().unwrap();
+    let run = |threads: &str| {
+        let out = dir.path().join(threads);
+        let args = ["render", scene, "-o", out.to_str().unwrap(), "--frames", "60"];
+        let more = ["--threads", threads];
+        succeeded(&relume(&[&args[..], &more].concat()));
+        let hash = report(&out)["frames"][0]["hash"].clone();
+        (fs::read(out.join("frame-0060.png")).unwrap(), hash)
+    };
+    let one = run("1");
+    assert!(run("2") == one && run("8") == one);
+}
+
 #[test]
 fn resuming_makes_what_is_missing_and_nothing_else() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,0 +1,88 @@
+//! Form factors between the patches of a room with two bodies, as sums over links, against exact
+//! ones: clipped closed forms from a fine grid of points. Occlusion decides here; a wrong list of
+//! possible occluders shows in no mean, but here.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::{sliding, turn, v};
+use glam::{DQuat, DVec3};
+use relume::element::{WorldView, bilinear};
+use relume::geometry::{ConvexPolygon, Plane};
+use relume::scene::{PatchId, Scene, SceneBuilder};
+use relume::session::{Options, Session};
+use relume::transport::visible_form_factor;
+
+/// A cubical room (patches 0 to 5) with two boxes of six patches each.
+fn room() -> Scene {
+    let mut b = SceneBuilder::new("two boxes");
+    let one = b.material("one", [0.5; 3], [1.0; 3]);
+    let room = common::still(&mut b, "room");
+    b.cuboid_inward(room, "walls", one, DVec3::ZERO, DVec3::ONE);
+    let node = sliding(&mut b, "mover", v(0.3, 0.3, 0.4), v(0.6, 0.7, 0.6));
+    turn(&mut b, node, v(0.3, 1.0, 0.2), 1.5);
+    b.cuboid(node, "mover", one, DVec3::splat(-0.1), DVec3::splat(0.1));
+    let node = b.node("rester", None, v(0.7, 0.3, 0.3), DQuat::from_rotation_y(0.5));
+    b.cuboid(node, "rester", one, v(-0.15, -0.1, -0.1), v(0.15, 0.1, 0.1));
+    b.build().unwrap()
+}
+
+/// Points along each side of a patch.
+const GRID: u32 = 16;
+
+/// Form factor from a quadrilateral patch to another past all others.
+fn exact(view: &WorldView, from: PatchId, to: PatchId, patches: u32) -> f64 {
+    let (source, receiver) = (view.occluder(to), view.occluder(from));
+    let c: [DVec3; 4] = receiver.corners.try_into().unwrap();
+    let mut sum = 0.0;
+    for k in 0..GRID * GRID {
+        let at = |k: u32| (f64::from(k) + 0.5) / f64::from(GRID);
+        let point = bilinear(&c, at(k % GRID), at(k / GRID));
+        let tangent = Plane::through(point, receiver.plane.normal);
+        let seen = ConvexPolygon::new(source.corners).clipped(&tangent, 0.0);
+        if source.plane.distance(point) <= 0.0 || seen.corners().len() < 3 {
+            continue;
+        }
+        let between: Vec<ConvexPolygon> = (0..patches)
+            .map(PatchId)
+            .filter(|&p| p != from && p != to)
+            .map(|p| ConvexPolygon::new(view.occluder(p).corners))
+            .map(|o| o.clipped(&tangent, 0.0).clipped(&source.plane, 0.0))
+            .filter(|o| o.corners().len() >= 3)
+            .collect();
+        sum += visible_form_factor(point, receiver.plane.normal, &seen, &between);
+    }
+    sum / f64::from(GRID * GRID)
+}
+
+#[test]
+fn factors_between_patches_are_exact_to_a_thousandth_where_bodies_hide_each_other() {
+    let scene = Arc::new(room());
+    let patches = scene.patches.len() as u32;
+    let mut session = Session::new(Arc::clone(&scene), Options::default()).unwrap();
+    session.step(0, 0.0).unwrap();
+    let (tree, forest) = session.pairs();
+    let view = WorldView::new(&scene, forest, 0.0);
+    let mut factors = vec![0.0; (patches * patches) as usize];
+    for link in tree.links() {
+        let [a, b] = [link.a, link.b].map(|id| forest.patch(id).unwrap().0);
+        let exchange = f64::from(link.exchange_area_m2 * link.visibility);
+        for (from, to) in [(a, b), (b, a)] {
+            factors[(from * patches + to) as usize] +=
+                exchange / scene.patches[from as usize].area_m2();
+        }
+    }
+    let (mut worst, mut worst_row) = (0.0_f64, 0.0_f64);
+    // The bodies' faces: each is small beside what it sees, and sees the other body.
+    for from in 6..patches {
+        let row = &factors[(from * patches) as usize..((from + 1) * patches) as usize];
+        worst_row = worst_row.max((row.iter().sum::<f64>() - 1.0).abs());
+        for to in (0..patches).filter(|&to| to != from) {
+            let off = row[to as usize] - exact(&view, PatchId(from), PatchId(to), patches);
+            worst = worst.max(off.abs());
+        }
+    }
+    println!("largest error of a factor {worst:.1e}, of a row sum {worst_row:.1e}");
+    assert!(worst < 1e-3 && worst_row < 5e-4, "{worst} {worst_row}");
+}

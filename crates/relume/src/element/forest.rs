@@ -67,7 +67,6 @@ pub struct Forest {
     nodes: Vec<Node>,
     fixed_len: u32,
     /// Outline of each [`Kind::Polygon`] node and its id, ascending.
-    outlines: Vec<(u32, Vec<DVec2>)>,
     patch_roots: Vec<ElementId>,
     body_roots: Vec<ElementId>,
 }
@@ -78,7 +77,6 @@ impl Forest {
         let mut forest = Forest {
             nodes: Vec::new(),
             fixed_len: 0,
-            outlines: Vec::new(),
             patch_roots: vec![ElementId(NONE); scene.patches.len()],
             body_roots: vec![ElementId(NONE); scene.bodies.len()],
         };
@@ -159,7 +157,6 @@ impl Forest {
             return;
         }
         self.set(at, Kind::Polygon, patch);
-        self.outlines.push((at, corners.to_vec()));
         let (one, two) = split_convex(corners);
         let child = self.add_children(at, 2);
         self.plant_polygon(patch, &one, child);
@@ -195,7 +192,6 @@ impl Forest {
         for (node, sum) in self.nodes.iter_mut().zip(sums) {
             node.area_m2 = sum as f32;
         }
-        self.outlines.sort_by_key(|o| o.0);
     }
 
     /// The scene's node.
@@ -275,12 +271,6 @@ impl Forest {
     #[inline]
     pub fn shape(&self, id: ElementId) -> Shape {
         self.nodes[id.0 as usize].shape()
-    }
-
-    /// Outline of a [`Kind::Polygon`] node in its patch's frame.
-    pub fn outline(&self, id: ElementId) -> &[DVec2] {
-        let at = self.outlines.binary_search_by_key(&id.0, |o| o.0);
-        at.map_or(&[], |k| &self.outlines[k].1)
     }
 
     /// Index of the coarse element that holds this one, if coarse elements have been numbered.

@@ -105,6 +105,15 @@ pub fn bilinear(c: &[DVec3; 4], s: f64, t: f64) -> DVec3 {
         + c[3] * ((1.0 - s) * t)
 }
 
+/// Area vector of a quadrilateral's surface element at `(s, t)`: its length is the Jacobian of
+/// [`bilinear`], m2, and it points to the front.
+#[inline]
+pub fn bilinear_area(c: &[DVec3; 4], s: f64, t: f64) -> DVec3 {
+    let ds = (c[1] - c[0]) * (1.0 - t) + (c[2] - c[3]) * t;
+    let dt = (c[3] - c[0]) * (1.0 - s) + (c[2] - c[1]) * s;
+    ds.cross(dt)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

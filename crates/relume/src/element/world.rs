@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::forest::{ElementId, Forest, Kind};
-use super::split::bilinear;
+use super::split::{Shape, bilinear};
 use crate::geometry::{Aabb, Plane, Pose};
 use crate::scene::{BodyId, Frame, LightKind, PatchId, Scene};
 
@@ -280,6 +280,15 @@ impl WorldElement {
     pub fn offset(&self, p: DVec3) -> DVec2 {
         let d = p - self.centre;
         DVec2::new(d.dot(self.axes[0]), d.dot(self.axes[1]))
+    }
+
+    /// The relative gradient, 1/m, of a linear density over the element whose centre of mass is
+    /// `shift` away from the centroid (plane coordinates, metres).
+    pub fn gradient_of_shift(&self, shift: DVec2) -> DVec2 {
+        let corners = self.corners.map(|c| self.offset(c));
+        let [xx, xy, yy] = Shape { corners, len: self.len }.second_moment();
+        let det = (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
+        DVec2::new(shift.x * yy - shift.y * xy, shift.y * xx - shift.x * xy) / det
     }
 
     /// Signed distances of the corners from a plane: smallest and largest, metres.

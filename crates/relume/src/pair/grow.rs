@@ -105,8 +105,6 @@ pub struct Work {
     pub segments: u64,
     /// Elements made.
     pub elements_made: u64,
-    /// Largest scratch memory, bytes.
-    pub scratch_bytes: u64,
 }
 
 /// Pairs judged by one task.
@@ -150,7 +148,6 @@ pub fn resume<J: Judge>(
                 apply(tree, judge, chunk, &mut next, &mut held, work);
             }
             let scratch = wave.memory_bytes() + next.memory_bytes() + held.memory_bytes();
-            work.scratch_bytes = work.scratch_bytes.max(scratch);
             if !may_go_on(tree, judge.element_count(), scratch) {
                 return None;
             }

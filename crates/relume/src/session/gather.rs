@@ -4,7 +4,9 @@ use glam::DVec3;
 
 use crate::element::{ElementId, Forest, Kind, WorldElement};
 use crate::geometry::{Aabb, ConvexPolygon, Plane, shaft_meets_box};
-use crate::transport::{form_factor_from_point, light_at, segment_is_clear, visible_form_factor};
+use crate::transport::{
+    CLIPPED_MAX, form_factor_from_point, light_at, segment_is_clear, visible_form_factor,
+};
 
 use super::{Session, Solved};
 
@@ -70,9 +72,6 @@ impl Session {
         look.at(&ConvexPolygon::new(&e.corners[..e.len]), SPLITS)
     }
 }
-
-/// Polygons in the way up to which a part of an element is clipped exactly.
-const CLIPPED_MAX: usize = 12;
 
 /// Halvings of an element with more polygons in the way; then its middle decides.
 const SPLITS: u32 = 6;

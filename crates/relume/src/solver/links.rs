@@ -15,7 +15,7 @@ pub struct Link {
 
 impl Link {
     /// Steps of a gradient in one.
-    pub const STEPS: f32 = 4096.0;
+    pub const STEPS: f32 = crate::pair::Gradients::STEPS;
 }
 
 /// For each receiver the sources it gathers from and the coupling V X / A_receiver.

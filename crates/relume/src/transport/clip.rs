@@ -6,13 +6,11 @@
 
 use glam::{DVec2, DVec3};
 
+use super::kernel::G;
 use super::point::form_factor_from_point;
 use super::visibility::Visibility;
-use crate::element::{Shape, WorldElement};
+use crate::element::WorldElement;
 use crate::geometry::{ConvexPolygon, Plane};
-
-/// Parameters of the two Gauss-Legendre points on [0, 1].
-const G: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 /// Fragments after which what is left is taken as it is: a guard, never met with few occluders.
 const FRAGMENTS_MAX: usize = 256;
@@ -140,11 +138,7 @@ fn gradient(e: &WorldElement, at: DVec2, at_clear: DVec2, all: f64, clear: f64) 
     if clear <= 1e-12 * all {
         return DVec2::ZERO;
     }
-    let shift = at_clear / clear - at / all;
-    let corners = e.corners.map(|c| e.offset(c));
-    let [xx, xy, yy] = Shape { corners, len: e.len }.second_moment();
-    let det = (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
-    DVec2::new(shift.x * yy - shift.y * xy, shift.y * xx - shift.x * xy) / det
+    e.gradient_of_shift(at_clear / clear - at / all)
 }
 
 /// Cuts pyramids out of a polygon; its buffers serve many points.

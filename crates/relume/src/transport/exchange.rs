@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 
 use super::kernel::{GaussPoints, Simd, kernel_grid};
 use super::point::{PointBundle, form_factors_from_points};
-use crate::element::{WorldElement, WorldLight, bilinear};
+use crate::element::{WorldElement, WorldLight, bilinear, bilinear_area};
 use crate::geometry::ConvexPolygon;
 use crate::scene::LightKind;
 
@@ -205,9 +205,7 @@ impl Looker<'_> {
         let mut weights = [0.0; 16];
         for k in 0..16 {
             let ((s, ws), (t, wt)) = (G4[k & 3], G4[k >> 2]);
-            let ds = (quad[1] - quad[0]) * (1.0 - t) + (quad[2] - quad[3]) * t;
-            let dt = (quad[3] - quad[0]) * (1.0 - s) + (quad[2] - quad[1]) * s;
-            weights[k] = ws * wt * ds.cross(dt).dot(normal);
+            weights[k] = ws * wt * bilinear_area(quad, s, t).dot(normal);
             let p = bilinear(quad, s, t);
             (points.x[k], points.y[k], points.z[k]) = (p.x, p.y, p.z);
         }
@@ -245,10 +243,7 @@ pub fn light_exchange(light: &WorldLight, e: &WorldElement) -> Exchange {
     let mut fit = Fit::default();
     for (s, ws) in G4 {
         for (t, wt) in G4 {
-            let c = &e.corners;
-            let ds = (c[1] - c[0]) * (1.0 - t) + (c[2] - c[3]) * t;
-            let dt = (c[3] - c[0]) * (1.0 - s) + (c[2] - c[1]) * s;
-            let weight = ws * wt * ds.cross(dt).dot(e.plane.normal);
+            let weight = ws * wt * bilinear_area(&e.corners, s, t).dot(e.plane.normal);
             let point = e.point(s, t);
             fit.add(e.offset(point), weight, light_at(light, point, e.plane.normal));
         }

@@ -7,7 +7,7 @@ use std::f64::consts::FRAC_1_PI;
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
 
-use crate::element::WorldElement;
+use crate::element::{WorldElement, bilinear_area};
 
 /// The instruction set chosen at run time.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +27,7 @@ impl Simd {
 }
 
 /// Parameters of the two Gauss-Legendre points on [0, 1].
-const G: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+pub(super) const G: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 /// The 2 x 2 Gauss points of an element and their shares of its area.
 #[derive(Clone, Copy, Debug)]
@@ -56,9 +56,7 @@ impl GaussPoints {
             let p = e.point(s, t);
             (out.x[k], out.y[k], out.z[k]) = (p.x, p.y, p.z);
             if !even {
-                let ds = (c[1] - c[0]) * (1.0 - t) + (c[2] - c[3]) * t;
-                let dt = (c[3] - c[0]) * (1.0 - s) + (c[2] - c[1]) * s;
-                out.share[k] = ds.cross(dt).dot(e.plane.normal);
+                out.share[k] = bilinear_area(c, s, t).dot(e.plane.normal);
                 sum += out.share[k];
             }
         }

@@ -15,5 +15,6 @@ pub use kernel::Simd;
 pub use point::form_factor_from_point;
 pub use segments::{SEGMENTS, SegmentBundle};
 pub use visibility::{
-    Candidates, Shaft, Visibility, exact_visibility, light_visibility, segment_is_clear, visibility,
+    CLIPPED_MAX, Candidates, Shaft, Visibility, exact_visibility, light_visibility,
+    segment_is_clear, visibility,
 };

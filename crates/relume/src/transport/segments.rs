@@ -6,7 +6,7 @@ use fearless_simd::dispatch;
 use glam::DVec3;
 
 use super::kernel::Simd;
-use crate::element::{OccluderPolygon, WorldElement};
+use crate::element::{OccluderPolygon, WorldElement, bilinear_area};
 
 /// Segments in a bundle.
 pub const SEGMENTS: usize = 16;
@@ -27,6 +27,9 @@ pub struct SegmentBundle {
     /// Quadrant of the second element each segment ends in, 0 to 3.
     pub quadrant_b: [u8; SEGMENTS],
 }
+
+/// How far polygons reach over their edges, in slacks: neighbours leave no gap between them.
+pub(super) const EDGE_OVERLAP: f64 = 1e-5;
 
 /// The k-th point of the (0, m, 2)-net of van der Corput and Sobol, as `bits`-bit integers.
 fn net_point(k: u32, bits: u32) -> (u32, u32) {
@@ -103,8 +106,8 @@ impl SegmentBundle {
         self.weight[k] = kernel * jacobian(a, sa, ta) * jacobian(b, sb, tb);
     }
 
-    /// Segments from a light to an element: the light is a point or infinitely far along
-    /// `-toward_light`; `weights` come with them.
+    /// Segments from points of an element to a light: `end` tells where the one from a point ends,
+    /// `weigh` what it stands for (irradiance of a unit light there).
     pub fn to_light(
         e: &WorldElement,
         key: u64,
@@ -132,7 +135,7 @@ impl SegmentBundle {
     ///
     /// A segment that comes no closer than `slack_m` to the other side of the plane does not
     /// cross it. Edges are shared to the last bit but one: a segment through a shared edge is
-    /// blocked by at least one of the two polygons (they overlap by 1e-12 of the distance).
+    /// blocked by at least one of the two polygons (they overlap by a 100,000th of the slack).
     pub fn blocked_by(&self, simd: Simd, polygon: &OccluderPolygon<'_>, slack_m: f64) -> u16 {
         dispatch!(simd.level(), _simd => self.blocked(polygon, slack_m))
     }
@@ -157,7 +160,7 @@ impl SegmentBundle {
         }
         for edge in polygon.edges {
             let m = edge.normal;
-            let give = 1e-12 * (edge.offset.abs() + 1e-3);
+            let give = EDGE_OVERLAP * slack_m;
             for k in 0..SEGMENTS {
                 let x = self.px[k] + t[k] * self.dx[k];
                 let y = self.py[k] + t[k] * self.dy[k];
@@ -176,10 +179,7 @@ impl SegmentBundle {
 
 #[inline]
 fn jacobian(e: &WorldElement, s: f64, t: f64) -> f64 {
-    let c = &e.corners;
-    let ds = (c[1] - c[0]) * (1.0 - t) + (c[2] - c[3]) * t;
-    let dt = (c[3] - c[0]) * (1.0 - s) + (c[2] - c[1]) * s;
-    ds.cross(dt).dot(e.plane.normal)
+    bilinear_area(&e.corners, s, t).dot(e.plane.normal)
 }
 
 #[cfg(test)]

@@ -1,13 +1,13 @@
 //! Partial visibility of a pair: which bodies stand in its shaft, and which of its fixed
 //! segments they block.
 
-use crate::element::{ElementId, Forest, Kind, Shape, WorldElement, WorldView};
+use crate::element::{ElementId, Forest, Kind, WorldElement, WorldView};
 use crate::geometry::{Aabb, Pose, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
 use super::clip::clipped_visibility;
 use super::kernel::Simd;
-use super::segments::{SEGMENTS, SegmentBundle};
+use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use glam::{DVec2, DVec3};
 
 /// Nodes of the forest's fixed part that may stand between the two ends of a pair: clusters and
@@ -184,7 +184,7 @@ pub fn visibility(
 }
 
 /// Occluding polygons up to which partial visibility is found by clipping.
-const CLIPPED_MAX: usize = 12;
+pub const CLIPPED_MAX: usize = 12;
 
 /// Visibility of a pair by clipping, exact from 2 x 2 points in each of `cells` x `cells` parts of
 /// its smaller end (each counts as a segment), if at most twelve polygons stand in
@@ -273,11 +273,7 @@ impl SideTally {
         if clear <= 0.0 {
             return DVec2::ZERO;
         }
-        let shift = self.clear_moment / clear - self.moment / total;
-        let corners = e.corners.map(|c| e.offset(c));
-        let [xx, xy, yy] = Shape { corners, len: e.len }.second_moment();
-        let det = (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
-        DVec2::new(shift.x * yy - shift.y * xy, shift.y * xx - shift.x * xy) / det
+        e.gradient_of_shift(self.clear_moment / clear - self.moment / total)
     }
 
     fn spread(&self, value: f64) -> f64 {
@@ -355,5 +351,5 @@ fn crosses(view: &WorldView, patch: PatchId, p: DVec3, q: DVec3, slack_m: f64) -
         return false;
     }
     let x = p + (q - p) * (s0 / (s0 - s1));
-    occluder.edges.iter().all(|e| e.distance(x) >= -1e-12 * (e.offset.abs() + 1e-3))
+    occluder.edges.iter().all(|e| e.distance(x) >= -EDGE_OVERLAP * slack_m)
 }

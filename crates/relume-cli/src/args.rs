@@ -161,8 +161,8 @@ pub(crate) struct SolveFlags {
     /// form-factor=0.02,0.001.
     #[arg(long, value_name = "ORACLE", default_value = "error")]
     pub(crate) oracle: OracleFlag,
-    /// How the links follow the motion: `scratch` builds them anew in every frame.
-    #[arg(long, value_name = "STRATEGY", value_enum, default_value = "scratch")]
+    /// How the links follow the motion; the links of a frame are the same either way.
+    #[arg(long, value_name = "STRATEGY", value_enum, default_value = "reinspect")]
     pub(crate) update: UpdateFlag,
     /// Threads to use; the result has the same bits for any number [default: all cores].
     #[arg(long, value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
@@ -251,6 +251,8 @@ pub(crate) enum OracleFlag {
 /// `--update`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum UpdateFlag {
+    /// Look again at the pairs that the motion may concern, and at no other.
+    Reinspect,
     /// Rebuild everything in every frame.
     Scratch,
 }
@@ -374,6 +376,7 @@ impl UpdateFlag {
     /// The name on the command line and in the report.
     pub(crate) fn name(self) -> &'static str {
         match self {
+            UpdateFlag::Reinspect => "reinspect",
             UpdateFlag::Scratch => "scratch",
         }
     }

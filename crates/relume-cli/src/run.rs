@@ -155,6 +155,7 @@ impl Job {
             },
         };
         let update = match self.solve.update {
+            UpdateFlag::Reinspect => Update::Reinspect,
             UpdateFlag::Scratch => Update::Scratch,
         };
         Options {

@@ -67,7 +67,7 @@ fn factors_between_patches_are_exact_to_a_thousandth_where_bodies_hide_each_othe
     let mut factors = vec![0.0; (patches * patches) as usize];
     for link in tree.links() {
         let [a, b] = [link.a, link.b].map(|id| forest.patch(id).unwrap().0);
-        let exchange = f64::from(link.exchange_area_m2 * link.visibility);
+        let exchange = f64::from(link.exchange_area_m2() * link.visibility());
         for (from, to) in [(a, b), (b, a)] {
             factors[(from * patches + to) as usize] +=
                 exchange / scene.patches[from as usize].area_m2();

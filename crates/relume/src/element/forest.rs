@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::{DVec2, DVec3};
 
 use super::clusters::{Branch, binary_tree};
-use super::split::Shape;
+use super::split::{Chart, Place, Shape};
 use crate::geometry::{Aabb, split_convex};
 use crate::scene::{BodyId, PatchId, Scene};
 
@@ -24,6 +24,8 @@ pub enum Kind {
     Element,
     /// A punctual light: it has no area and receives nothing.
     Light,
+    /// Nothing: room of elements that were reaped, to be used again.
+    Vacant,
 }
 
 /// The name of an element that does not depend on history: its facet and the path below it.
@@ -35,22 +37,21 @@ pub struct ElementKey {
     pub path: u32,
 }
 
-/// 64 bytes.
+/// 44 bytes.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    /// In the patch's frame. Neighbours share these values exactly, so they tile without gaps.
-    corners: [[f32; 2]; 4],
+    /// Where an element lies within its facet.
+    place: Place,
     parent: u32,
     first_child: u32,
-    /// Patch, light or body, depending on the kind; `u32::MAX` for groups of bodies.
-    subject: u32,
     facet: u32,
     path: u32,
     coarse: u32,
+    /// Pairs that are refined on this element.
+    users: u32,
     area_m2: f32,
     child_count: u16,
     kind: Kind,
-    corner_count: u8,
 }
 
 const NONE: u32 = u32::MAX;
@@ -61,14 +62,37 @@ const LEVELS_MAX: u32 = 15;
 /// All elements of a scene.
 ///
 /// Nodes with ids below [`Forest::fixed_len`] (clusters, lights, polygons and facets) are a pure
-/// function of the scene; quadtree elements come and go above them.
+/// function of the scene; quadtree elements come and go above them. Which of these exist follows
+/// from the pairs that are refined on them; their ids depend on history, their names do not.
 #[derive(Clone, Debug)]
 pub struct Forest {
     nodes: Vec<Node>,
     fixed_len: u32,
-    /// Outline of each [`Kind::Polygon`] node and its id, ascending.
+    /// Elements with ids below this are never reaped.
+    kept_len: u32,
+    /// Patch, light or body of each node of the fixed part; `NONE` for groups of bodies.
+    subjects: Vec<u32>,
+    /// Geometry of each facet, by id; of no meaning for the rest of the fixed part.
+    charts: Vec<Chart>,
     patch_roots: Vec<ElementId>,
     body_roots: Vec<ElementId>,
+    facets: Vec<ElementId>,
+    /// First ids of vacant groups of two and of four.
+    vacant: [Vec<u32>; 2],
+    /// Elements that lost their last user.
+    loose: Vec<u32>,
+    /// Elements whose children came or went since [`Forest::take_changed`].
+    changed: Vec<ElementId>,
+    counts: Counts,
+}
+
+/// How many elements there are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Elements, at all levels.
+    pub elements: u64,
+    /// Elements without children.
+    pub leaves: u64,
 }
 
 impl Forest {
@@ -77,28 +101,45 @@ impl Forest {
         let mut forest = Forest {
             nodes: Vec::new(),
             fixed_len: 0,
+            kept_len: 0,
+            subjects: Vec::new(),
+            charts: Vec::new(),
             patch_roots: vec![ElementId(NONE); scene.patches.len()],
             body_roots: vec![ElementId(NONE); scene.bodies.len()],
+            facets: Vec::new(),
+            vacant: [Vec::new(), Vec::new()],
+            loose: Vec::new(),
+            changed: Vec::new(),
+            counts: Counts::default(),
         };
-        forest.nodes.push(blank(Kind::Cluster, NONE, NONE));
+        forest.push_fixed(Kind::Cluster, NONE, 1);
         let lights = scene.lights.len() as u32;
         let children = u32::from(!scene.patches.is_empty()) + lights;
-        forest.nodes.extend((0..children).map(|_| blank(Kind::Light, 0, NONE)));
+        forest.push_fixed(Kind::Light, 0, children);
         forest.nodes[0].first_child = 1;
         forest.nodes[0].child_count = u16::try_from(children).expect("fewer than 65,536 lights");
-        for (k, node) in forest.nodes[(1 + children - lights) as usize..].iter_mut().enumerate() {
-            node.subject = k as u32;
-            node.path = 1;
-        }
-        for id in (1 + children - lights)..=children {
-            forest.nodes[id as usize].facet = id;
+        let first_light = 1 + children - lights;
+        for (light, id) in (first_light..=children).enumerate() {
+            forest.subjects[id as usize] = light as u32;
+            let node = &mut forest.nodes[id as usize];
+            (node.facet, node.path) = (id, 1);
         }
         if !scene.patches.is_empty() {
             forest.plant_bodies(scene, 1);
         }
         forest.fixed_len = forest.nodes.len() as u32;
+        forest.kept_len = forest.fixed_len;
         forest.sum_areas();
         forest
+    }
+
+    fn push_fixed(&mut self, kind: Kind, parent: u32, count: u32) -> u32 {
+        let first = self.nodes.len() as u32;
+        let len = self.nodes.len() + count as usize;
+        self.nodes.resize(len, blank(kind, parent));
+        self.subjects.resize(len, NONE);
+        self.charts.resize(len, Chart::of(&Shape { corners: [DVec2::ZERO; 4], len: 4 }));
+        first
     }
 
     fn plant_bodies(&mut self, scene: &Scene, at: u32) {
@@ -150,10 +191,13 @@ impl Forest {
         if corners.len() <= 4 {
             self.set(at, Kind::Element, patch);
             let shape = Shape::new(corners);
+            self.charts[at as usize] = Chart::of(&shape);
             let node = &mut self.nodes[at as usize];
-            node.facet = at;
-            node.path = 1;
-            node.set_shape(&shape);
+            (node.facet, node.path, node.place) = (at, 1, Place::whole(shape.len));
+            node.area_m2 = shape.area() as f32;
+            self.facets.push(ElementId(at));
+            self.counts.elements += 1;
+            self.counts.leaves += 1;
             return;
         }
         self.set(at, Kind::Polygon, patch);
@@ -164,14 +208,12 @@ impl Forest {
     }
 
     fn set(&mut self, at: u32, kind: Kind, subject: u32) {
-        let node = &mut self.nodes[at as usize];
-        node.kind = kind;
-        node.subject = subject;
+        self.nodes[at as usize].kind = kind;
+        self.subjects[at as usize] = subject;
     }
 
     fn add_children(&mut self, at: u32, count: u16) -> u32 {
-        let first = self.nodes.len() as u32;
-        self.nodes.extend((0..u32::from(count)).map(|_| blank(Kind::Cluster, at, NONE)));
+        let first = self.push_fixed(Kind::Cluster, at, u32::from(count));
         let node = &mut self.nodes[at as usize];
         node.first_child = first;
         node.child_count = count;
@@ -183,7 +225,7 @@ impl Forest {
         for id in (0..self.nodes.len()).rev() {
             let node = &self.nodes[id];
             if node.kind == Kind::Element {
-                sums[id] = node.shape().area();
+                sums[id] = self.shape(ElementId(id as u32)).area();
             }
             if node.parent != NONE {
                 sums[node.parent as usize] += sums[id];
@@ -197,7 +239,7 @@ impl Forest {
     /// The scene's node.
     pub const ROOT: ElementId = ElementId(0);
 
-    /// Nodes alive.
+    /// Room for nodes: ids are below this; some may be vacant.
     pub fn len(&self) -> usize {
         self.nodes.len()
     }
@@ -212,9 +254,26 @@ impl Forest {
         self.fixed_len
     }
 
+    /// Ids below this are never reaped.
+    pub fn kept_len(&self) -> u32 {
+        self.kept_len
+    }
+
+    /// How many elements there are.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// The quadtree roots, ascending.
+    pub fn facets(&self) -> &[ElementId] {
+        &self.facets
+    }
+
     /// Bytes held.
     pub fn memory_bytes(&self) -> u64 {
-        (self.nodes.capacity() * size_of::<Node>()) as u64
+        let fixed = self.charts.capacity() * size_of::<Chart>() + self.subjects.capacity() * 4;
+        let lists = self.vacant.iter().map(Vec::capacity).sum::<usize>() + self.loose.capacity();
+        (self.nodes.capacity() * size_of::<Node>() + fixed + lists * 4) as u64
     }
 
     /// What the node is.
@@ -250,14 +309,32 @@ impl Forest {
     #[inline]
     pub fn patch(&self, id: ElementId) -> Option<PatchId> {
         let node = &self.nodes[id.0 as usize];
-        matches!(node.kind, Kind::Element | Kind::Polygon).then_some(PatchId(node.subject))
+        match node.kind {
+            Kind::Element => Some(PatchId(self.subjects[node.facet as usize])),
+            Kind::Polygon => Some(PatchId(self.subjects[id.0 as usize])),
+            _ => None,
+        }
+    }
+
+    /// The node of the fixed part that an element is in; the node itself for any other.
+    #[inline]
+    pub fn fixed(&self, id: ElementId) -> ElementId {
+        if id.0 < self.fixed_len { id } else { ElementId(self.nodes[id.0 as usize].facet) }
     }
 
     /// Index of a light in the scene.
     #[inline]
     pub fn light(&self, id: ElementId) -> Option<usize> {
+        let is_light = self.nodes[id.0 as usize].kind == Kind::Light;
+        is_light.then(|| self.subjects[id.0 as usize] as usize)
+    }
+
+    /// The body of a cluster; `None` for groups of bodies and for what is no cluster.
+    #[inline]
+    pub fn cluster_body(&self, id: ElementId) -> Option<BodyId> {
         let node = &self.nodes[id.0 as usize];
-        (node.kind == Kind::Light).then_some(node.subject as usize)
+        let subject = *self.subjects.get(id.0 as usize)?;
+        (node.kind == Kind::Cluster && subject != NONE).then_some(BodyId(subject))
     }
 
     /// The name of an element or light that does not depend on history.
@@ -270,7 +347,8 @@ impl Forest {
     /// Corners of an element in its patch's frame.
     #[inline]
     pub fn shape(&self, id: ElementId) -> Shape {
-        self.nodes[id.0 as usize].shape()
+        let node = &self.nodes[id.0 as usize];
+        self.charts[node.facet as usize].shape(&node.place)
     }
 
     /// Index of the coarse element that holds this one, if coarse elements have been numbered.
@@ -278,6 +356,14 @@ impl Forest {
     pub fn coarse(&self, id: ElementId) -> Option<usize> {
         let coarse = self.nodes[id.0 as usize].coarse;
         (coarse != NONE).then_some(coarse as usize)
+    }
+
+    /// Whether this is one of the coarse elements itself, not a part of one.
+    #[inline]
+    pub fn is_coarse_root(&self, id: ElementId) -> bool {
+        let node = &self.nodes[id.0 as usize];
+        node.coarse != NONE
+            && (node.parent == NONE || self.nodes[node.parent as usize].coarse == NONE)
     }
 
     /// Makes `id` the coarse element number `index`; elements made below it later inherit it.
@@ -302,66 +388,118 @@ impl Forest {
         self.nodes[id.0 as usize].child_count > 0 || path.leading_zeros() > 31 - 2 * LEVELS_MAX + 1
     }
 
-    /// The children of an element, made if it is a leaf. Areas of the children sum to the
-    /// parent's up to single precision. Returns the ids and whether they are new.
+    /// Everything that exists now stays for good.
+    pub fn keep_all(&mut self) {
+        self.kept_len = self.nodes.len() as u32;
+        self.changed.clear();
+    }
+
+    /// The children of an element, made if it is a leaf, with one more user. Areas of the children
+    /// sum to the parent's up to single precision. Returns the ids and whether they are new.
     ///
     /// # Panics
     /// If `id` is no element or has no room below it.
     pub fn split(&mut self, id: ElementId) -> (Range<u32>, bool) {
+        self.nodes[id.0 as usize].users += 1;
         let node = self.nodes[id.0 as usize];
         if node.child_count > 0 {
             return (self.children(id), false);
         }
         assert!(node.kind == Kind::Element && self.can_split(id), "{id:?} cannot be split");
-        let shapes = node.shape().children();
-        let first = self.nodes.len() as u32;
-        for (k, shape) in shapes.iter().enumerate() {
-            let mut child = blank(Kind::Element, id.0, node.subject);
+        let chart = self.charts[node.facet as usize];
+        let (places, count) = node.place.children(chart.len, chart.shape(&node.place).cut());
+        let first = self.room_for(count);
+        for (k, place) in places[..count].iter().enumerate() {
+            let mut child = blank(Kind::Element, id.0);
             child.facet = node.facet;
             child.path = node.path << 2 | k as u32;
             child.coarse = node.coarse;
-            child.set_shape(shape);
-            self.nodes.push(child);
+            child.place = *place;
+            child.area_m2 = chart.shape(place).area() as f32;
+            self.nodes[first as usize + k] = child;
         }
         let parent = &mut self.nodes[id.0 as usize];
         parent.first_child = first;
-        parent.child_count = shapes.len() as u16;
+        parent.child_count = count as u16;
+        self.counts.elements += count as u64;
+        self.counts.leaves += count as u64 - 1;
+        self.changed.push(id);
         (self.children(id), true)
     }
-}
 
-impl Node {
-    fn shape(&self) -> Shape {
-        let corner = |k: usize| {
-            let [x, y] = self.corners[k];
-            DVec2::new(f64::from(x), f64::from(y))
-        };
-        Shape {
-            corners: [corner(0), corner(1), corner(2), corner(3)],
-            len: self.corner_count as usize,
+    fn room_for(&mut self, count: usize) -> u32 {
+        self.vacant[count / 4].pop().unwrap_or_else(|| {
+            let first = self.nodes.len();
+            self.nodes.resize(first + count, blank(Kind::Vacant, NONE));
+            first as u32
+        })
+    }
+
+    /// Takes back one use of an element's children; [`Forest::reap`] removes what has none left.
+    ///
+    /// # Panics
+    /// If there is no user.
+    pub fn release(&mut self, id: ElementId) {
+        let users = &mut self.nodes[id.0 as usize].users;
+        *users = users.checked_sub(1).expect("released more often than split");
+        if *users == 0 {
+            self.loose.push(id.0);
         }
     }
 
-    fn set_shape(&mut self, shape: &Shape) {
-        self.corners = shape.corners.map(|c| [c.x as f32, c.y as f32]);
-        self.corner_count = shape.len as u8;
-        self.area_m2 = self.shape().area() as f32;
+    /// Removes the children of elements that lost their last user; returns how many.
+    pub fn reap(&mut self) -> u64 {
+        let mut reaped = 0;
+        for id in std::mem::take(&mut self.loose) {
+            let node = &self.nodes[id as usize];
+            if node.users == 0 && node.kind == Kind::Element {
+                reaped += self.remove_children(ElementId(id));
+            }
+        }
+        reaped
+    }
+
+    fn remove_children(&mut self, id: ElementId) -> u64 {
+        let children = self.children(id);
+        if children.is_empty() || children.start < self.kept_len {
+            return 0;
+        }
+        let mut count = children.len() as u64;
+        self.counts.elements -= count;
+        self.counts.leaves -= count - 1;
+        for child in children.clone() {
+            debug_assert_eq!(
+                self.nodes[child as usize].users, 0,
+                "a child outlives its parent's pair"
+            );
+            count += self.remove_children(ElementId(child));
+            self.nodes[child as usize] = blank(Kind::Vacant, NONE);
+        }
+        self.vacant[children.len() / 4].push(children.start);
+        self.nodes[id.0 as usize].child_count = 0;
+        self.changed.push(id);
+        count
+    }
+
+    /// Elements whose children came or went since the last call; some may be vacant by now, some
+    /// may be named twice.
+    pub fn take_changed(&mut self) -> Vec<ElementId> {
+        std::mem::take(&mut self.changed)
     }
 }
 
-fn blank(kind: Kind, parent: u32, subject: u32) -> Node {
+fn blank(kind: Kind, parent: u32) -> Node {
     Node {
-        corners: [[0.0; 2]; 4],
+        place: Place::whole(4),
         parent,
         first_child: NONE,
-        subject,
         facet: NONE,
         path: 0,
         coarse: NONE,
+        users: 0,
         area_m2: 0.0,
         child_count: 0,
         kind,
-        corner_count: 0,
     }
 }
 

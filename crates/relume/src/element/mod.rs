@@ -8,6 +8,6 @@ mod forest;
 mod split;
 mod world;
 
-pub use forest::{ElementId, ElementKey, Forest, Kind};
+pub use forest::{Counts, ElementId, ElementKey, Forest, Kind};
 pub use split::{Shape, bilinear, bilinear_area};
 pub use world::{OccluderPolygon, WorldElement, WorldLight, WorldPatch, WorldView};

@@ -59,40 +59,158 @@ impl Shape {
         self.corners.iter().map(|c| (*c - m).length_squared()).fold(0.0, f64::max).sqrt()
     }
 
-    /// The two or four children, tiling this shape, in canonical order.
-    pub fn children(&self) -> Vec<Shape> {
-        if self.len == 3 { self.triangle_children() } else { self.quad_children() }
+    /// How this shape is cut so that its children are well shaped.
+    pub(super) fn cut(&self) -> Cut {
+        if self.len == 3 { self.triangle_cut() } else { self.quad_cut() }
     }
 
-    fn quad_children(&self) -> Vec<Shape> {
+    fn quad_cut(&self) -> Cut {
         let [a, b, c, d] = self.corners;
         let (ab, bc, cd, da) = ((a + b) * 0.5, (b + c) * 0.5, (c + d) * 0.5, (d + a) * 0.5);
         let along = (bc - da).length();
         let across = (cd - ab).length();
-        let quad = |p, q, r, s| Shape { corners: [p, q, r, s], len: 4 };
         if along > ELONGATED * across {
-            vec![quad(a, ab, cd, d), quad(ab, b, c, cd)]
+            Cut::AcrossS
         } else if across > ELONGATED * along {
-            vec![quad(a, b, bc, da), quad(da, bc, c, d)]
+            Cut::AcrossT
         } else {
-            let m = (ab + cd) * 0.5;
-            vec![quad(a, ab, m, da), quad(ab, b, bc, m), quad(m, bc, c, cd), quad(da, m, cd, d)]
+            Cut::Quarters
         }
     }
 
-    fn triangle_children(&self) -> Vec<Shape> {
+    fn triangle_cut(&self) -> Cut {
         let [a, b, c, _] = self.corners;
-        let tri = |p, q, r| Shape { corners: [p, q, r, r], len: 3 };
         let edges = [(b - a).length_squared(), (c - b).length_squared(), (a - c).length_squared()];
         let longest = (0..3).fold(0, |m, k| if edges[k] > edges[m] { k } else { m });
-        if edges[longest] > SLENDER * self.area() {
-            let v = [a, b, c];
-            let (p, q, r) = (v[longest], v[(longest + 1) % 3], v[(longest + 2) % 3]);
-            let m = (p + q) * 0.5;
-            return vec![tri(p, m, r), tri(m, q, r)];
+        if edges[longest] > SLENDER * self.area() { Cut::Edge(longest) } else { Cut::Quarters }
+    }
+}
+
+/// Ways to cut an element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Cut {
+    /// In four.
+    Quarters,
+    /// A quadrilateral in two, halving its first parameter.
+    AcrossS,
+    /// A quadrilateral in two, halving its second parameter.
+    AcrossT,
+    /// A triangle in two, from the middle of this edge.
+    Edge(usize),
+}
+
+/// Where an element lies within its facet, in steps of 2^-15 of the facet's parameters: two
+/// opposite corners (s0, t0, s1, t1) in a quadrilateral, all three in a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place([u16; 6]);
+
+/// Steps in one.
+const ONE: u16 = 1 << 15;
+
+impl Place {
+    /// The whole facet.
+    pub(super) fn whole(corner_count: usize) -> Place {
+        if corner_count == 3 {
+            Place([0, 0, ONE, 0, 0, ONE])
+        } else {
+            Place([0, 0, ONE, ONE, 0, 0])
         }
-        let (ab, bc, ca) = ((a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5);
-        vec![tri(a, ab, ca), tri(ab, b, bc), tri(ca, bc, c), tri(bc, ca, ab)]
+    }
+
+    /// Parameters of the corners; a triangle repeats its last.
+    #[inline]
+    pub(super) fn corners(&self, corner_count: usize) -> [DVec2; 4] {
+        let [a, b, c, d, e, f] = self.0.map(|x| f64::from(x) * (1.0 / ONE as f64));
+        let v = DVec2::new;
+        if corner_count == 3 {
+            [v(a, b), v(c, d), v(e, f), v(e, f)]
+        } else {
+            [v(a, b), v(c, b), v(c, d), v(a, d)]
+        }
+    }
+
+    /// Places of the children, in canonical order.
+    pub(super) fn children(&self, corner_count: usize, cut: Cut) -> ([Place; 4], usize) {
+        if corner_count == 3 { self.triangle_children(cut) } else { self.quad_children(cut) }
+    }
+
+    fn quad_children(&self, cut: Cut) -> ([Place; 4], usize) {
+        let [s0, t0, s1, t1, ..] = self.0;
+        let (s, t) = (middle(s0, s1), middle(t0, t1));
+        let place = |s0, t0, s1, t1| Place([s0, t0, s1, t1, 0, 0]);
+        match cut {
+            Cut::AcrossS => {
+                let two = [place(s0, t0, s, t1), place(s, t0, s1, t1)];
+                ([two[0], two[1], two[1], two[1]], 2)
+            }
+            Cut::AcrossT => {
+                let two = [place(s0, t0, s1, t), place(s0, t, s1, t1)];
+                ([two[0], two[1], two[1], two[1]], 2)
+            }
+            Cut::Quarters | Cut::Edge(_) => (
+                [
+                    place(s0, t0, s, t),
+                    place(s, t0, s1, t),
+                    place(s, t, s1, t1),
+                    place(s0, t, s, t1),
+                ],
+                4,
+            ),
+        }
+    }
+
+    fn triangle_children(&self, cut: Cut) -> ([Place; 4], usize) {
+        let [a0, a1, b0, b1, c0, c1] = self.0;
+        let corners = [[a0, a1], [b0, b1], [c0, c1]];
+        let half = |k: usize, l: usize| [0, 1].map(|x| middle(corners[k][x], corners[l][x]));
+        let place =
+            |p: [u16; 2], q: [u16; 2], r: [u16; 2]| Place([p[0], p[1], q[0], q[1], r[0], r[1]]);
+        if let Cut::Edge(k) = cut {
+            let (p, q, r) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
+            let m = half(k, (k + 1) % 3);
+            let two = [place(p, m, r), place(m, q, r)];
+            return ([two[0], two[1], two[1], two[1]], 2);
+        }
+        let [a, b, c] = corners;
+        let (ab, bc, ca) = (half(0, 1), half(1, 2), half(2, 0));
+        ([place(a, ab, ca), place(ab, b, bc), place(ca, bc, c), place(bc, ca, ab)], 4)
+    }
+}
+
+/// Exact: after n of at most 15 cuts all parameters are multiples of 2^(15 - n) steps.
+fn middle(x: u16, y: u16) -> u16 {
+    ((u32::from(x) + u32::from(y)) / 2) as u16
+}
+
+/// The map from a facet's parameters to its patch's frame: `origin + e s + f t + g s t`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Chart {
+    origin: DVec2,
+    e: DVec2,
+    f: DVec2,
+    g: DVec2,
+    /// Corners of the facet.
+    pub(super) len: usize,
+}
+
+impl Chart {
+    /// The chart of a facet.
+    pub(super) fn of(facet: &Shape) -> Chart {
+        let [a, b, c, d] = facet.corners;
+        let (e, f, g) = match facet.len {
+            3 => (b - a, c - a, DVec2::ZERO),
+            _ => (b - a, d - a, (a - b) + (c - d)),
+        };
+        // What is left of the twist of a parallelogram is rounding.
+        let even = g.length_squared() <= 1e-24 * (e.length_squared() + f.length_squared());
+        Chart { origin: a, e, f, g: if even { DVec2::ZERO } else { g }, len: facet.len }
+    }
+
+    /// The element at a place. Neighbours get the same values at shared corners, bit for bit.
+    #[inline]
+    pub(super) fn shape(&self, place: &Place) -> Shape {
+        let at = |p: DVec2| self.origin + self.e * p.x + self.f * p.y + self.g * (p.x * p.y);
+        Shape { corners: place.corners(self.len).map(at), len: self.len }
     }
 }
 
@@ -118,8 +236,14 @@ pub fn bilinear_area(c: &[DVec3; 4], s: f64, t: f64) -> DVec3 {
 mod tests {
     use super::*;
 
+    fn children(shape: &Shape) -> Vec<Shape> {
+        let chart = Chart::of(shape);
+        let (places, count) = Place::whole(shape.len).children(shape.len, shape.cut());
+        places[..count].iter().map(|p| chart.shape(p)).collect()
+    }
+
     fn check_tiling(shape: Shape, count: usize) {
-        let children = shape.children();
+        let children = children(&shape);
         assert_eq!(children.len(), count);
         let sum: f64 = children.iter().map(Shape::area).sum();
         assert!((sum - shape.area()).abs() < 1e-14 * shape.area());
@@ -137,11 +261,26 @@ mod tests {
     }
 
     #[test]
+    fn the_chart_meets_the_corners_of_its_facet() {
+        let v = DVec2::new;
+        for corners in [
+            vec![v(0.3, 0.1), v(1., 0.), v(1.1, 1.), v(0., 0.9)],
+            vec![v(-1., 2.), v(3., 2.5), v(0.2, 4.)],
+        ] {
+            let shape = Shape::new(&corners);
+            let again = Chart::of(&shape).shape(&Place::whole(shape.len));
+            for (p, q) in shape.corners.iter().zip(again.corners) {
+                assert!((*p - q).length() < 1e-15, "{p} {q}");
+            }
+        }
+    }
+
+    #[test]
     fn slender_shapes_become_rounder() {
         let v = DVec2::new;
         let mut needle = Shape::new(&[v(0., 0.), v(20., 0.), v(20., 1.), v(0., 1.)]);
         for _ in 0..5 {
-            needle = needle.children()[0];
+            needle = children(&needle)[0];
         }
         let [a, b, _, d] = needle.corners;
         assert!((b - a).length() / (d - a).length() < 2.0);

@@ -5,9 +5,9 @@ use glam::{DVec2, DVec3};
 use super::forest::{ElementId, Forest, Kind};
 use super::split::{Shape, bilinear};
 use crate::geometry::{Aabb, Plane, Pose};
-use crate::scene::{BodyId, Frame, LightKind, PatchId, Scene};
+use crate::scene::{BodyId, Frame, Light, LightKind, PatchId, Scene};
 
-/// Rounding of element corners: they are kept in single precision relative to their patch.
+/// Relative rounding of what files hold: coordinates in single precision.
 const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
 
 /// A patch's plane, in its body's frame and in the world.
@@ -19,7 +19,7 @@ pub struct WorldPatch {
     pub world: Frame,
     /// The body it rides on.
     pub body: BodyId,
-    /// How far an element corner of this patch may be off its exact place, metres.
+    /// How far a corner of this patch may be off its exact place, metres.
     pub rounding_m: f64,
 }
 
@@ -40,6 +40,8 @@ pub struct WorldView {
     patches: Vec<WorldPatch>,
     poses: Vec<Option<Pose>>,
     boxes: Vec<Aabb>,
+    local_boxes: Vec<Aabb>,
+    far_m: f64,
     world: Occluders,
     local: Occluders,
     lights: Vec<Option<WorldLight>>,
@@ -48,7 +50,7 @@ pub struct WorldView {
 }
 
 /// A punctual light at one instant.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorldLight {
     /// Where it is, metres.
     pub position: DVec3,
@@ -103,17 +105,25 @@ impl WorldView {
         let patches = scene.patches.iter().map(|p| world_patch(p, &poses)).collect();
         let still = vec![Some(Pose::IDENTITY); poses.len()];
         let world = Occluders::of(scene, &poses);
+        let local = Occluders::of(scene, &still);
         let boxes = boxes(forest, &poses, &world, scene);
         WorldView {
             patches,
+            far_m: far(boxes[Forest::ROOT.0 as usize].diagonal()),
             boxes,
+            local_boxes: self::boxes(forest, &still, &local, scene),
             world,
-            local: Occluders::of(scene, &still),
+            local,
             lights: scene.lights.iter().map(|l| world_light(scene, l, time_s)).collect(),
             present: poses.iter().map(Option::is_some).collect(),
             hidden_twin: hidden_twins(scene),
             poses,
         }
+    }
+
+    /// A punctual light at `time_s`, `None` while absent.
+    pub fn light_at(scene: &Scene, light: &Light, time_s: f64) -> Option<WorldLight> {
+        world_light(scene, light, time_s)
     }
 
     /// World pose of each body, `None` while absent.
@@ -137,6 +147,18 @@ impl WorldView {
     #[inline]
     pub fn fixed_box(&self, id: ElementId) -> &Aabb {
         &self.boxes[id.0 as usize]
+    }
+
+    /// Box of a node of the fixed part within one body, in that body's frame.
+    #[inline]
+    pub fn box_in_body(&self, id: ElementId) -> &Aabb {
+        &self.local_boxes[id.0 as usize]
+    }
+
+    /// A distance that leads out of the scene from anywhere in it, metres: a power of two, so that
+    /// it seldom changes.
+    pub fn far_m(&self) -> f64 {
+        self.far_m
     }
 
     /// Whether a body is there at all.
@@ -165,6 +187,18 @@ impl WorldView {
     }
 }
 
+/// The power of two above 1.5 diagonals.
+fn far(diagonal_m: f64) -> f64 {
+    let mut far = 1.0;
+    while far < 1.5 * diagonal_m {
+        far *= 2.0;
+    }
+    while far >= 3.0 * diagonal_m && far > f64::MIN_POSITIVE {
+        far *= 0.5;
+    }
+    far
+}
+
 fn hidden_twins(scene: &Scene) -> Vec<bool> {
     let twin_is_first =
         |(i, p): (usize, &crate::scene::Patch)| p.twin.is_some_and(|t| (t.0 as usize) < i);
@@ -188,7 +222,7 @@ fn world_patch(patch: &crate::scene::Patch, poses: &[Option<Pose>]) -> WorldPatc
     }
 }
 
-fn world_light(scene: &Scene, light: &crate::scene::Light, time_s: f64) -> Option<WorldLight> {
+fn world_light(scene: &Scene, light: &Light, time_s: f64) -> Option<WorldLight> {
     let pose = scene.motion.pose(light.node, time_s)?;
     Some(WorldLight {
         position: pose.translation,

@@ -33,6 +33,12 @@ impl Aabb {
         Aabb { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
 
+    /// This box grown by a margin on all sides; an empty one stays empty.
+    #[inline]
+    pub fn grown(self, margin_m: f64) -> Aabb {
+        Aabb { lo: self.lo - margin_m, hi: self.hi + margin_m }
+    }
+
     /// Whether nothing is inside.
     pub fn is_empty(&self) -> bool {
         !self.lo.cmple(self.hi).all()

@@ -50,6 +50,12 @@ impl Brightness {
         forest.coarse(id).map_or(Light::UNIFORM, |c| self.coarse[c])
     }
 
+    /// Which coarse elements, by number, have another brightness than in `other`.
+    pub fn differences(&self, other: &Brightness) -> Vec<bool> {
+        let of = |k: usize| other.coarse.get(k);
+        (0..self.coarse.len()).map(|k| of(k) != self.coarse.get(k)).collect()
+    }
+
     /// Area at which an element weighs 1 in the error norm, m2.
     pub fn reference_area_m2(&self) -> f64 {
         self.reference_area_m2

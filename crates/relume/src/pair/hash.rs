@@ -1,8 +1,8 @@
 //! Names of pairs as numbers, and a hash over sets of links.
 
-use crate::element::{ElementKey, Forest};
+use crate::element::ElementKey;
 
-use super::tree::Pair;
+use super::tree::{Carried, Gradients};
 
 /// A number that depends on the names of the two ends and on nothing else.
 #[inline]
@@ -29,20 +29,14 @@ fn mix(x: u64) -> u64 {
 pub struct PairHash(u128);
 
 impl PairHash {
-    /// Adds a link.
-    pub fn add(&mut self, forest: &Forest, pair: &Pair) {
-        self.0 = self.0.wrapping_add(hash_of(forest, pair));
+    /// Adds a link; `key` is its [`pair_key`].
+    pub fn add(&mut self, key: u64, carried: &Carried) {
+        self.0 = self.0.wrapping_add(hash_of(key, carried));
     }
 
     /// Takes a link away that was added before.
-    pub fn remove(&mut self, forest: &Forest, pair: &Pair) {
-        self.0 = self.0.wrapping_sub(hash_of(forest, pair));
-    }
-
-    /// Both sets together.
-    #[must_use]
-    pub fn merged(self, other: PairHash) -> PairHash {
-        PairHash(self.0.wrapping_add(other.0))
+    pub fn remove(&mut self, key: u64, carried: &Carried) {
+        self.0 = self.0.wrapping_sub(hash_of(key, carried));
     }
 }
 
@@ -52,12 +46,11 @@ impl std::fmt::Display for PairHash {
     }
 }
 
-fn hash_of(forest: &Forest, pair: &Pair) -> u128 {
-    let key = pair_key(forest.key(pair.a), forest.key(pair.b));
-    let x = u64::from(pair.exchange_area_m2.to_bits());
-    let v = u64::from(pair.visibility.to_bits());
-    let [[au, av], [bu, bv]] = [pair.gradients.over_a, pair.gradients.over_b];
-    let gradients = [au, av, bu, bv].iter().fold(0, |sum, &g| sum << 16 | u64::from(g as u16));
+fn hash_of(key: u64, carried: &Carried) -> u128 {
+    let x = u64::from(carried.exchange_area_m2.to_bits());
+    let v = u64::from(carried.visibility);
+    let Gradients { over_a: [au, av], over_b: [bu, bv] } = carried.gradients;
+    let gradients = [au, av, bu, bv].iter().fold(0, |sum, &g| sum << 8 | u64::from(g as u8));
     let low = mix(key ^ mix(x << 32 | v) ^ mix(gradients).rotate_left(7));
     let high = mix(low ^ key.rotate_left(31));
     u128::from(high) << 64 | u128::from(low)

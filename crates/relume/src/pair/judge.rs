@@ -4,19 +4,20 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use crate::element::{ElementId, Forest, Kind, WorldElement, WorldLight, WorldView};
+use crate::element::{ElementId, ElementKey, Forest, Kind, WorldElement, WorldLight, WorldView};
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
-use crate::scene::LightKind;
+use crate::scene::{BodyId, LightKind, PatchId};
 use crate::transport::{
     Exchange, Meeting, SEGMENTS, SegmentBundle, Shaft, Simd, Visibility, exact_visibility,
     exchange, light_at, light_exchange, light_visibility, meeting, visibility,
 };
 
 use super::brightness::Brightness;
-use super::grow::{Hierarchy, Judge, Judgement, Verdict};
 use super::hash::pair_key;
 use super::oracle::{End, Oracle, Side, estimate};
-use super::tree::{CullReason, Gradients};
+use super::since::Since;
+use super::tree::{Carried, CullReason, Gradients};
+use super::update::{Hierarchy, Judge, Judgement, Stale, Verdict};
 
 /// How far pairs are decided.
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +40,8 @@ pub struct Placed<'a> {
     pub oracle: Oracle,
     /// Vector instructions.
     pub simd: Simd,
+    /// What happened since the last update; `None` where there was none.
+    pub since: Option<&'a Since<'a>>,
 }
 
 impl Hierarchy for Placed<'_> {
@@ -53,8 +56,18 @@ impl Hierarchy for Placed<'_> {
         }
     }
 
+    fn release(&mut self, id: ElementId) {
+        if self.forest.kind(id) == Kind::Element {
+            self.forest.release(id);
+        }
+    }
+
+    fn key(&self, id: ElementId) -> ElementKey {
+        self.forest.key(id)
+    }
+
     fn element_count(&self) -> usize {
-        self.forest.len()
+        self.forest.counts().elements as usize
     }
 }
 
@@ -74,17 +87,28 @@ impl Judge for Placed<'_> {
             _ => self.judge_groups(a, b, candidates, narrowed),
         }
     }
+
+    fn stale(&self, a: ElementId, b: ElementId) -> Stale {
+        let Some(since) = self.since else { return Stale::Moved };
+        let brightness = match self.stage {
+            Stage::Fine(_) => since.brightness(self.forest, a, b),
+            Stage::Coarse => Stale::Nothing,
+        };
+        match since.geometry(self.forest, self.view, a, b) {
+            Stale::Nothing => brightness,
+            moved => moved,
+        }
+    }
+
+    fn holds(&self, a: ElementId, b: ElementId) -> bool {
+        let at_level = |id| self.forest.is_coarse_root(id) || self.forest.kind(id) == Kind::Light;
+        at_level(a) && at_level(b)
+    }
 }
 
 /// A verdict of which the numbers do not matter.
 fn passing(verdict: Verdict, segments: u32) -> Judgement {
-    Judgement {
-        verdict,
-        exchange_area_m2: 0.0,
-        visibility: 0.0,
-        gradients: Gradients::default(),
-        segments,
-    }
+    Judgement { verdict, carried: Carried::default(), segments }
 }
 
 fn culled(reason: CullReason) -> Judgement {
@@ -98,16 +122,13 @@ fn carrying(
     v: &Visibility,
     (a, b): (&WorldElement, &WorldElement),
 ) -> Judgement {
-    Judgement {
-        verdict,
-        exchange_area_m2: x.area_m2 as f32,
-        visibility: v.value as f32,
-        gradients: Gradients::new(
-            (x.over_a.gradient + v.gradient_a, a.radius),
-            (x.over_b.gradient + v.gradient_b, b.radius),
-        ),
-        segments: v.segments,
-    }
+    let gradients = Gradients::new(
+        (x.over_a.gradient + v.gradient_a, a.radius),
+        (x.over_b.gradient + v.gradient_b, b.radius),
+    );
+    let visibility = (v.value * 65_535.0).round() as u16;
+    let carried = Carried { exchange_area_m2: x.area_m2 as f32, visibility, gradients };
+    Judgement { verdict, carried, segments: v.segments }
 }
 
 impl Placed<'_> {
@@ -138,7 +159,8 @@ impl Placed<'_> {
         if self.box_is_behind(a, box_b) || self.box_is_behind(b, box_a) {
             return culled(CullReason::FacingAway);
         }
-        narrow_boxes(self.view, self.forest, (box_a, box_b), candidates, narrowed);
+        let body = self.body_of(a).filter(|&body| self.body_of(b) == Some(body));
+        BoxShaft::new(self.view, self.forest, (a, b), body).narrow(candidates, narrowed);
         let size = |id: ElementId, bounds: &Aabb| match self.forest.kind(id) {
             Kind::Element => -1.0,
             _ => bounds.diagonal(),
@@ -184,24 +206,31 @@ impl Placed<'_> {
         } else {
             self.shaft((&own_a, &own_b), None, patches)
         };
-        let mut blockers = Vec::new();
-        shaft.narrow(candidates, &mut blockers);
-        let judgement = self.decide((a, b), (&own_a, &own_b), met, &shaft, &blockers);
-        narrowed.extend(blockers);
-        judgement
+        let start = narrowed.len();
+        shaft.narrow(candidates, narrowed);
+        let candidates = &narrowed[start..];
+        if self.is_above_coarse(a, b) {
+            return passing(Verdict::Refine(self.larger_above_coarse(a, b)), 0);
+        }
+        self.decide((a, b), (&own_a, &own_b), met, &shaft, candidates)
     }
 
     fn shaft<'a>(
         &'a self,
         (a, b): (&'a WorldElement, &'a WorldElement),
-        own: Option<(crate::scene::BodyId, &'a WorldElement, &'a WorldElement)>,
-        patches: (crate::scene::PatchId, crate::scene::PatchId),
+        own: Option<(BodyId, &'a WorldElement, &'a WorldElement)>,
+        patches: (PatchId, PatchId),
     ) -> Shaft<'a> {
         Shaft { forest: self.forest, view: self.view, a, b, own, patches }
     }
 
-    fn patch_of(&self, id: ElementId) -> crate::scene::PatchId {
+    fn patch_of(&self, id: ElementId) -> PatchId {
         self.forest.patch(id).expect("elements have patches")
+    }
+
+    /// The one body that a node belongs to.
+    fn body_of(&self, id: ElementId) -> Option<BodyId> {
+        body_of(self.forest, self.view, id)
     }
 
     fn decide(
@@ -210,13 +239,8 @@ impl Placed<'_> {
         (place_a, place_b): (&WorldElement, &WorldElement),
         met: Meeting,
         shaft: &Shaft<'_>,
-        blockers: &[u32],
+        candidates: &[u32],
     ) -> Judgement {
-        if let Stage::Coarse = self.stage
-            && let Some(side) = self.above_coarse(a, b)
-        {
-            return passing(Verdict::Refine(side), 0);
-        }
         let key = pair_key(self.forest.key(a), self.forest.key(b));
         let x = exchange(self.simd, place_a, place_b, met);
         if let (Oracle::FormFactor { epsilon, min_area_m2 }, Stage::Fine(_)) =
@@ -229,8 +253,9 @@ impl Placed<'_> {
                 return passing(Verdict::Refine(side), 0);
             }
         }
-        let v = exact_visibility(shaft, blockers, 1)
-            .unwrap_or_else(|| visibility(self.simd, shaft, blockers, key, 4));
+        let blockers = shaft.blockers(candidates);
+        let v = exact_visibility(shaft, &blockers, 1)
+            .unwrap_or_else(|| visibility(self.simd, shaft, &blockers, key, 4));
         let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
         else {
             let verdict = match self.stage {
@@ -248,7 +273,7 @@ impl Placed<'_> {
             return passing(Verdict::Refine(side), v.segments);
         }
         let stake = x.area_m2 / place_a.area.min(place_b.area) / threshold.max(FINEST);
-        let v = self.settle(v, shaft, blockers, key, stake);
+        let v = self.settle(v, shaft, &blockers, key, stake);
         carrying(Verdict::Link, &x, &v, (place_a, place_b))
     }
 
@@ -258,7 +283,7 @@ impl Placed<'_> {
         &self,
         v: Visibility,
         shaft: &Shaft<'_>,
-        blockers: &[u32],
+        blockers: &[PatchId],
         key: u64,
         stake: f64,
     ) -> Visibility {
@@ -281,18 +306,19 @@ impl Placed<'_> {
         Visibility { segments: v.segments + again.segments, ..again }
     }
 
-    /// The side that is above the coarse level, if one is; the larger first.
-    fn above_coarse(&self, a: ElementId, b: ElementId) -> Option<Side> {
-        let above = |id| self.forest.coarse(id).is_none();
-        match (above(a), above(b)) {
-            (true, false) => Some(Side::A),
-            (false, true) => Some(Side::B),
-            (false, false) => None,
-            (true, true) => Some(if self.forest.area_m2(a) >= self.forest.area_m2(b) {
-                Side::A
-            } else {
-                Side::B
-            }),
+    /// Whether an end is above the level at which the coarse solution links.
+    fn is_above_coarse(&self, a: ElementId, b: ElementId) -> bool {
+        matches!(self.oracle, Oracle::Error { .. })
+            && (self.forest.coarse(a).is_none() || self.forest.coarse(b).is_none())
+    }
+
+    /// The side above the coarse level; the larger if both are.
+    fn larger_above_coarse(&self, a: ElementId, b: ElementId) -> Side {
+        match (self.forest.coarse(a), self.forest.coarse(b)) {
+            (None, Some(_)) => Side::A,
+            (Some(_), None) => Side::B,
+            _ if self.forest.area_m2(a) >= self.forest.area_m2(b) => Side::A,
+            _ => Side::B,
         }
     }
 
@@ -341,14 +367,17 @@ impl Placed<'_> {
         if x.area_m2 <= 0.0 {
             return culled(CullReason::FacingAway);
         }
-        let place = LightPlace::new(lamp, &e, self.view.fixed_box(Forest::ROOT));
+        let place = LightPlace::new(lamp, &e, self.view.far_m());
         let shaft = self.shaft((&e, &place.stand_in), None, (patch, patch));
-        let mut blockers = Vec::new();
-        shaft.narrow(candidates, &mut blockers);
+        let start = narrowed.len();
+        shaft.narrow(candidates, narrowed);
+        let blockers = shaft.blockers(&narrowed[start..]);
         let key = pair_key(self.forest.key(element), self.forest.key(light));
+        if matches!(self.oracle, Oracle::Error { .. }) && self.forest.coarse(element).is_none() {
+            return passing(Verdict::Refine(side), 0);
+        }
         let segments = place.segments(lamp, &e, key);
         let v = light_visibility(self.simd, &shaft, &blockers, &segments);
-        narrowed.extend(blockers);
         let verdict = match (self.stage, self.oracle) {
             (Stage::Coarse, _) => Verdict::Hold,
             (Stage::Fine(brightness), Oracle::Error { threshold }) => {
@@ -383,15 +412,14 @@ const FINEST: f64 = 0.005;
 const CLOSER: f64 = 0.05;
 
 /// A punctual light as the far end of a shaft.
-struct LightPlace {
-    stand_in: WorldElement,
+pub(super) struct LightPlace {
+    pub(super) stand_in: WorldElement,
     /// For directional lights: far enough along the light to be outside everything.
     away_m: f64,
 }
 
 impl LightPlace {
-    fn new(lamp: &WorldLight, e: &WorldElement, scene: &Aabb) -> LightPlace {
-        let away_m = scene.diagonal() * 1.5;
+    pub(super) fn new(lamp: &WorldLight, e: &WorldElement, away_m: f64) -> LightPlace {
         let corners = match lamp.kind {
             LightKind::Directional => e.corners.map(|c| c - lamp.direction * away_m),
             LightKind::Point | LightKind::Spot { .. } => [lamp.position; 4],
@@ -421,26 +449,77 @@ impl LightPlace {
     }
 }
 
-/// Candidates of a pair of boxes; clusters large against the pair are opened.
-fn narrow_boxes(
-    view: &WorldView,
-    forest: &Forest,
-    (a, b): (&Aabb, &Aabb),
-    parents: &[u32],
-    out: &mut Vec<u32>,
-) {
-    let keep_m = 0.5 * a.union(*b).diagonal();
-    let mut stack: Vec<u32> = parents.iter().rev().copied().collect();
-    while let Some(id) = stack.pop() {
-        let element = ElementId(id);
-        let bounds = view.fixed_box(element);
-        if bounds.is_empty() || !shaft_meets_box(a, b, bounds) {
-            continue;
+/// The one body that a node belongs to; `None` for groups of bodies and for lights.
+pub(super) fn body_of(forest: &Forest, view: &WorldView, id: ElementId) -> Option<BodyId> {
+    match forest.patch(id) {
+        Some(patch) => Some(view.patch(patch).body),
+        None => forest.cluster_body(id),
+    }
+}
+
+/// The shaft of two nodes of the fixed part, as boxes.
+pub(super) struct BoxShaft<'a> {
+    view: &'a WorldView,
+    forest: &'a Forest,
+    world: (&'a Aabb, &'a Aabb),
+    /// Both boxes in the frame of the one body that they are in.
+    own: Option<(BodyId, &'a Aabb, &'a Aabb)>,
+    margin_m: f64,
+}
+
+impl<'a> BoxShaft<'a> {
+    /// Of two nodes, at least one of which is a group; `body` if both are in that one.
+    pub(super) fn new(
+        view: &'a WorldView,
+        forest: &'a Forest,
+        (a, b): (ElementId, ElementId),
+        body: Option<BodyId>,
+    ) -> BoxShaft<'a> {
+        let (a, b) = (forest.fixed(a), forest.fixed(b));
+        let own = body.map(|body| (body, view.box_in_body(a), view.box_in_body(b)));
+        let world = (view.fixed_box(a), view.fixed_box(b));
+        BoxShaft { view, forest, world, own, margin_m: 1e-9 * view.far_m() }
+    }
+
+    fn meets(&self, id: ElementId) -> bool {
+        let world = self.view.fixed_box(id);
+        let (a, b, bounds) = match self.own {
+            Some((body, a, b)) if body_of(self.forest, self.view, id) == Some(body) => {
+                (a, b, self.view.box_in_body(id))
+            }
+            _ => (self.world.0, self.world.1, world),
+        };
+        !world.is_empty() && shaft_meets_box(a, b, &bounds.grown(self.margin_m))
+    }
+
+    /// Which of `parents` may block; clusters large against the shaft are opened.
+    fn narrow(&self, parents: &[u32], out: &mut Vec<u32>) {
+        let keep_m = 0.5 * self.world.0.union(*self.world.1).diagonal();
+        let mut stack: Vec<u32> = parents.iter().rev().copied().collect();
+        while let Some(id) = stack.pop() {
+            let element = ElementId(id);
+            if self.forest.kind(element) == Kind::Light || !self.meets(element) {
+                continue;
+            }
+            let group = self.forest.patch(element).is_none();
+            let mixed = body_of(self.forest, self.view, element).is_none();
+            if !group || (!mixed && self.view.fixed_box(element).diagonal() <= keep_m) {
+                out.push(id);
+            } else {
+                stack.extend(self.forest.children(element).rev());
+            }
         }
-        if forest.patch(element).is_some() || bounds.diagonal() <= keep_m {
-            out.push(id);
-        } else {
-            stack.extend(forest.children(element).rev());
+    }
+
+    /// Whether the box of anything at or below `id` meets the shaft, what is in `except` aside.
+    pub(super) fn is_entered_by(&self, id: ElementId, except: Option<BodyId>) -> bool {
+        let body = body_of(self.forest, self.view, id);
+        if (body.is_some() && body == except) || self.forest.kind(id) == Kind::Light {
+            return false;
         }
+        let mixed = body.is_none();
+        self.meets(id)
+            && (!mixed
+                || self.forest.children(id).any(|c| self.is_entered_by(ElementId(c), except)))
     }
 }

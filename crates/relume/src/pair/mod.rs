@@ -4,15 +4,19 @@
 //! this room knows no history, and no radiosity beyond the [`Brightness`] it is handed.
 
 mod brightness;
-mod grow;
 mod hash;
 mod judge;
 mod oracle;
+mod since;
 mod tree;
+mod update;
 
 pub use brightness::{Brightness, Light};
-pub use grow::{Frontier, Hierarchy, Judge, Judgement, Verdict, Work, grow, resume};
 pub use hash::{PairHash, pair_key};
 pub use judge::{Placed, Stage};
 pub use oracle::{Oracle, Side};
-pub use tree::{CullReason, Gradients, Pair, PairId, PairTree, State};
+pub use since::Since;
+pub use tree::{Carried, CullReason, Gradients, Link, PairId, PairTree, State, StateCounts};
+pub use update::{
+    Changes, Edit, Held, Hierarchy, Judge, Judgement, OutOfMemory, Stale, Verdict, Work, update,
+};

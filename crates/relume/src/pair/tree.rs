@@ -4,7 +4,9 @@ use glam::DVec2;
 
 use crate::element::ElementId;
 
-/// Index of a [`Pair`] in a [`PairTree`].
+use super::oracle::Side;
+
+/// Index of a pair in a [`PairTree`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PairId(pub u32);
 
@@ -22,140 +24,366 @@ pub enum CullReason {
 /// What a pair is at this instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
+    /// Not judged yet.
+    New,
     /// A link, used in both directions.
     Active,
-    /// Its children carry the transport.
-    Refined,
+    /// Its children carry the transport: those of one side with the whole other side.
+    Refined(Side),
+    /// A cluster paired with itself; its children are all pairs of the cluster's children.
+    RefinedSelf,
     /// It exchanges nothing, for the reason given.
     Culled(CullReason),
+    /// No pair: room to be used again.
+    Vacant,
+}
+
+impl State {
+    /// Whether the pair has children.
+    #[inline]
+    pub fn is_refined(self) -> bool {
+        matches!(self, State::Refined(_) | State::RefinedSelf)
+    }
+
+    const ALL: [State; 9] = [
+        State::New,
+        State::Active,
+        State::Refined(Side::A),
+        State::Refined(Side::B),
+        State::RefinedSelf,
+        State::Culled(CullReason::FacingAway),
+        State::Culled(CullReason::Absent),
+        State::Culled(CullReason::NoReceiver),
+        State::Vacant,
+    ];
+
+    fn code(self) -> u32 {
+        match self {
+            State::New => 0,
+            State::Active => 1,
+            State::Refined(Side::A) => 2,
+            State::Refined(Side::B) => 3,
+            State::RefinedSelf => 4,
+            State::Culled(CullReason::FacingAway) => 5,
+            State::Culled(CullReason::Absent) => 6,
+            State::Culled(CullReason::NoReceiver) => 7,
+            State::Vacant => 8,
+        }
+    }
 }
 
 /// Relative gradients of what arrives over both ends of a pair, in their patches' frames, times the
-/// ends' radii; in steps of 1/4096, at most 8.
+/// ends' radii, in eight bits each: finer near 0 (steps of 2.5e-4 there, of 2e-2 at 0.3), at
+/// most [`Gradients::MAX`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Gradients {
     /// Over the first end.
-    pub over_a: [i16; 2],
+    pub over_a: [i8; 2],
     /// Over the second end.
-    pub over_b: [i16; 2],
+    pub over_b: [i8; 2],
 }
 
 impl Gradients {
-    /// Steps in one.
-    pub const STEPS: f32 = 4096.0;
+    /// The largest that is told from larger ones.
+    pub const MAX: f32 = 4.0;
 
     /// From relative gradients (1/m) and radii (m) of both ends.
     pub fn new((a, radius_a): (DVec2, f64), (b, radius_b): (DVec2, f64)) -> Gradients {
         let steps = |g: DVec2, r: f64| {
-            [g.x, g.y].map(|v| (v * r * f64::from(Gradients::STEPS)).round() as i16)
+            [g.x, g.y].map(|v| {
+                let share = (v * r / f64::from(Gradients::MAX)).clamp(-1.0, 1.0);
+                (share.abs().sqrt() * 127.0).round().copysign(share) as i8
+            })
         };
         Gradients { over_a: steps(a, radius_a), over_b: steps(b, radius_b) }
     }
+
+    /// The value of one of them, per radius.
+    #[inline]
+    pub fn value(step: i8) -> f32 {
+        let s = f32::from(step);
+        s * s.abs() * (Gradients::MAX / (127.0 * 127.0))
+    }
 }
 
-/// A node of the pair tree: 36 bytes.
+/// What a link carries.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Carried {
+    /// Exchange area X without occlusion, m2.
+    pub exchange_area_m2: f32,
+    /// Visibility V in 65,535ths.
+    pub visibility: u16,
+    /// How what arrives varies over the ends.
+    pub gradients: Gradients,
+}
+
+impl Carried {
+    /// Visibility V, in [0, 1].
+    #[inline]
+    pub fn visibility(&self) -> f32 {
+        f32::from(self.visibility) / 65_535.0
+    }
+
+    /// Exchange area with occlusion, V X, m2.
+    #[inline]
+    pub fn exchange_area_past_occluders_m2(&self) -> f32 {
+        self.exchange_area_m2 * self.visibility()
+    }
+}
+
+/// A link as the tree hands it out.
 #[derive(Clone, Copy, Debug)]
-pub struct Pair {
+pub struct Link {
     /// First end.
     pub a: ElementId,
     /// Second end; the order is inherited from the pair of facets above.
     pub b: ElementId,
-    /// Exchange area X, m2, of an active (or coarse) pair.
-    pub exchange_area_m2: f32,
-    /// Visibility V of an active (or coarse) pair, in [0, 1].
-    pub visibility: f32,
-    /// How what arrives varies over the ends of an active (or coarse) pair.
-    pub gradients: Gradients,
-    first_child: u32,
-    child_count: u32,
-    /// Link, refined or culled.
-    pub state: State,
+    /// What it carries.
+    pub carried: Carried,
 }
 
-/// The tree of pairs, from the one root (scene, scene); parents come before children.
+impl Link {
+    /// Exchange area X without occlusion, m2.
+    pub fn exchange_area_m2(&self) -> f32 {
+        self.carried.exchange_area_m2
+    }
+
+    /// Visibility V, in [0, 1].
+    pub fn visibility(&self) -> f32 {
+        self.carried.visibility()
+    }
+}
+
+/// A node: 20 bytes. The two highest bits of both ends hold the state.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    a: u32,
+    b: u32,
+    /// Of a link X, V and gradients; of a refined pair its first child and their number.
+    payload: [u32; 3],
+}
+
+/// Bits of an element's id.
+const ID_BITS: u32 = 30;
+const ID_MASK: u32 = (1 << ID_BITS) - 1;
+
+impl Node {
+    fn new(a: ElementId, b: ElementId, state: State) -> Node {
+        debug_assert!(a.0 <= ID_MASK && b.0 <= ID_MASK, "more than 2^30 elements");
+        let mut node = Node { a: a.0, b: b.0, payload: [0; 3] };
+        node.set_state(state);
+        node
+    }
+
+    #[inline]
+    fn state(&self) -> State {
+        State::ALL[((self.a >> ID_BITS) << 2 | self.b >> ID_BITS) as usize]
+    }
+
+    fn set_state(&mut self, state: State) {
+        let code = state.code();
+        self.a = self.a & ID_MASK | (code >> 2) << ID_BITS;
+        self.b = self.b & ID_MASK | (code & 3) << ID_BITS;
+    }
+
+    #[inline]
+    fn carried(&self) -> Carried {
+        let [x, v, g] = self.payload;
+        let [au, av, bu, bv] = g.to_le_bytes().map(|b| b as i8);
+        Carried {
+            exchange_area_m2: f32::from_bits(x),
+            visibility: v as u16,
+            gradients: Gradients { over_a: [au, av], over_b: [bu, bv] },
+        }
+    }
+
+    fn set_carried(&mut self, carried: &Carried) {
+        let Gradients { over_a: [au, av], over_b: [bu, bv] } = carried.gradients;
+        self.payload = [
+            carried.exchange_area_m2.to_bits(),
+            u32::from(carried.visibility),
+            u32::from_le_bytes([au, av, bu, bv].map(|g| g as u8)),
+        ];
+    }
+}
+
+/// Nodes of a pair tree by state.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StateCounts {
+    /// Links.
+    pub active: u64,
+    /// Pairs whose children carry the transport.
+    pub refined: u64,
+    /// Pairs that exchange nothing.
+    pub culled: u64,
+}
+
+/// The tree of pairs, from the one root (scene, scene). Ids depend on history.
 #[derive(Clone, Debug, Default)]
 pub struct PairTree {
-    pairs: Vec<Pair>,
+    nodes: Vec<Node>,
+    /// First ids of vacant groups of siblings, by their number.
+    vacant: Vec<Vec<u32>>,
+    counts: StateCounts,
 }
 
 impl PairTree {
     /// The root alone, unjudged.
     pub fn new(root: ElementId) -> PairTree {
-        let mut tree = PairTree::default();
-        tree.pairs.push(unjudged(root, root));
-        tree
+        PairTree { nodes: vec![Node::new(root, root, State::New)], ..PairTree::default() }
     }
 
     /// The root pair.
     pub const ROOT: PairId = PairId(0);
 
-    /// Nodes in the tree.
+    /// Pairs in the tree.
     pub fn len(&self) -> usize {
-        self.pairs.len()
+        (self.counts.active + self.counts.refined + self.counts.culled) as usize
     }
 
-    /// Whether the tree has no node.
+    /// Whether nothing has been judged.
     pub fn is_empty(&self) -> bool {
-        self.pairs.is_empty()
+        self.len() == 0
+    }
+
+    /// Pairs by state.
+    pub fn counts(&self) -> StateCounts {
+        self.counts
     }
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> u64 {
-        (self.pairs.capacity() * size_of::<Pair>()) as u64
+        let lists: usize =
+            self.vacant.iter().map(|l| l.capacity() * 4 + size_of::<Vec<u32>>()).sum();
+        (self.nodes.capacity() * size_of::<Node>() + lists) as u64
     }
 
-    /// A node.
+    /// Both ends of a pair.
     #[inline]
-    pub fn pair(&self, id: PairId) -> &Pair {
-        &self.pairs[id.0 as usize]
+    pub fn ends(&self, id: PairId) -> (ElementId, ElementId) {
+        let node = &self.nodes[id.0 as usize];
+        (ElementId(node.a & ID_MASK), ElementId(node.b & ID_MASK))
     }
 
-    /// All nodes, parents before children.
-    pub fn pairs(&self) -> &[Pair] {
-        &self.pairs
+    /// What a pair is.
+    #[inline]
+    pub fn state(&self, id: PairId) -> State {
+        self.nodes[id.0 as usize].state()
     }
 
-    /// Ids of a node's children.
+    /// Ids of a pair's children; empty unless it is refined.
+    #[inline]
     pub fn children(&self, id: PairId) -> std::ops::Range<u32> {
-        let pair = self.pair(id);
-        pair.first_child..pair.first_child + pair.child_count
+        let node = &self.nodes[id.0 as usize];
+        match node.state().is_refined() {
+            true => node.payload[0]..node.payload[0] + node.payload[1],
+            false => 0..0,
+        }
     }
 
-    /// All links.
-    pub fn links(&self) -> impl Iterator<Item = &Pair> + Clone {
-        self.pairs.iter().filter(|p| p.state == State::Active)
+    /// A pair as a link, if it is one.
+    #[inline]
+    pub fn link(&self, id: PairId) -> Option<Link> {
+        let node = &self.nodes[id.0 as usize];
+        let (a, b) = self.ends(id);
+        (node.state() == State::Active).then(|| Link { a, b, carried: node.carried() })
     }
 
-    pub(super) fn pair_mut(&mut self, id: PairId) -> &mut Pair {
-        &mut self.pairs[id.0 as usize]
+    /// All links, in no order of meaning.
+    pub fn links(&self) -> impl Iterator<Item = Link> + Clone + '_ {
+        (0..self.nodes.len() as u32).filter_map(|id| self.link(PairId(id)))
     }
 
-    /// Makes `parent` refined into `ends`; returns the first child's id.
+    /// Sets what a pair without children is; what it carries is kept where it stays a link.
+    pub(super) fn set_state(&mut self, id: PairId, state: State) {
+        self.count(self.state(id), -1);
+        self.count(state, 1);
+        self.nodes[id.0 as usize].set_state(state);
+    }
+
+    pub(super) fn set_carried(&mut self, id: PairId, carried: &Carried) {
+        debug_assert_eq!(self.state(id), State::Active);
+        self.nodes[id.0 as usize].set_carried(carried);
+    }
+
+    fn count(&mut self, state: State, by: i64) {
+        let slot = match state {
+            State::Active => &mut self.counts.active,
+            State::Refined(_) | State::RefinedSelf => &mut self.counts.refined,
+            State::Culled(_) => &mut self.counts.culled,
+            State::New | State::Vacant => return,
+        };
+        *slot = slot.wrapping_add_signed(by);
+    }
+
+    /// Makes a pair without children refined into unjudged ones; returns their ids.
     pub(super) fn refine(
         &mut self,
         parent: PairId,
-        ends: impl Iterator<Item = (ElementId, ElementId)>,
-    ) -> PairId {
-        let first = self.pairs.len() as u32;
-        self.pairs.extend(ends.map(|(a, b)| unjudged(a, b)));
-        let count = self.pairs.len() as u32 - first;
-        let pair = self.pair_mut(parent);
-        pair.state = State::Refined;
-        pair.first_child = first;
-        pair.child_count = count;
-        PairId(first)
+        state: State,
+        ends: impl ExactSizeIterator<Item = (ElementId, ElementId)>,
+    ) -> std::ops::Range<u32> {
+        let count = ends.len();
+        let vacant = self.vacant.get_mut(count).and_then(Vec::pop);
+        let first = vacant.unwrap_or(self.nodes.len() as u32);
+        if vacant.is_none() {
+            self.nodes.extend(ends.map(|(a, b)| Node::new(a, b, State::New)));
+        } else {
+            for (node, (a, b)) in self.nodes[first as usize..].iter_mut().zip(ends) {
+                *node = Node::new(a, b, State::New);
+            }
+        }
+        self.set_state(parent, state);
+        self.nodes[parent.0 as usize].payload = [first, count as u32, 0];
+        first..first + count as u32
+    }
+
+    /// Forgets the children of a refined pair, which have none themselves; it is to be judged anew.
+    pub(super) fn remove_children(&mut self, parent: PairId) {
+        let children = self.children(parent);
+        for child in children.clone() {
+            debug_assert!(!self.state(PairId(child)).is_refined());
+            self.set_state(PairId(child), State::Vacant);
+        }
+        let count = children.len();
+        if self.vacant.len() <= count {
+            self.vacant.resize(count + 1, Vec::new());
+        }
+        self.vacant[count].push(children.start);
+        self.set_state(parent, State::New);
     }
 }
 
-fn unjudged(a: ElementId, b: ElementId) -> Pair {
-    Pair {
-        a,
-        b,
-        exchange_area_m2: 0.0,
-        visibility: 0.0,
-        gradients: Gradients::default(),
-        first_child: 0,
-        child_count: 0,
-        state: State::Culled(CullReason::FacingAway),
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn states_survive_being_packed() {
+        let (a, b) = (ElementId(ID_MASK), ElementId(7));
+        for (code, state) in State::ALL.into_iter().enumerate() {
+            assert_eq!(state.code(), code as u32);
+            let node = Node::new(a, b, state);
+            assert_eq!((node.state(), node.a & ID_MASK, node.b & ID_MASK), (state, a.0, b.0));
+        }
+    }
+
+    #[test]
+    fn what_a_link_carries_survives_being_packed() {
+        let gradients = Gradients { over_a: [-127, 3], over_b: [127, -1] };
+        let carried = Carried { exchange_area_m2: 0.123, visibility: 65_535, gradients };
+        let mut node = Node::new(ElementId(1), ElementId(2), State::Active);
+        node.set_carried(&carried);
+        assert_eq!(node.carried(), carried);
+        assert_eq!(carried.visibility(), 1.0);
+    }
+
+    #[test]
+    fn gradients_are_finer_near_zero() {
+        for g in [-3.9, -0.3, -0.01, 0.0, 0.002, 0.3, 1.7] {
+            let packed = Gradients::new((DVec2::new(g, 0.0), 1.0), (DVec2::ZERO, 1.0));
+            let back = f64::from(Gradients::value(packed.over_a[0]));
+            assert!((back - g).abs() <= 0.016 * g.abs().sqrt() + 1e-4, "{g} {back}");
+        }
     }
 }

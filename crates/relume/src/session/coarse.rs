@@ -1,13 +1,13 @@
 //! The coarse solution that the error oracle weighs by: a fixed set of coarse elements, all pairs
 //! of them linked, a fixed number of sweeps from the emission. A pure function of the scene at one
-//! instant.
+//! instant: links are summed in the order of the coarse elements, whatever their history.
 
 use crate::element::{ElementId, Forest, Kind};
-use crate::pair::{Brightness, Frontier, Light, PairTree};
+use crate::pair::{self, Brightness, Changes, Light};
 use crate::scene::{PatchId, Scene};
-use crate::solver::{Radiosity, Stop, Surfaces};
+use crate::solver::{Dirty, Links, Radiosity, Stop, Surfaces};
 
-use super::surfaces::{LitForest, links_of};
+use super::surfaces::{LitForest, remove_pair, set_pair};
 
 /// Coarse elements are no larger than this share of the scene's area.
 const COARSE_SHARE: f64 = 1.0 / 64.0;
@@ -21,7 +21,8 @@ const SWEEPS: u32 = 8;
 /// Errors on dark receivers are measured against at least this share of the mean irradiance.
 const DARK_FLOOR: f64 = 0.1;
 
-/// Splits facets down to coarse elements and numbers them; returns their ids by number.
+/// Splits facets down to coarse elements, numbers them and keeps them for good; returns their ids
+/// by number.
 pub(super) fn number(scene: &Scene, forest: &mut Forest) -> Vec<u32> {
     let largest = forest.area_m2(Forest::ROOT) * COARSE_SHARE;
     let mut out = Vec::new();
@@ -42,54 +43,97 @@ pub(super) fn number(scene: &Scene, forest: &mut Forest) -> Vec<u32> {
             stack.extend(children.rev().map(ElementId));
         }
     }
+    forest.keep_all();
     out
 }
 
-/// Solves over the held pairs; the solution and what the oracle may know of it.
-pub(super) fn solve(
-    scene: &Scene,
-    forest: &Forest,
-    tree: &PairTree,
-    held: &Frontier,
-    coarse: &[u32],
-) -> (Radiosity, Brightness) {
-    let surfaces = LitForest::new(scene, forest);
-    let links = links_of(forest, held.pairs().map(|id| tree.pair(id)));
-    let solved = Radiosity::solve(&surfaces, &links, None, Stop::Sweeps(SWEEPS));
-    let total_area = forest.area_m2(Forest::ROOT);
-    let mean = |v: [f32; 3]| v.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
-    let arriving: f64 =
-        coarse.iter().map(|&id| surfaces.area_m2(id) * mean(solved.irradiance(id))).sum();
-    let floor = arriving / total_area * DARK_FLOOR;
-    let light_of = |&id: &u32| {
-        let emitted = surfaces.lit(id).map_or(0.0, |lit| mean(lit.exitance));
-        let radiosity = mean(solved.radiosity(id));
-        Light {
-            radiosity,
-            reflected: (radiosity - emitted).max(0.0),
-            irradiance: mean(solved.irradiance(id)) + floor,
-        }
-    };
-    let lights = scene.lights.iter().map(|l| l.intensity.iter().sum::<f64>() / 3.0).collect();
-    let known = if arriving > 0.0 {
-        coarse.iter().map(light_of).collect()
-    } else {
-        // Nothing emits: every surface weighs the same, and errors are relative to row sums.
-        vec![Light::UNIFORM; coarse.len()]
-    };
-    (solved, Brightness::new(known, lights, total_area * REFERENCE_SHARE))
+/// The coarse links and their solution.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Coarse {
+    links: Links,
+    radiosity: Radiosity,
+    pub(super) brightness: Brightness,
 }
 
-/// The coarse solution as a first guess for an element; exitance where there is none.
-pub(super) fn radiosity_at(
-    forest: &Forest,
-    solved: &Radiosity,
-    coarse: &[u32],
-    id: u32,
-    surfaces: &LitForest<'_>,
-) -> [f32; 3] {
-    match forest.coarse(ElementId(id)) {
-        Some(number) => solved.radiosity(coarse[number]),
-        None => surfaces.lit(id).map_or([0.0; 3], |lit| lit.exitance),
+impl Coarse {
+    /// Takes over what an update found on the coarse pairs. Whether any of them changed.
+    pub(super) fn follow(&mut self, seed: &Forest, changes: &Changes) -> bool {
+        self.links.extend(seed.len());
+        for &(a, b) in &changes.dropped {
+            remove_pair(&mut self.links, a, b);
+        }
+        for held in &changes.held {
+            let link = pair::Link { a: held.a, b: held.b, carried: held.carried };
+            set_pair(&mut self.links, seed, &link);
+        }
+        self.links.tidy();
+        !changes.dropped.is_empty() || !changes.held.is_empty()
     }
+
+    /// Solves over the coarse links; `coarse` are the coarse elements of `seed` by number.
+    pub(super) fn solve(&mut self, scene: &Scene, seed: &Forest, coarse: &[u32]) {
+        for &id in coarse {
+            self.links.sort(id);
+        }
+        let surfaces = LitForest::new(scene, seed).with_places();
+        self.radiosity = start(scene, seed, &surfaces);
+        self.radiosity.solve(&surfaces, &self.links, Dirty::All, Stop::Sweeps(SWEEPS));
+        self.brightness = self.measure(scene, seed, coarse, &surfaces);
+    }
+
+    fn measure(
+        &self,
+        scene: &Scene,
+        seed: &Forest,
+        coarse: &[u32],
+        surfaces: &LitForest<'_>,
+    ) -> Brightness {
+        let total_area = seed.area_m2(Forest::ROOT);
+        let mean = |v: [f32; 3]| v.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
+        let mut irradiance = vec![0.0; coarse.len()];
+        for facet in surfaces.facets() {
+            self.radiosity.irradiances(surfaces, facet.0, &mut |id, h| {
+                let number = seed.coarse(ElementId(id)).expect("leaves of the seed are coarse");
+                irradiance[number] = mean(h.mean.map(|x| x.max(0.0)));
+            });
+        }
+        let arriving: f64 =
+            coarse.iter().zip(&irradiance).map(|(&id, h)| surfaces.area_m2(id) * h).sum();
+        let lights = scene.lights.iter().map(|l| l.intensity.iter().sum::<f64>() / 3.0).collect();
+        let floor = arriving / total_area * DARK_FLOOR;
+        let light_of = |(&id, irradiance): (&u32, &f64)| {
+            let emitted = mean(surfaces.lit(surfaces.facet_of(id)).exitance);
+            let radiosity = mean(self.radiosity.radiosity(id));
+            let reflected = (radiosity - emitted).max(0.0);
+            Light { radiosity, reflected, irradiance: irradiance + floor }
+        };
+        let known = if arriving > 0.0 {
+            coarse.iter().zip(&irradiance).map(light_of).collect()
+        } else {
+            // Nothing emits: every surface weighs the same, and errors are relative to row sums.
+            vec![Light::UNIFORM; coarse.len()]
+        };
+        Brightness::new(known, lights, total_area * REFERENCE_SHARE)
+    }
+
+    /// Radiosity of a coarse element.
+    pub(super) fn radiosity(&self, id: u32) -> [f32; 3] {
+        self.radiosity.radiosity(id)
+    }
+
+    /// Bytes held.
+    pub(super) fn memory_bytes(&self) -> u64 {
+        self.links.memory_bytes() + self.radiosity.memory_bytes()
+    }
+}
+
+/// A solution to begin with: exitances, and intensities of punctual lights.
+pub(super) fn start(scene: &Scene, forest: &Forest, surfaces: &LitForest<'_>) -> Radiosity {
+    let mut out = Radiosity::new(surfaces);
+    for id in 0..forest.fixed_len() {
+        if let Some(light) = forest.light(ElementId(id)) {
+            out.set(id, scene.lights[light].intensity.map(|x| x as f32));
+        }
+    }
+    out
 }

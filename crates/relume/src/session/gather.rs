@@ -51,7 +51,7 @@ impl Session {
         let index = solved.forest.light(id).expect("a light has an index");
         let Some(light) = solved.view.light(index) else { return [0.0; 3] };
         let e = light_at(light, point, normal);
-        let away = solved.view.fixed_box(Forest::ROOT).diagonal() * 1.5;
+        let away = solved.view.far_m();
         let end = match light.kind {
             crate::scene::LightKind::Directional => point - light.direction * away,
             _ => light.position,

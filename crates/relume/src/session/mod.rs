@@ -3,12 +3,13 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::element::{Forest, WorldView};
-use crate::pair::{self, Brightness, Frontier, PairTree, Placed, Stage, Work, grow, resume};
+use crate::element::{ElementId, Forest, WorldView};
+use crate::pair::{PairHash, PairTree};
 use crate::scene::{BodyId, Scene};
-use crate::solver::{Links, Radiosity, Stop};
+use crate::solver::{Links, Radiosity};
 use crate::transport::Simd;
 
+mod advance;
 mod coarse;
 mod gather;
 mod options;
@@ -21,7 +22,7 @@ pub use options::{Options, Oracle, Update};
 pub use report::{Energy, FrameReport, PairCounts, RowSumError, Seconds};
 pub use snapshot::{Leaf, Snapshot};
 
-use surfaces::LitForest;
+use coarse::Coarse;
 
 /// Why a frame could not be computed.
 #[derive(Debug, thiserror::Error)]
@@ -50,8 +51,10 @@ pub struct Session {
     scene: Arc<Scene>,
     options: Options,
     simd: Simd,
-    /// The fixed part of the forest, where every build starts.
+    /// The part of the forest that is always there, where every build starts.
     seed: Forest,
+    /// Coarse elements of the seed by number; none for oracles that ask for no brightness.
+    coarse_ids: Vec<u32>,
     solved: Option<Solved>,
     /// Time that `moved` compares with, where it is not that of the last step.
     came_from: Option<f64>,
@@ -63,8 +66,11 @@ struct Solved {
     forest: Forest,
     view: WorldView,
     tree: PairTree,
+    hash: PairHash,
     links: Links,
+    coarse: Coarse,
     radiosity: Radiosity,
+    report: FrameReport,
 }
 
 /// Threshold of the error oracle for a link, relative to the tolerance of the whole: the errors of
@@ -81,8 +87,13 @@ impl Session {
     /// [`SessionError::Option`] if an option is out of its range.
     pub fn new(scene: Arc<Scene>, options: Options) -> Result<Session, SessionError> {
         options.validate()?;
-        let seed = Forest::new(&scene);
-        Ok(Session { scene, options, simd: Simd::detect(), seed, solved: None, came_from: None })
+        let mut seed = Forest::new(&scene);
+        let coarse_ids = match options.oracle {
+            Oracle::Error => coarse::number(&scene, &mut seed),
+            Oracle::FormFactor { .. } => Vec::new(),
+        };
+        let simd = Simd::detect();
+        Ok(Session { scene, options, simd, seed, coarse_ids, solved: None, came_from: None })
     }
 
     /// The scene being solved.
@@ -97,86 +108,31 @@ impl Session {
 
     /// Brings the solution to `time_s` (seconds of the animation); `frame` only labels the report.
     ///
+    /// Any time may follow any other: the links are those of a cold build at `time_s`, bit for bit.
+    /// Cost: proportional to what differs from the step before, unless [`Update::Scratch`] is
+    /// asked for.
+    ///
     /// # Errors
-    /// [`SessionError::OutOfMemory`] if the links do not fit; the last solution is kept.
+    /// [`SessionError::OutOfMemory`] if the links do not fit; there is no solution then until a
+    /// step succeeds.
     pub fn step(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, SessionError> {
-        let mut clock = Clock::start();
-        let mut report = FrameReport { frame, time_s, ..FrameReport::default() };
-        report.moved = self.moved_since_last(time_s);
-        let mut forest = self.seed.clone();
-        let view = WorldView::new(&self.scene, &forest, time_s);
-        report.seconds.moving = clock.lap();
-
-        let mut tree = PairTree::new(Forest::ROOT);
-        let mut work = Work::default();
-        let (start, coarse) = self.build(&mut forest, &view, &mut tree, &mut work, frame)?;
-        report.seconds.evaluate = clock.lap();
-
-        let links = surfaces::links_of(&forest, tree.links());
-        let lit = LitForest::new(&self.scene, &forest);
-        let stop = Stop::Residual(self.options.tolerance * RESIDUAL_SHARE);
-        let guess = |id: u32| coarse::radiosity_at(&forest, &start, &coarse, id, &lit);
-        let radiosity = Radiosity::solve(&lit, &links, Some(&guess), stop);
-        report.seconds.solve = clock.lap();
-
-        let solved = Solved { time_s, forest, view, tree, links, radiosity };
-        tally::fill(&mut report, &self.scene, &solved, &work);
-        report.seconds.total = clock.total();
-        self.came_from = None;
+        let moved = self.moved_since_last(time_s);
+        let from = self.came_from.take().or(self.solved.as_ref().map(|s| s.time_s));
+        let label = FrameReport { frame, time_s, moved, ..FrameReport::default() };
+        let mut last = self.solved.take();
+        if self.options.update == Update::Scratch {
+            last = None;
+        }
+        let solved = match last {
+            Some(last) if self.is_still(&last, time_s) => {
+                let report = last.report.of_a_still_frame(label);
+                Solved { time_s, report, ..last }
+            }
+            last => self.advance(last, from, label)?,
+        };
+        let report = solved.report.clone();
         self.solved = Some(solved);
         Ok(report)
-    }
-
-    /// Grows the pair tree of the present poses; returns the coarse solution on the way.
-    fn build(
-        &self,
-        forest: &mut Forest,
-        view: &WorldView,
-        tree: &mut PairTree,
-        work: &mut Work,
-        frame: u32,
-    ) -> Result<(Radiosity, Vec<u32>), SessionError> {
-        let limit = self.options.max_memory_bytes.unwrap_or(u64::MAX);
-        let enough = |tree: &PairTree, elements: usize, scratch: u64| {
-            // Links and solution are still to come: 16 bytes a pair, 32 an element.
-            let pairs = tree.memory_bytes() + tree.len() as u64 * 16;
-            pairs + elements as u64 * 96 + scratch <= limit
-        };
-        let oracle = self.options.pair_oracle();
-        let coarse = match oracle {
-            pair::Oracle::Error { .. } => coarse::number(&self.scene, forest),
-            pair::Oracle::FormFactor { .. } => Vec::new(),
-        };
-        let mut placed =
-            Placed { forest: &mut *forest, view, stage: Stage::Coarse, oracle, simd: self.simd };
-        let root = [Forest::ROOT.0];
-        let (frontier, start, brightness);
-        if coarse.is_empty() {
-            (start, brightness) = (Radiosity::default(), Brightness::default());
-            placed.stage = Stage::Fine(&brightness);
-            frontier = grow(tree, &mut placed, &root, work, &enough).map(|_| Frontier::default());
-        } else {
-            let held = grow(tree, &mut placed, &root, work, &enough);
-            let held = held.ok_or_else(|| self.too_large(tree, limit, frame))?;
-            (start, brightness) = coarse::solve(&self.scene, placed.forest, tree, &held, &coarse);
-            let mut placed = Placed {
-                forest: &mut *forest,
-                view,
-                stage: Stage::Fine(&brightness),
-                oracle,
-                simd: self.simd,
-            };
-            frontier = resume(tree, &mut placed, held, work, &enough);
-        }
-        match frontier {
-            Some(_) => Ok((start, coarse)),
-            None => Err(self.too_large(tree, limit, frame)),
-        }
-    }
-
-    fn too_large(&self, tree: &PairTree, limit_bytes: u64, frame: u32) -> SessionError {
-        let tolerance = self.options.tolerance;
-        SessionError::OutOfMemory { frame, tolerance, limit_bytes, links: tree.len() as u64 }
     }
 
     /// Says at which time the frame before the next step was, where that is not the last step:
@@ -217,25 +173,44 @@ impl Session {
         (&solved.tree, &solved.forest)
     }
 
-    /// Sum of the form factors from a leaf element; 1 in a closed scene, up to the links' errors.
+    /// Sum of the form factors from every leaf element, in no order of meaning; 1 in a closed scene,
+    /// up to the links' errors. Elements of absent bodies are among them.
     ///
     /// # Panics
     /// Before the first [`Session::step`].
-    pub fn row_sum(&self, leaf: crate::element::ElementId) -> f64 {
+    pub fn row_sums(&self) -> Vec<(ElementId, f64)> {
         let solved = self.solved.as_ref().expect("a step comes before a look at the rows");
-        f64::from(solved.radiosity.row_sum(leaf.0))
+        tally::row_sums_of(&self.scene, solved)
     }
 
     /// Bytes that the engine's structures hold now.
-    pub fn memory_bytes(&self) -> u64 {
-        let solved = self.solved.as_ref().map_or(0, |s| {
-            s.tree.memory_bytes()
-                + s.links.memory_bytes()
-                + s.radiosity.memory_bytes()
-                + s.forest.memory_bytes()
-        });
-        self.seed.memory_bytes() + solved
+    pub fn memory(&self) -> Memory {
+        let mut memory = Memory { fixed: self.seed.memory_bytes(), ..Memory::default() };
+        if let Some(s) = &self.solved {
+            memory.pairs = s.tree.memory_bytes() + s.links.pool_bytes();
+            memory.elements =
+                s.forest.memory_bytes() + s.radiosity.memory_bytes() + s.links.span_bytes();
+            memory.fixed += s.coarse.memory_bytes();
+        }
+        memory
     }
+
+    /// Bytes that the engine's structures hold now, all together.
+    pub fn memory_bytes(&self) -> u64 {
+        let memory = self.memory();
+        memory.pairs + memory.elements + memory.fixed
+    }
+}
+
+/// Bytes that the engine's structures hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Memory {
+    /// Pair tree and links by receiver.
+    pub pairs: u64,
+    /// Element forest, radiosities, and where each element's links are.
+    pub elements: u64,
+    /// What does not grow with the tolerance: the fixed part of the forest, the coarse solution.
+    pub fixed: u64,
 }
 
 /// Wall-clock time of the phases; it labels reports and decides nothing.

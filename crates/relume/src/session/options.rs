@@ -18,7 +18,7 @@ impl Default for Options {
         Options {
             tolerance: 0.02,
             oracle: Oracle::Error,
-            update: Update::Scratch,
+            update: Update::Reinspect,
             max_memory_bytes: None,
         }
     }
@@ -44,6 +44,8 @@ pub enum Oracle {
 pub enum Update {
     /// Rebuild everything in every frame: the reference that others are checked against.
     Scratch,
+    /// Look again at every pair that the motion since the last step may concern, and at no other.
+    Reinspect,
 }
 
 impl Options {

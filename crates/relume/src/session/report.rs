@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::pair::Work;
+
 /// One entry of `frames` in a report of schema `relume-report/1`.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct FrameReport {
@@ -17,19 +19,26 @@ pub struct FrameReport {
     pub leaves: u64,
     /// Active pairs: links, each used in both directions.
     pub links: u64,
-    /// Links with a moved end.
+    /// Links with an end that moved against the other.
     pub dynamic_links: u64,
     /// Nodes of the pair tree by state.
     pub pairs: PairCounts,
-    /// Pairs looked at.
+    /// Pairs met on the walk through the pair tree: those examined, and those next to them that
+    /// turned out to be unaffected.
+    pub visited: u64,
+    /// Pairs judged.
     pub examined: u64,
-    /// Pairs whose exchange area was evaluated again.
+    /// Of these, pairs judged because an end moved against the other, or for the first time.
     pub reevaluated: u64,
-    /// Pairs of which only the visibility was evaluated again.
+    /// Of these, pairs of which only the visibility may have changed.
     pub visibility_only: u64,
-    /// Links that moved up the hierarchy.
+    /// Of these, pairs of which only the light on their ends may have changed.
+    pub brightness_only: u64,
+    /// Pairs of which the state, or what they carry as a link, differs from before.
+    pub changed: u64,
+    /// Refined pairs that became links.
     pub promoted: u64,
-    /// Links that moved down the hierarchy.
+    /// Links that were refined.
     pub demoted: u64,
     /// Links whose visibility changed.
     pub occlusion_changed: u64,
@@ -41,7 +50,9 @@ pub struct FrameReport {
     pub elements_reaped: u64,
     /// Gather sweeps of the solver.
     pub sweeps: u32,
-    /// Largest change of radiosity in the last sweep, relative to the mean radiosity.
+    /// Receivers gathered in all sweeps together.
+    pub gathers: u64,
+    /// Largest change of radiosity that the last sweep left undone, relative to the mean radiosity.
     pub residual: f64,
     /// How far the row sums of the form factors are from 1.
     pub row_sum_error: RowSumError,
@@ -100,4 +111,37 @@ pub struct Seconds {
     pub solve: f64,
     /// The whole step.
     pub total: f64,
+}
+
+impl FrameReport {
+    /// Takes over the counts of an update.
+    pub(super) fn count(&mut self, work: &Work) {
+        self.visited = work.visited;
+        self.examined = work.examined;
+        self.reevaluated = work.reevaluated;
+        self.visibility_only = work.visibility_only;
+        self.brightness_only = work.brightness_only;
+        self.changed = work.changed;
+        self.promoted = work.promoted;
+        self.demoted = work.demoted;
+        self.occlusion_changed = work.occlusion_changed;
+        self.dynamic_links = work.dynamic_links;
+        self.segments = work.segments;
+        self.elements_made = work.elements_made;
+    }
+
+    /// The report of a frame in which nothing changed: the state as it was, and no work.
+    pub(super) fn of_a_still_frame(&self, label: FrameReport) -> FrameReport {
+        FrameReport {
+            elements: self.elements,
+            leaves: self.leaves,
+            links: self.links,
+            pairs: self.pairs,
+            residual: self.residual,
+            row_sum_error: self.row_sum_error,
+            energy: self.energy,
+            hash: self.hash.clone(),
+            ..label
+        }
+    }
 }

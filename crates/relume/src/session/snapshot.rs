@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use crate::element::ElementId;
+use crate::element::{ElementId, Kind};
 use crate::geometry::Pose;
 use crate::scene::{PatchId, Scene};
 
 use super::Solved;
+use super::surfaces::LitForest;
 
 /// The solution at one instant.
 #[derive(Clone, Debug)]
@@ -56,14 +57,11 @@ impl Snapshot {
     }
 }
 
-fn gradient(solved: &Solved, id: ElementId) -> [[f32; 3]; 2] {
-    solved.radiosity.linear_irradiance(id.0).gradient.map(|[r, g, b, _]| [r, g, b])
-}
-
 /// The leaves of a solved forest.
 pub(super) fn take(scene: &Arc<Scene>, solved: &Solved) -> Snapshot {
     let forest = &solved.forest;
-    let mut leaves = Vec::new();
+    let surfaces = LitForest::new(scene, forest);
+    let mut leaves = Vec::with_capacity(forest.counts().leaves as usize);
     let mut leaf_offsets = vec![0];
     for (k, patch) in scene.patches.iter().enumerate() {
         let mut stack = vec![forest.patch_root(PatchId(k as u32))];
@@ -71,16 +69,18 @@ pub(super) fn take(scene: &Arc<Scene>, solved: &Solved) -> Snapshot {
             stack.clear();
         }
         while let Some(id) = stack.pop() {
-            let children = forest.children(id);
-            if children.is_empty() {
-                leaves.push(Leaf {
-                    corners: forest.shape(id).corners,
-                    irradiance: solved.radiosity.irradiance(id.0),
-                    irradiance_gradient: gradient(solved, id),
-                    radiosity: solved.radiosity.radiosity(id.0),
-                });
+            if forest.kind(id) == Kind::Polygon {
+                stack.extend(forest.children(id).rev().map(ElementId));
+                continue;
             }
-            stack.extend(children.rev().map(ElementId));
+            solved.radiosity.irradiances(&surfaces, id.0, &mut |id, h| {
+                leaves.push(Leaf {
+                    corners: forest.shape(ElementId(id)).corners,
+                    irradiance: h.mean.map(|x| x.max(0.0)),
+                    irradiance_gradient: h.gradient,
+                    radiosity: solved.radiosity.radiosity(id),
+                });
+            });
         }
         leaf_offsets.push(leaves.len() as u32);
     }

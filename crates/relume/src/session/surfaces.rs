@@ -2,8 +2,10 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use crate::element::{ElementId, Forest, Kind};
-use crate::pair::Pair;
+use crate::pair::{self, Edit, PairTree};
 use crate::scene::Scene;
 use crate::solver::{Link, Links, LinksBuilder, Lit, Place, Surfaces};
 
@@ -11,7 +13,7 @@ use crate::solver::{Link, Links, LinksBuilder, Lit, Place, Surfaces};
 pub(super) struct LitForest<'a> {
     forest: &'a Forest,
     patch_lit: Vec<Lit>,
-    lights: Vec<Lit>,
+    /// Places of all elements, where they were worth computing ahead.
     places: Vec<Place>,
 }
 
@@ -20,23 +22,17 @@ impl<'a> LitForest<'a> {
         let single = |v: [f64; 3]| v.map(|x| x as f32);
         let of_patch = |patch: &crate::scene::Patch| {
             let material = &scene.materials[patch.material.0 as usize];
-            Lit {
-                reflectance: single(material.reflectance),
-                exitance: single(material.exitance),
-                counts: true,
-            }
+            Lit { reflectance: single(material.reflectance), exitance: single(material.exitance) }
         };
-        let of_light = |light: &crate::scene::Light| Lit {
-            reflectance: [0.0; 3],
-            exitance: single(light.intensity),
-            counts: false,
-        };
-        LitForest {
-            forest,
-            patch_lit: scene.patches.iter().map(of_patch).collect(),
-            lights: scene.lights.iter().map(of_light).collect(),
-            places: (0..forest.len() as u32).map(|id| place_of(forest, ElementId(id))).collect(),
-        }
+        let patch_lit = scene.patches.iter().map(of_patch).collect();
+        LitForest { forest, patch_lit, places: Vec::new() }
+    }
+
+    /// With all places computed ahead: for several sweeps over all of the forest.
+    pub(super) fn with_places(mut self) -> LitForest<'a> {
+        let ids = (0..self.forest.len() as u32).into_par_iter();
+        self.places = ids.map(|id| place_of(self.forest, ElementId(id))).collect();
+        self
     }
 }
 
@@ -58,11 +54,12 @@ impl Surfaces for LitForest<'_> {
         self.forest.len()
     }
 
-    fn parent(&self, id: u32) -> Option<u32> {
-        let parent = self.forest.parent(ElementId(id))?;
-        let within = self.forest.kind(ElementId(id)) == Kind::Element
-            && self.forest.kind(parent) == Kind::Element;
-        within.then_some(parent.0)
+    fn facets(&self) -> &[ElementId] {
+        self.forest.facets()
+    }
+
+    fn facet_of(&self, id: u32) -> u32 {
+        self.forest.fixed(ElementId(id)).0
     }
 
     fn children(&self, id: u32) -> Range<u32> {
@@ -74,49 +71,90 @@ impl Surfaces for LitForest<'_> {
     }
 
     fn place(&self, id: u32) -> Place {
-        self.places[id as usize]
+        match self.places.get(id as usize) {
+            Some(place) => *place,
+            None => place_of(self.forest, ElementId(id)),
+        }
     }
 
-    fn lit(&self, id: u32) -> Option<&Lit> {
-        let element = ElementId(id);
-        match self.forest.kind(element) {
-            Kind::Element => {
-                let patch = self.forest.patch(element).expect("elements have patches");
-                Some(&self.patch_lit[patch.0 as usize])
-            }
-            Kind::Light => self.forest.light(element).map(|k| &self.lights[k]),
-            Kind::Cluster | Kind::Polygon => None,
-        }
+    fn lit(&self, facet: u32) -> &Lit {
+        let patch = self.forest.patch(ElementId(facet)).expect("elements have patches");
+        &self.patch_lit[patch.0 as usize]
     }
 }
 
-/// Both directions of some pairs, by receiver. Pairs of visibility 0 couple nothing.
-pub(super) fn links_of<'a>(
-    forest: &Forest,
-    pairs: impl Iterator<Item = &'a Pair> + Clone,
-) -> Links {
-    let carries = |p: &&Pair| p.visibility > 0.0 && p.exchange_area_m2 > 0.0;
-    let receives = |id: ElementId| forest.kind(id) == Kind::Element;
+/// Both directions of a link: (receiver, link), for the ends that receive. Links of visibility 0
+/// carry nothing.
+fn directions(forest: &Forest, link: &pair::Link) -> impl Iterator<Item = (u32, Link)> {
+    let carried = link.carried;
+    let exchange = carried.exchange_area_past_occluders_m2();
+    let g = carried.gradients;
+    let one = |receiver: ElementId, source: ElementId, over_receiver, over_source| {
+        let receives = forest.kind(receiver) == Kind::Element && exchange > 0.0;
+        receives.then(|| {
+            let coupling = exchange / forest.area_m2(receiver) as f32;
+            (receiver.0, Link { source: source.0, coupling, over_receiver, over_source })
+        })
+    };
+    let forth = one(link.a, link.b, g.over_a, g.over_b);
+    let back = one(link.b, link.a, g.over_b, g.over_a);
+    forth.into_iter().chain(back)
+}
+
+/// All links of a tree, by receiver.
+pub(super) fn links_of(forest: &Forest, tree: &PairTree) -> Links {
     let mut builder = LinksBuilder::new(forest.len());
-    for pair in pairs.clone().filter(carries) {
-        for end in [pair.a, pair.b] {
-            if receives(end) {
-                builder.count(end.0);
-            }
-        }
+    for link in tree.links() {
+        directions(forest, &link).for_each(|(receiver, _)| builder.count(receiver));
     }
     builder.fill(|add| {
-        for pair in pairs.filter(carries) {
-            let exchange = pair.exchange_area_m2 * pair.visibility;
-            let g = &pair.gradients;
-            let ends = [(pair.a, pair.b, g.over_a, g.over_b), (pair.b, pair.a, g.over_b, g.over_a)];
-            for (receiver, source, over_receiver, over_source) in ends {
-                if receives(receiver) {
-                    let coupling = exchange / forest.area_m2(receiver) as f32;
-                    let source = source.0;
-                    add(receiver.0, Link { source, coupling, over_receiver, over_source });
-                }
-            }
+        for link in tree.links() {
+            directions(forest, &link).for_each(|(receiver, link)| add(receiver, link));
         }
     })
+}
+
+/// Sets both directions of a pair to what it carries now; returns the receivers concerned.
+pub(super) fn set_pair(links: &mut Links, forest: &Forest, pair: &pair::Link) {
+    links.extend(forest.len());
+    if pair.carried.exchange_area_past_occluders_m2() > 0.0 {
+        directions(forest, pair).for_each(|(receiver, link)| links.set(receiver, link));
+    } else {
+        remove_pair(links, pair.a, pair.b);
+    }
+}
+
+/// Removes both directions of a pair.
+pub(super) fn remove_pair(links: &mut Links, a: ElementId, b: ElementId) {
+    links.remove(a.0, b.0);
+    links.remove(b.0, a.0);
+}
+
+/// Carries edits of a tree over to its links; returns the receivers concerned, ascending.
+pub(super) fn apply_edits(
+    links: &mut Links,
+    forest: &Forest,
+    tree: &PairTree,
+    edits: &[Edit],
+) -> Vec<u32> {
+    links.extend(forest.len());
+    let mut receivers = Vec::with_capacity(2 * edits.len());
+    for edit in edits {
+        let (a, b) = match *edit {
+            Edit::Set(id) => {
+                let link = tree.link(id).expect("a link that was set stays one");
+                set_pair(links, forest, &link);
+                (link.a, link.b)
+            }
+            Edit::Removed(a, b) => {
+                remove_pair(links, a, b);
+                (a, b)
+            }
+        };
+        receivers.extend([a, b].iter().filter(|&&e| forest.kind(e) == Kind::Element).map(|e| e.0));
+    }
+    links.tidy();
+    receivers.sort_unstable();
+    receivers.dedup();
+    receivers
 }

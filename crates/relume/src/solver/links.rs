@@ -1,64 +1,92 @@
-//! Links sorted by receiver, ready to gather.
+//! For each receiver the sources it gathers from.
 
-/// One source of a receiver.
+use crate::pair::Gradients;
+
+/// One source of a receiver: 12 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Link {
     /// The source.
     pub source: u32,
     /// V X / A_receiver.
     pub coupling: f32,
-    /// Relative gradient of what arrives over the receiver, times its radius, in steps.
-    pub over_receiver: [i16; 2],
-    /// Relative gradient of what a point of the source sends, times its radius, in steps.
-    pub over_source: [i16; 2],
+    /// Relative gradient of what arrives over the receiver, per radius, as in [`Gradients`].
+    pub over_receiver: [i8; 2],
+    /// Relative gradient of what a point of the source sends, per radius, as in [`Gradients`].
+    pub over_source: [i8; 2],
 }
 
 impl Link {
-    /// Steps of a gradient in one.
-    pub const STEPS: f32 = crate::pair::Gradients::STEPS;
+    /// The gradient over the receiver, per radius.
+    #[inline]
+    pub fn receiver_gradient(&self) -> [f32; 2] {
+        self.over_receiver.map(Gradients::value)
+    }
+
+    /// The gradient over the source, per radius.
+    #[inline]
+    pub fn source_gradient(&self) -> [f32; 2] {
+        self.over_source.map(Gradients::value)
+    }
 }
 
-/// For each receiver the sources it gathers from and the coupling V X / A_receiver.
+/// Links of one receiver in the pool, with room for the next multiple of four.
+#[derive(Clone, Copy, Debug, Default)]
+struct Span {
+    start: u32,
+    len: u32,
+}
+
+/// Links are kept in blocks with room for a multiple of so many.
+const ROOM: u32 = 4;
+
+fn room(len: u32) -> u32 {
+    len.next_multiple_of(ROOM)
+}
+
+/// The links of all receivers, in one pool; each pair of a receiver and a source at most once.
 #[derive(Clone, Debug, Default)]
 pub struct Links {
-    offsets: Vec<u32>,
-    entries: Vec<Link>,
+    spans: Vec<Span>,
+    pool: Vec<Link>,
+    /// Room in the pool that no span has.
+    lost: usize,
 }
 
 /// Counts first, then fills: two passes over the links, no sorting.
 #[derive(Clone, Debug)]
 pub struct LinksBuilder {
-    counts: Vec<u32>,
+    spans: Vec<Span>,
 }
 
 impl LinksBuilder {
     /// For `elements` elements.
     pub fn new(elements: usize) -> LinksBuilder {
-        LinksBuilder { counts: vec![0; elements + 1] }
+        LinksBuilder { spans: vec![Span::default(); elements] }
     }
 
     /// Announces one source of a receiver.
     #[inline]
     pub fn count(&mut self, receiver: u32) {
-        self.counts[receiver as usize + 1] += 1;
+        self.spans[receiver as usize].len += 1;
     }
 
     /// Ends counting; `fill` is called once and must hand in as many sources as were announced, as
     /// (receiver, link). Links keep the order in which they are handed in.
-    pub fn fill(self, fill: impl FnOnce(&mut dyn FnMut(u32, Link))) -> Links {
-        let mut offsets = self.counts;
-        for k in 1..offsets.len() {
-            offsets[k] += offsets[k - 1];
+    pub fn fill(mut self, fill: impl FnOnce(&mut dyn FnMut(u32, Link))) -> Links {
+        let mut total = 0;
+        for span in &mut self.spans {
+            span.start = total;
+            total += room(span.len);
+            span.len = 0;
         }
-        let total = offsets.last().copied().unwrap_or(0) as usize;
-        let mut entries = vec![Link::default(); total];
-        let mut next = offsets.clone();
+        let mut pool = vec![Link::default(); total as usize];
+        let spans = &mut self.spans;
         fill(&mut |receiver, link| {
-            let at = &mut next[receiver as usize];
-            entries[*at as usize] = link;
-            *at += 1;
+            let span = &mut spans[receiver as usize];
+            pool[(span.start + span.len) as usize] = link;
+            span.len += 1;
         });
-        Links { offsets, entries }
+        Links { spans: self.spans, pool, lost: 0 }
     }
 }
 
@@ -66,17 +94,139 @@ impl Links {
     /// The links of a receiver.
     #[inline]
     pub fn of(&self, receiver: u32) -> &[Link] {
-        let at = receiver as usize;
-        &self.entries[self.offsets[at] as usize..self.offsets[at + 1] as usize]
+        let span = self.spans[receiver as usize];
+        &self.pool[span.start as usize..(span.start + span.len) as usize]
     }
 
-    /// Elements.
+    /// Receivers there is room for.
     pub fn elements(&self) -> usize {
-        self.offsets.len().saturating_sub(1)
+        self.spans.len()
+    }
+
+    /// Makes room for receivers with higher ids; they have no links yet.
+    pub fn extend(&mut self, elements: usize) {
+        if elements > self.spans.len() {
+            self.spans.resize(elements, Span::default());
+        }
+    }
+
+    /// Adds a link, or gives that from the same source new values.
+    pub fn set(&mut self, receiver: u32, link: Link) {
+        if let Some(at) = self.find(receiver, link.source) {
+            self.pool[at] = link;
+            return;
+        }
+        let span = self.spans[receiver as usize];
+        if span.len == room(span.len) {
+            self.relocate(receiver);
+        }
+        let span = &mut self.spans[receiver as usize];
+        self.pool[(span.start + span.len) as usize] = link;
+        span.len += 1;
+    }
+
+    /// Removes the link from a source, if there is one; the others may change their order.
+    pub fn remove(&mut self, receiver: u32, source: u32) {
+        let Some(at) = self.find(receiver, source) else { return };
+        let span = &mut self.spans[receiver as usize];
+        let before = room(span.len);
+        span.len -= 1;
+        self.lost += (before - room(span.len)) as usize;
+        self.pool[at] = self.pool[(span.start + span.len) as usize];
+    }
+
+    /// Puts the links of a receiver in the order of their sources.
+    pub fn sort(&mut self, receiver: u32) {
+        let span = self.spans[receiver as usize];
+        self.pool[span.start as usize..(span.start + span.len) as usize]
+            .sort_unstable_by_key(|l| l.source);
+    }
+
+    fn find(&self, receiver: u32, source: u32) -> Option<usize> {
+        let at = self.of(receiver).iter().position(|l| l.source == source)?;
+        Some(self.spans[receiver as usize].start as usize + at)
+    }
+
+    /// Moves a full block to the end of the pool, where there is room for more.
+    fn relocate(&mut self, receiver: u32) {
+        let Span { start, len } = self.spans[receiver as usize];
+        let (from, to) = (start as usize, self.pool.len());
+        let wanted = to + (len + ROOM) as usize;
+        if wanted > self.pool.capacity() {
+            self.pool.reserve_exact(wanted / 16 + (len + ROOM) as usize);
+        }
+        self.pool.extend_from_within(from..from + len as usize);
+        self.pool.resize(wanted, Link::default());
+        self.lost += len as usize;
+        self.spans[receiver as usize].start = to as u32;
+    }
+
+    /// Moves everything together where more than an eighth of the pool is lost.
+    pub fn tidy(&mut self) {
+        if self.lost * 8 <= self.pool.len() {
+            return;
+        }
+        let total: u32 = self.spans.iter().map(|s| room(s.len)).sum();
+        let mut pool = Vec::with_capacity(total as usize);
+        for span in &mut self.spans {
+            let from = span.start as usize;
+            span.start = pool.len() as u32;
+            pool.extend_from_slice(&self.pool[from..from + span.len as usize]);
+            pool.resize((span.start + room(span.len)) as usize, Link::default());
+        }
+        *self = Links { spans: std::mem::take(&mut self.spans), pool, lost: 0 };
+    }
+
+    /// Bytes held by the links.
+    pub fn pool_bytes(&self) -> u64 {
+        (self.pool.capacity() * size_of::<Link>()) as u64
+    }
+
+    /// Bytes held to say where the links of each receiver are.
+    pub fn span_bytes(&self) -> u64 {
+        (self.spans.capacity() * size_of::<Span>()) as u64
     }
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> u64 {
-        (self.offsets.capacity() * 4 + self.entries.capacity() * size_of::<Link>()) as u64
+        self.pool_bytes() + self.span_bytes()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// Whatever is set, removed and tidied, a table remembers what the pool should hold.
+        #[test]
+        fn the_pool_holds_what_was_put_in(
+            steps in prop::collection::vec((0..7_u32, 0..9_u32, 0..4_u32), 0..400)
+        ) {
+            let mut links = Links::default();
+            links.extend(7);
+            let mut table = [[0.0_f32; 9]; 7];
+            for (k, (receiver, source, action)) in steps.into_iter().enumerate() {
+                let coupling = if action == 0 { 0.0 } else { k as f32 + 1.0 };
+                table[receiver as usize][source as usize] = coupling;
+                match action {
+                    0 => links.remove(receiver, source),
+                    _ => links.set(receiver, Link { source, coupling, ..Link::default() }),
+                }
+                if action == 3 {
+                    links.tidy();
+                    links.sort(receiver);
+                }
+                for (r, row) in table.iter().enumerate() {
+                    let held = links.of(r as u32);
+                    prop_assert_eq!(held.len(), row.iter().filter(|c| **c > 0.0).count());
+                    for link in held {
+                        prop_assert_eq!(link.coupling, row[link.source as usize]);
+                    }
+                }
+            }
+        }
     }
 }

@@ -6,4 +6,4 @@ mod links;
 mod radiosity;
 
 pub use links::{Link, Links, LinksBuilder};
-pub use radiosity::{Linear, Lit, Place, Radiosity, Stop, Surfaces};
+pub use radiosity::{Dirty, Linear, Lit, Place, Radiosity, Stop, Surfaces, row_sums};

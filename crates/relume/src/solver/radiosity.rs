@@ -4,17 +4,17 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use crate::element::ElementId;
+
 use super::links::{Link, Links};
 
-/// Reflectance and exitance of one material (or intensity of one light), linear RGB.
+/// Reflectance and exitance of one material, linear RGB.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lit {
     /// Reflectance rho.
     pub reflectance: [f32; 3],
-    /// Exitance M, W/m2; for a punctual light its intensity.
+    /// Exitance M, W/m2.
     pub exitance: [f32; 3],
-    /// Whether it takes part in row sums: surfaces do, punctual lights do not.
-    pub counts: bool,
 }
 
 /// Where an element lies in its patch's frame.
@@ -28,24 +28,26 @@ pub struct Place {
     pub moment: [f32; 3],
 }
 
-/// The hierarchy as the solver sees it: parents come before children.
+/// The hierarchy as the solver sees it: quadtrees over facets.
 pub trait Surfaces: Sync {
-    /// Elements.
+    /// Room for elements: ids are below this.
     fn len(&self) -> usize;
     /// Whether there are none.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Parent of an element within its quadtree.
-    fn parent(&self, id: u32) -> Option<u32>;
+    /// The roots of the quadtrees.
+    fn facets(&self) -> &[ElementId];
+    /// Root of the quadtree that an element is in.
+    fn facet_of(&self, id: u32) -> u32;
     /// Children of an element within its quadtree.
     fn children(&self, id: u32) -> Range<u32>;
     /// Area, m2.
     fn area_m2(&self, id: u32) -> f64;
-    /// Where it lies.
+    /// Where an element lies.
     fn place(&self, id: u32) -> Place;
-    /// What it is made of; `None` for nodes that carry no radiosity (clusters).
-    fn lit(&self, id: u32) -> Option<&Lit>;
+    /// What a facet is made of.
+    fn lit(&self, facet: u32) -> &Lit;
 }
 
 /// When to stop.
@@ -53,30 +55,45 @@ pub trait Surfaces: Sync {
 pub enum Stop {
     /// After exactly this many sweeps.
     Sweeps(u32),
-    /// When no element's radiosity changes by more than this, relative to the mean radiosity.
+    /// When no element's radiosity would change by more than this, relative to the mean radiosity.
     Residual(f64),
 }
 
-/// A quantity that varies linearly over an element: red, green, blue and, last, what row sums
-/// count.
+/// Which receivers to gather anew to begin with.
+#[derive(Clone, Debug)]
+pub enum Dirty {
+    /// All of them.
+    All,
+    /// Some of them, and all that depends on them.
+    Some {
+        /// Receivers whose links changed.
+        receivers: Vec<u32>,
+        /// Facets whose elements came or went.
+        facets: Vec<u32>,
+    },
+}
+
+/// A quantity that varies linearly over an element, red, green and blue.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Linear {
     /// Mean over the element.
-    pub mean: [f32; 4],
-    /// Gradient in the patch's frame, per metre (of radiosities in a solve: per radius).
-    pub gradient: [[f32; 4]; 2],
+    pub mean: [f32; 3],
+    /// Gradient in the patch's frame, per metre (of radiosities: per radius).
+    pub gradient: [[f32; 3]; 2],
 }
 
-/// The solution.
+/// The solution: 72 bytes an element.
 #[derive(Clone, Debug, Default)]
 pub struct Radiosity {
     /// Gradients are per radius of the element.
     radiosity: Vec<Linear>,
-    /// Gradients are per metre.
-    irradiance: Vec<Linear>,
-    /// Sweeps made.
+    /// What an element's own links bring, without those of its ancestors. Gradients are per metre.
+    gathered: Vec<Linear>,
+    /// Sweeps made by the last solve.
     pub sweeps: u32,
-    /// Largest change of an element's radiosity in the last sweep, relative to the mean.
+    /// Receivers gathered by the last solve, each time counted.
+    pub gathers: u64,
+    /// Largest change that was left undone, relative to the mean radiosity.
     pub residual: f64,
 }
 
@@ -86,156 +103,167 @@ const SWEEPS_MAX: u32 = 10_000;
 /// Receivers gathered by one task.
 const CHUNK: usize = 256;
 
+/// Share of the receivers above which all are gathered: to find out which is dearer then.
+const MANY: usize = 4;
+
 impl Linear {
     /// Value at an offset from the centroid (in the unit of the gradient), unclamped.
     #[inline]
-    pub fn at(&self, x: f32, y: f32) -> [f32; 4] {
+    pub fn at(&self, x: f32, y: f32) -> [f32; 3] {
         let mut out = self.mean;
         for (c, value) in out.iter_mut().enumerate() {
             *value += self.gradient[0][c] * x + self.gradient[1][c] * y;
         }
         out
     }
+
+    /// The same about another centroid, per metre.
+    fn about(&self, own: &Place, other: &Place) -> Linear {
+        let [dx, dy] = [0, 1].map(|k| other.centroid[k] - own.centroid[k]);
+        Linear { mean: self.at(dx, dy), ..*self }
+    }
+
+    fn plus(mut self, other: &Linear) -> Linear {
+        for c in 0..3 {
+            self.mean[c] += other.mean[c];
+            self.gradient[0][c] += other.gradient[0][c];
+            self.gradient[1][c] += other.gradient[1][c];
+        }
+        self
+    }
+
+    fn difference(&self, other: &Linear) -> f32 {
+        let mut out = 0.0_f32;
+        for c in 0..3 {
+            out = out.max((self.mean[c] - other.mean[c]).abs());
+            out = out.max((self.gradient[0][c] - other.gradient[0][c]).abs());
+            out = out.max((self.gradient[1][c] - other.gradient[1][c]).abs());
+        }
+        out
+    }
 }
 
 impl Radiosity {
-    /// Solves from `start`: the radiosity of each element to begin with, or exitance if `None`.
-    pub fn solve(
-        surfaces: &impl Surfaces,
-        links: &Links,
-        start: Option<&dyn Fn(u32) -> [f32; 3]>,
-        stop: Stop,
-    ) -> Radiosity {
-        let n = surfaces.len();
-        let mut out = Radiosity {
-            radiosity: vec![Linear::default(); n],
-            irradiance: vec![Linear::default(); n],
-            ..Radiosity::default()
-        };
-        for id in 0..n as u32 {
-            if let Some(lit) = surfaces.lit(id) {
-                let [r, g, b] = start.map_or(lit.exitance, |s| s(id));
-                out.radiosity[id as usize].mean = [r, g, b, f32::from(u8::from(lit.counts))];
-            }
-        }
-        loop {
-            out.gather(surfaces, links);
-            out.push(surfaces);
-            out.residual = out.reflect(surfaces);
-            out.pull(surfaces);
-            out.sweeps += 1;
-            let done = match stop {
-                Stop::Sweeps(count) => out.sweeps >= count,
-                Stop::Residual(limit) => out.residual <= limit,
-            };
-            if done || out.sweeps >= SWEEPS_MAX {
-                return out;
-            }
-        }
-    }
-
-    fn gather(&mut self, surfaces: &impl Surfaces, links: &Links) {
-        let radiosity = &self.radiosity;
-        self.irradiance.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
-            for (k, h) in out.iter_mut().enumerate() {
-                let id = (chunk * CHUNK + k) as u32;
-                let list = links.of(id);
-                *h = Linear::default();
-                if !list.is_empty() {
-                    *h = gather_one(radiosity, list, 1.0 / surfaces.place(id).radius);
-                }
-            }
-        });
-    }
-
-    fn push(&mut self, surfaces: &impl Surfaces) {
-        for id in 0..surfaces.len() as u32 {
-            if let Some(parent) = surfaces.parent(id) {
-                let (p, q) = (surfaces.place(parent).centroid, surfaces.place(id).centroid);
-                let from = self.irradiance[parent as usize];
-                let mean = from.at(q[0] - p[0], q[1] - p[1]);
-                let to = &mut self.irradiance[id as usize];
-                for c in 0..4 {
-                    to.mean[c] += mean[c];
-                    to.gradient[0][c] += from.gradient[0][c];
-                    to.gradient[1][c] += from.gradient[1][c];
-                }
-            }
-        }
-    }
-
-    fn reflect(&mut self, surfaces: &impl Surfaces) -> f64 {
-        let (mut change, mut flux, mut area) = (0.0_f32, 0.0_f64, 0.0_f64);
-        for id in 0..surfaces.len() as u32 {
-            let Some(lit) = surfaces.lit(id) else { continue };
-            if !surfaces.children(id).is_empty() || !lit.counts {
-                continue;
-            }
-            let h = &self.irradiance[id as usize];
-            let b = &mut self.radiosity[id as usize];
-            let radius = surfaces.place(id).radius;
-            let mut sum = 0.0;
-            for c in 0..3 {
-                let rho = lit.reflectance[c];
-                // A gradient pushed down a long way may reach below zero; light does not.
-                let new = lit.exitance[c] + rho * h.mean[c].max(0.0);
-                change = change.max((new - b.mean[c]).abs());
-                b.mean[c] = new;
-                for axis in 0..2 {
-                    b.gradient[axis][c] = rho * h.gradient[axis][c] * radius;
-                }
-                sum += f64::from(new);
-            }
-            flux += surfaces.area_m2(id) * sum / 3.0;
-            area += surfaces.area_m2(id);
-        }
-        if flux > 0.0 { f64::from(change) * area / flux } else { 0.0 }
-    }
-
-    fn pull(&mut self, surfaces: &impl Surfaces) {
-        for id in (0..surfaces.len() as u32).rev() {
-            let children = surfaces.children(id);
-            if !children.is_empty() && surfaces.lit(id).is_some() {
-                self.radiosity[id as usize] = self.pulled(surfaces, id, children);
-            }
-        }
-    }
-
-    /// The linear function over an element that fits those over its children best.
-    fn pulled(&self, surfaces: &impl Surfaces, id: u32, children: Range<u32>) -> Linear {
-        let own = surfaces.place(id);
-        let area: f64 = children.clone().map(|c| surfaces.area_m2(c)).sum();
-        let mut out = Linear { mean: self.radiosity[id as usize].mean, ..Linear::default() };
-        let mut mean = [0.0_f64; 3];
-        let mut first = [[0.0_f64; 3]; 2];
-        let mut moment = [0.0_f64; 3];
-        for child in children {
-            let share = surfaces.area_m2(child) / area;
-            let place = surfaces.place(child);
-            let b = &self.radiosity[child as usize];
-            let dx = f64::from(place.centroid[0] - own.centroid[0]);
-            let dy = f64::from(place.centroid[1] - own.centroid[1]);
-            let [xx, xy, yy] = place.moment.map(f64::from);
-            moment[0] += share * (dx * dx + xx);
-            moment[1] += share * (dx * dy + xy);
-            moment[2] += share * (dy * dy + yy);
-            for c in 0..3 {
-                let value = f64::from(b.mean[c]);
-                let gx = f64::from(b.gradient[0][c] / place.radius);
-                let gy = f64::from(b.gradient[1][c] / place.radius);
-                mean[c] += share * value;
-                first[0][c] += share * (dx * value + xx * gx + xy * gy);
-                first[1][c] += share * (dy * value + xy * gx + yy * gy);
-            }
-        }
-        let [xx, xy, yy] = moment;
-        let scale = f64::from(own.radius) / (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
-        for c in 0..3 {
-            out.mean[c] = mean[c] as f32;
-            out.gradient[0][c] = ((first[0][c] * yy - first[1][c] * xy) * scale) as f32;
-            out.gradient[1][c] = ((first[1][c] * xx - first[0][c] * xy) * scale) as f32;
+    /// A solution to begin with: the exitance of surfaces. Sources other than surfaces are given by
+    /// [`Radiosity::set`].
+    pub fn new(surfaces: &impl Surfaces) -> Radiosity {
+        let mut out = Radiosity::default();
+        out.extend(surfaces.len());
+        for &facet in surfaces.facets() {
+            let exitance = surfaces.lit(facet.0).exitance;
+            for_each_below(surfaces, facet.0, &mut |id| out.set(id, exitance));
         }
         out
+    }
+
+    /// Makes room for elements with higher ids.
+    pub fn extend(&mut self, len: usize) {
+        if len > self.radiosity.len() {
+            self.radiosity.resize(len, Linear::default());
+            self.gathered.resize(len, Linear::default());
+        }
+    }
+
+    /// Gives an element a constant radiosity to begin with.
+    pub fn set(&mut self, id: u32, radiosity: [f32; 3]) {
+        self.radiosity[id as usize] = Linear { mean: radiosity, ..Linear::default() };
+    }
+
+    /// Gives the new children of an element its radiosity to begin with.
+    pub fn inherit(&mut self, surfaces: &impl Surfaces, parent: u32) {
+        let own = surfaces.place(parent);
+        let from = self.radiosity[parent as usize];
+        for child in surfaces.children(parent) {
+            let place = surfaces.place(child);
+            let [x, y] = [0, 1].map(|k| (place.centroid[k] - own.centroid[k]) / own.radius);
+            let scale = place.radius / own.radius;
+            let gradient = from.gradient.map(|g| g.map(|v| v * scale));
+            self.radiosity[child as usize] = Linear { mean: from.at(x, y), gradient };
+            self.gathered[child as usize] = Linear::default();
+        }
+    }
+
+    /// Gathers, pushes and pulls until the solution is settled, beginning with what is dirty.
+    ///
+    /// A radiosity that would change by no more than the residual stays as it is, so that whoever
+    /// gathered it has gathered its present value: nothing drifts, however often this is called.
+    pub fn solve(&mut self, surfaces: &impl Surfaces, links: &Links, dirty: Dirty, stop: Stop) {
+        let mut work = Work::new(surfaces, dirty);
+        (self.sweeps, self.gathers, self.residual) = (0, 0, 0.0);
+        loop {
+            let mean = self.mean(surfaces);
+            let keep = match stop {
+                Stop::Sweeps(_) => 0.0,
+                Stop::Residual(limit) => (limit * mean) as f32,
+            };
+            self.gather(surfaces, links, &work);
+            let settled = self.settle(surfaces, &work, keep);
+            let largest = settled.iter().map(|s| s.kept).fold(0.0, f32::max);
+            self.residual = if mean > 0.0 { f64::from(largest) / mean } else { 0.0 };
+            self.sweeps += 1;
+            let done = match stop {
+                Stop::Sweeps(count) => self.sweeps >= count,
+                Stop::Residual(_) => settled.iter().all(|s| s.changed.is_empty()),
+            };
+            for &(id, value) in settled.iter().flat_map(|s| &s.changed) {
+                self.radiosity[id as usize] = value;
+            }
+            if done || self.sweeps >= SWEEPS_MAX {
+                return;
+            }
+            work.follow(surfaces, links, &settled);
+        }
+    }
+
+    /// Area-weighted mean radiosity of all surfaces and channels.
+    fn mean(&self, surfaces: &impl Surfaces) -> f64 {
+        let (mut flux, mut area) = (0.0, 0.0);
+        for facet in surfaces.facets() {
+            let a = surfaces.area_m2(facet.0);
+            let b: f32 = self.radiosity[facet.0 as usize].mean.iter().sum();
+            flux += a * f64::from(b) / 3.0;
+            area += a;
+        }
+        if area > 0.0 { flux / area } else { 0.0 }
+    }
+
+    fn gather(&mut self, surfaces: &impl Surfaces, links: &Links, work: &Work) {
+        let radiosity = &self.radiosity;
+        let one = |id: u32| match links.of(id) {
+            [] => Linear::default(),
+            list => gather_one(radiosity, list, 1.0 / surfaces.place(id).radius),
+        };
+        match &work.receivers {
+            None => {
+                self.gathers += self.gathered.len() as u64;
+                self.gathered.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
+                    for (k, h) in out.iter_mut().enumerate() {
+                        *h = one((chunk * CHUNK + k) as u32);
+                    }
+                });
+            }
+            Some(receivers) => {
+                self.gathers += receivers.len() as u64;
+                let gathered: Vec<Linear> =
+                    receivers.par_iter().with_min_len(CHUNK).map(|&id| one(id)).collect();
+                for (&id, h) in receivers.iter().zip(gathered) {
+                    self.gathered[id as usize] = h;
+                }
+            }
+        }
+    }
+
+    /// New radiosities of all elements of the facets concerned, as far as they differ.
+    fn settle(&self, surfaces: &impl Surfaces, work: &Work, keep: f32) -> Vec<Settled> {
+        let facet = |&facet: &u32| {
+            let mut out = Settled { changed: Vec::new(), kept: 0.0 };
+            let lit = surfaces.lit(facet);
+            let place = surfaces.place(facet);
+            let below = Below { solution: self, surfaces, lit, keep };
+            below.settle(facet, &place, &Linear::default(), &mut out);
+            out
+        };
+        work.facets.par_iter().map(facet).collect()
     }
 
     /// Radiosity of an element: mean, and gradient per radius, W/m2.
@@ -244,35 +272,245 @@ impl Radiosity {
         &self.radiosity[id as usize]
     }
 
-    /// Irradiance of an element with that of all its ancestors: mean, and gradient per metre.
-    #[inline]
-    pub fn linear_irradiance(&self, id: u32) -> &Linear {
-        &self.irradiance[id as usize]
-    }
-
     /// Radiosity of an element, W/m2.
     #[inline]
     pub fn radiosity(&self, id: u32) -> [f32; 3] {
-        let [r, g, b, _] = self.radiosity[id as usize].mean;
-        [r, g, b]
+        self.radiosity[id as usize].mean
     }
 
-    /// Irradiance of an element with that of all its ancestors, W/m2: the whole for a leaf.
-    #[inline]
-    pub fn irradiance(&self, id: u32) -> [f32; 3] {
-        let [r, g, b, _] = self.irradiance[id as usize].mean;
-        [r.max(0.0), g.max(0.0), b.max(0.0)]
-    }
-
-    /// Sum of the form factors from an element over its and its ancestors' links.
-    #[inline]
-    pub fn row_sum(&self, id: u32) -> f32 {
-        self.irradiance[id as usize].mean[3]
+    /// Calls `visit` with the irradiance (mean, and gradient per metre) of each leaf of a facet,
+    /// children in order.
+    pub fn irradiances(
+        &self,
+        surfaces: &impl Surfaces,
+        facet: u32,
+        visit: &mut dyn FnMut(u32, &Linear),
+    ) {
+        let own = |id: u32| self.gathered[id as usize];
+        push(surfaces, (facet, &surfaces.place(facet)), &Linear::default(), &own, visit);
     }
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> u64 {
-        ((self.radiosity.capacity() + self.irradiance.capacity()) * size_of::<Linear>()) as u64
+        ((self.radiosity.capacity() + self.gathered.capacity()) * size_of::<Linear>()) as u64
+    }
+}
+
+/// Calls `visit` with the sum of the form factors from each leaf of a facet, over its and its
+/// ancestors' links.
+pub fn row_sums(
+    surfaces: &impl Surfaces,
+    links: &Links,
+    counts: &dyn Fn(u32) -> bool,
+    facet: u32,
+    visit: &mut dyn FnMut(u32, f32),
+) {
+    let own = |id: u32| {
+        let mut sum = Linear::default();
+        let list = links.of(id);
+        for link in list.iter().filter(|l| counts(l.source)) {
+            sum.mean[0] += link.coupling;
+            let [u, v] = link.receiver_gradient();
+            sum.gradient[0][0] += u * link.coupling;
+            sum.gradient[1][0] += v * link.coupling;
+        }
+        if !list.is_empty() {
+            let per_radius = 1.0 / surfaces.place(id).radius;
+            sum.gradient.iter_mut().for_each(|g| g[0] *= per_radius);
+        }
+        sum
+    };
+    let place = surfaces.place(facet);
+    push(surfaces, (facet, &place), &Linear::default(), &own, &mut |id, sum| {
+        visit(id, sum.mean[0]);
+    });
+}
+
+/// Adds `own` up from the root of a quadtree down to its leaves.
+fn push(
+    surfaces: &impl Surfaces,
+    (id, place): (u32, &Place),
+    inherited: &Linear,
+    own: &dyn Fn(u32) -> Linear,
+    visit: &mut dyn FnMut(u32, &Linear),
+) {
+    let whole = own(id).plus(inherited);
+    let children = surfaces.children(id);
+    if children.is_empty() {
+        return visit(id, &whole);
+    }
+    for child in children {
+        let at = surfaces.place(child);
+        push(surfaces, (child, &at), &whole.about(place, &at), own, visit);
+    }
+}
+
+fn for_each_below(surfaces: &impl Surfaces, id: u32, visit: &mut dyn FnMut(u32)) {
+    visit(id);
+    for child in surfaces.children(id) {
+        for_each_below(surfaces, child, visit);
+    }
+}
+
+/// What one sweep has to do.
+struct Work {
+    /// Receivers to be gathered; `None` for all.
+    receivers: Option<Vec<u32>>,
+    facets: Vec<u32>,
+    /// Receivers marked for the next sweep, a bit each.
+    marks: Vec<u64>,
+}
+
+impl Work {
+    fn new(surfaces: &impl Surfaces, dirty: Dirty) -> Work {
+        let mut work =
+            Work { receivers: None, facets: Vec::new(), marks: vec![0; surfaces.len() / 64 + 1] };
+        match dirty {
+            Dirty::All => work.all(surfaces),
+            Dirty::Some { receivers, facets } => work.some(surfaces, receivers, facets),
+        }
+        work
+    }
+
+    fn all(&mut self, surfaces: &impl Surfaces) {
+        self.receivers = None;
+        self.facets = surfaces.facets().iter().map(|f| f.0).collect();
+    }
+
+    fn some(&mut self, surfaces: &impl Surfaces, receivers: Vec<u32>, mut facets: Vec<u32>) {
+        if receivers.len() > surfaces.len() / MANY {
+            return self.all(surfaces);
+        }
+        facets.extend(receivers.iter().map(|&id| surfaces.facet_of(id)));
+        facets.sort_unstable();
+        facets.dedup();
+        self.facets = facets;
+        self.receivers = Some(receivers);
+    }
+
+    /// The next sweep gathers whoever has a link from an element that changed.
+    fn follow(&mut self, surfaces: &impl Surfaces, links: &Links, settled: &[Settled]) {
+        let changed: usize = settled.iter().map(|s| s.changed.len()).sum();
+        if changed > surfaces.len() / MANY {
+            return self.all(surfaces);
+        }
+        let mut receivers = Vec::new();
+        // Whoever an element gathers from gathers from it.
+        for &(id, _) in settled.iter().flat_map(|s| &s.changed) {
+            for link in links.of(id) {
+                let bit = 1 << (link.source % 64);
+                let word = &mut self.marks[link.source as usize / 64];
+                if *word & bit == 0 {
+                    *word |= bit;
+                    receivers.push(link.source);
+                }
+            }
+        }
+        receivers.sort_unstable();
+        for &id in &receivers {
+            self.marks[id as usize / 64] = 0;
+        }
+        // Sources that are no surfaces receive nothing: they have no links of their own.
+        receivers.retain(|&id| !links.of(id).is_empty());
+        self.some(surfaces, receivers, Vec::new());
+    }
+}
+
+/// What pushing and pulling through one facet found.
+struct Settled {
+    /// Elements with their new radiosities.
+    changed: Vec<(u32, Linear)>,
+    /// Largest change that was not made.
+    kept: f32,
+}
+
+/// One facet being settled.
+struct Below<'a, S> {
+    solution: &'a Radiosity,
+    surfaces: &'a S,
+    lit: &'a Lit,
+    keep: f32,
+}
+
+impl<S: Surfaces> Below<'_, S> {
+    /// Pushes irradiance down and pulls radiosity up; returns the new radiosity of `id`.
+    fn settle(&self, id: u32, place: &Place, inherited: &Linear, out: &mut Settled) -> Linear {
+        let h = self.solution.gathered[id as usize].plus(inherited);
+        let children = self.surfaces.children(id);
+        let b = if children.is_empty() {
+            self.reflect(&h, place.radius)
+        } else {
+            let mut fit = Fit::default();
+            for child in children {
+                let at = self.surfaces.place(child);
+                let b = self.settle(child, &at, &h.about(place, &at), out);
+                fit.add(self.surfaces.area_m2(child), place, &at, &b);
+            }
+            fit.linear(place.radius)
+        };
+        let difference = b.difference(&self.solution.radiosity[id as usize]);
+        if difference > self.keep {
+            out.changed.push((id, b));
+        } else {
+            out.kept = out.kept.max(difference);
+        }
+        b
+    }
+
+    fn reflect(&self, h: &Linear, radius: f32) -> Linear {
+        let mut b = Linear::default();
+        for c in 0..3 {
+            let rho = self.lit.reflectance[c];
+            // A gradient pushed down a long way may reach below zero; light does not.
+            b.mean[c] = self.lit.exitance[c] + rho * h.mean[c].max(0.0);
+            for axis in 0..2 {
+                b.gradient[axis][c] = rho * h.gradient[axis][c] * radius;
+            }
+        }
+        b
+    }
+}
+
+/// The linear function over an element that fits those over its children best.
+#[derive(Default)]
+struct Fit {
+    area: f64,
+    mean: [f64; 3],
+    first: [[f64; 3]; 2],
+    moment: [f64; 3],
+}
+
+impl Fit {
+    fn add(&mut self, area: f64, own: &Place, place: &Place, b: &Linear) {
+        let dx = f64::from(place.centroid[0] - own.centroid[0]);
+        let dy = f64::from(place.centroid[1] - own.centroid[1]);
+        let [xx, xy, yy] = place.moment.map(f64::from);
+        self.area += area;
+        self.moment[0] += area * (dx * dx + xx);
+        self.moment[1] += area * (dx * dy + xy);
+        self.moment[2] += area * (dy * dy + yy);
+        for c in 0..3 {
+            let value = f64::from(b.mean[c]);
+            let gx = f64::from(b.gradient[0][c] / place.radius);
+            let gy = f64::from(b.gradient[1][c] / place.radius);
+            self.mean[c] += area * value;
+            self.first[0][c] += area * (dx * value + xx * gx + xy * gy);
+            self.first[1][c] += area * (dy * value + xy * gx + yy * gy);
+        }
+    }
+
+    fn linear(&self, radius: f32) -> Linear {
+        let per_area = 1.0 / self.area;
+        let [xx, xy, yy] = self.moment.map(|m| m * per_area);
+        let scale = f64::from(radius) * per_area / (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
+        let mut out = Linear::default();
+        for c in 0..3 {
+            let [x, y] = [self.first[0][c], self.first[1][c]];
+            out.mean[c] = (self.mean[c] * per_area) as f32;
+            out.gradient[0][c] = ((x * yy - y * xy) * scale) as f32;
+            out.gradient[1][c] = ((y * xx - x * xy) * scale) as f32;
+        }
+        out
     }
 }
 
@@ -280,13 +518,13 @@ impl Radiosity {
 #[inline]
 fn gather_one(radiosity: &[Linear], list: &[Link], per_radius: f32) -> Linear {
     let mut out = Linear::default();
-    let [mut gx, mut gy] = [[0.0_f32; 4]; 2];
+    let [mut gx, mut gy] = [[0.0_f32; 3]; 2];
     for link in list {
         let b = &radiosity[link.source as usize];
-        let [su, sv] = link.over_source.map(|g| f32::from(g) * (1.0 / Link::STEPS));
-        let [ru, rv] = link.over_receiver.map(f32::from);
+        let [su, sv] = link.source_gradient();
+        let [ru, rv] = link.receiver_gradient();
         let moment = SOURCE_MOMENT * link.coupling;
-        for c in 0..4 {
+        for c in 0..3 {
             let mean = link.coupling * b.mean[c];
             let sent = mean + moment * (su * b.gradient[0][c] + sv * b.gradient[1][c]);
             out.mean[c] += sent;
@@ -294,8 +532,7 @@ fn gather_one(radiosity: &[Linear], list: &[Link], per_radius: f32) -> Linear {
             gy[c] += rv * mean;
         }
     }
-    let scale = per_radius / Link::STEPS;
-    out.gradient = [gx.map(|g| g * scale), gy.map(|g| g * scale)];
+    out.gradient = [gx.map(|g| g * per_radius), gy.map(|g| g * per_radius)];
     out
 }
 
@@ -307,14 +544,17 @@ mod tests {
     use super::*;
 
     /// Two plates, the second split in two, with given couplings.
-    struct Plates(Lit);
+    struct Plates(Lit, [ElementId; 2]);
 
     impl Surfaces for Plates {
         fn len(&self) -> usize {
             4
         }
-        fn parent(&self, id: u32) -> Option<u32> {
-            (id >= 2).then_some(1)
+        fn facets(&self) -> &[ElementId] {
+            &self.1
+        }
+        fn facet_of(&self, id: u32) -> u32 {
+            id.min(1)
         }
         fn children(&self, id: u32) -> Range<u32> {
             if id == 1 { 2..4 } else { 0..0 }
@@ -326,38 +566,51 @@ mod tests {
             let x = [0.0, 0.0, -0.25, 0.25][id as usize];
             Place { centroid: [x, 0.0], radius: 0.5, moment: [0.05, 0.0, 0.05] }
         }
-        fn lit(&self, _: u32) -> Option<&Lit> {
-            Some(&self.0)
+        fn lit(&self, _: u32) -> &Lit {
+            &self.0
         }
+    }
+
+    fn plates() -> (Plates, Links) {
+        let lit = Lit { reflectance: [0.5, 0.8, 0.0], exitance: [1.0, 2.0, 3.0] };
+        let mut links = Links::default();
+        links.extend(4);
+        for (receiver, source, coupling) in [(0, 2, 0.5), (0, 3, 0.5), (2, 0, 1.0), (3, 0, 1.0)] {
+            links.set(receiver, Link { source, coupling, ..Link::default() });
+        }
+        (Plates(lit, [ElementId(0), ElementId(1)]), links)
     }
 
     #[test]
     fn a_furnace_reaches_m_over_one_minus_rho_through_every_level() {
-        let lit = Lit { reflectance: [0.5, 0.8, 0.0], exitance: [1.0, 2.0, 3.0], counts: true };
-        // Plate 0 sees half of itself through plate 1 whole and half through the two parts.
-        let links =
-            [(0, 1, 0.5), (0, 2, 0.25), (0, 3, 0.25), (1, 0, 0.5), (2, 0, 0.5), (3, 0, 0.5)];
-        let mut builder = LinksBuilderHelper::default();
-        builder.0.extend(links);
-        let solved = Radiosity::solve(&Plates(lit), &builder.build(), None, Stop::Residual(1e-6));
+        let (plates, links) = plates();
+        let mut b = Radiosity::new(&plates);
+        b.solve(&plates, &links, Dirty::All, Stop::Residual(1e-7));
         for id in 0..4 {
-            for c in 0..3 {
-                let exact = lit.exitance[c] / (1.0 - lit.reflectance[c]);
-                assert!((solved.radiosity(id)[c] - exact).abs() < 1e-4 * exact);
+            for (value, want) in b.radiosity(id).iter().zip([2.0, 10.0, 3.0]) {
+                assert!((value - want).abs() < 1e-4, "{id} {value} {want}");
             }
         }
-        assert!((solved.row_sum(2) - 1.0).abs() < 1e-6);
     }
 
-    #[derive(Default)]
-    struct LinksBuilderHelper(Vec<(u32, u32, f32)>);
-
-    impl LinksBuilderHelper {
-        fn build(&self) -> Links {
-            let mut builder = super::super::LinksBuilder::new(4);
-            self.0.iter().for_each(|l| builder.count(l.0));
-            let link = |l: &(u32, u32, f32)| Link { source: l.1, coupling: l.2, ..Link::default() };
-            builder.fill(|add| self.0.iter().for_each(|l| add(l.0, link(l))))
+    #[test]
+    fn a_link_that_changes_is_followed_through_the_scene() {
+        let (plates, mut links) = plates();
+        let mut warm = Radiosity::new(&plates);
+        warm.solve(&plates, &links, Dirty::All, Stop::Residual(1e-7));
+        links.set(2, Link { source: 0, coupling: 0.25, ..Link::default() });
+        let dirty = Dirty::Some { receivers: vec![2], facets: vec![] };
+        warm.solve(&plates, &links, dirty, Stop::Residual(1e-7));
+        let mut cold = Radiosity::new(&plates);
+        cold.solve(&plates, &links, Dirty::All, Stop::Residual(1e-7));
+        for id in 0..4 {
+            for (one, two) in warm.radiosity(id).iter().zip(cold.radiosity(id)) {
+                assert!((one - two).abs() < 1e-4, "{id} {one} {two}");
+            }
         }
+        // And nothing is done where nothing changed.
+        let dirty = Dirty::Some { receivers: vec![], facets: vec![] };
+        warm.solve(&plates, &links, dirty, Stop::Residual(1e-7));
+        assert_eq!((warm.sweeps, warm.gathers), (1, 0));
     }
 }

@@ -60,28 +60,57 @@ pub struct Shaft<'a> {
     pub patches: (PatchId, PatchId),
 }
 
-impl Shaft<'_> {
+/// How strict a test of a shaft is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Test {
+    /// What counts: a blocker of a pair passes this test for the pair itself.
+    Exact,
+    /// A little wider, by less than the slack: what passes the exact test for a pair passes this one
+    /// for the pair and for every pair above it, in spite of rounding.
+    Wide,
+}
+
+impl<'a> Shaft<'a> {
     fn slack(&self) -> f64 {
         self.a.rounding_m + self.b.rounding_m
     }
 
+    /// The two ends in the frame in which a body is looked at: its own for the body that both ends
+    /// ride on, so that the answer does not depend on where that is.
+    fn seen_by(&self, body: Option<BodyId>) -> (bool, &'a WorldElement, &'a WorldElement) {
+        match self.own {
+            Some((own, a, b)) if body == Some(own) => (true, a, b),
+            _ => (false, self.a, self.b),
+        }
+    }
+
     /// Whether a patch could block any segment.
-    fn may_be_blocked_by(&self, patch: PatchId, bounds: &Aabb) -> bool {
+    fn may_be_blocked_by(&self, patch: PatchId, test: Test) -> bool {
         if patch == self.patches.0 || patch == self.patches.1 || self.view.is_hidden_twin(patch) {
             return false;
         }
-        let slack = self.slack();
-        let occluder = self.view.occluder(patch);
-        let (a_lo, a_hi) = self.a.span(&occluder.plane);
-        let (b_lo, b_hi) = self.b.span(&occluder.plane);
+        let root = self.forest.patch_root(patch);
+        let (own, a, b) = self.seen_by(Some(self.view.patch(patch).body));
+        let (occluder, bounds) = if own {
+            (self.view.occluder_in_body(patch), self.view.box_in_body(root))
+        } else {
+            (self.view.occluder(patch), self.view.fixed_box(root))
+        };
+        let (slack, margin) = match test {
+            Test::Exact => (self.slack(), 0.0),
+            Test::Wide => (0.5 * self.slack(), 0.5 * self.slack()),
+        };
+        if !shaft_meets_box(&a.bounds, &b.bounds, &bounds.grown(margin)) {
+            return false;
+        }
+        let (a_lo, a_hi) = a.span(&occluder.plane);
+        let (b_lo, b_hi) = b.span(&occluder.plane);
         if a_lo.min(b_lo) >= -slack || a_hi.max(b_hi) <= slack {
             return false;
         }
         let behind =
             |e: &WorldElement| occluder.corners.iter().all(|&c| e.plane.distance(c) <= slack);
-        !behind(self.a)
-            && !behind(self.b)
-            && shaft_meets_box(&self.a.bounds, &self.b.bounds, bounds)
+        !behind(a) && !behind(b)
     }
 
     /// Which of `parents` (candidates of a pair above) remain candidates here, appended to `out`;
@@ -89,63 +118,89 @@ impl Shaft<'_> {
     pub fn narrow(&self, parents: &Candidates, out: &mut Vec<u32>) {
         let reach = (self.b.centre - self.a.centre).length() + self.a.radius + self.b.radius;
         for &parent in parents {
-            self.walk(ElementId(parent), 0.25 * reach, &mut |id| out.push(id.0));
+            self.walk(ElementId(parent), 0.25 * reach, Test::Wide, &mut |id| {
+                out.push(id.0);
+                true
+            });
         }
     }
 
-    /// Visits the candidates at or below `id`: patches, and clusters no larger than `keep_m`.
-    fn walk(&self, id: ElementId, keep_m: f64, visit: &mut dyn FnMut(ElementId)) {
-        let bounds = self.view.fixed_box(id);
-        if bounds.is_empty() {
-            return;
+    /// The patches among and below `candidates` that may block segments of this very pair, in the
+    /// forest's order. Which they are depends on the pair alone, not on how `candidates` were found.
+    pub fn blockers(&self, candidates: &Candidates) -> Vec<PatchId> {
+        let mut out = Vec::new();
+        for &candidate in candidates {
+            self.walk(ElementId(candidate), -1.0, Test::Exact, &mut |id| {
+                out.extend(self.forest.patch(id));
+                true
+            });
+        }
+        out
+    }
+
+    /// Whether anything at or below `id` may block segments of this pair or of one below it,
+    /// what rides on `except` aside.
+    pub fn is_entered_by(&self, id: ElementId, except: Option<BodyId>) -> bool {
+        if except.is_some() && self.forest.cluster_body(id) == except {
+            return false;
+        }
+        if except.is_some() && self.forest.patch(id).is_none() {
+            // Groups of bodies are opened one by one, so that the excepted one is met.
+            let bounds = self.view.fixed_box(id).grown(self.slack());
+            return self.forest.kind(id) == Kind::Cluster
+                && shaft_meets_box(&self.a.bounds, &self.b.bounds, &bounds)
+                && self.forest.children(id).any(|c| self.is_entered_by(ElementId(c), except));
+        }
+        let mut entered = false;
+        self.walk(id, -1.0, Test::Wide, &mut |_| {
+            entered = true;
+            false
+        });
+        entered
+    }
+
+    /// Visits the candidates at or below `id`: patches, and clusters no larger than `keep_m`; ends
+    /// and returns false as soon as `visit` does.
+    fn walk(
+        &self,
+        id: ElementId,
+        keep_m: f64,
+        test: Test,
+        visit: &mut dyn FnMut(ElementId) -> bool,
+    ) -> bool {
+        let world = self.view.fixed_box(id);
+        if world.is_empty() || self.forest.kind(id) == Kind::Light {
+            return true;
         }
         if let Some(patch) = self.forest.patch(id) {
-            if self.may_be_blocked_by(patch, bounds) {
-                visit(id);
-            }
-            return;
+            return !self.may_be_blocked_by(patch, test) || visit(id);
         }
-        if self.forest.kind(id) == Kind::Light
-            || !shaft_meets_box(&self.a.bounds, &self.b.bounds, bounds)
-        {
-            return;
+        let body = self.forest.cluster_body(id);
+        let (own, a, b) = self.seen_by(body);
+        let bounds = if own { self.view.box_in_body(id) } else { world };
+        if !shaft_meets_box(&a.bounds, &b.bounds, &bounds.grown(self.slack())) {
+            return true;
         }
-        if bounds.diagonal() <= keep_m {
-            visit(id);
-            return;
+        // Groups of bodies are never kept: their boxes mix frames.
+        if body.is_some() && bounds.diagonal() <= keep_m {
+            return visit(id);
         }
-        for child in self.forest.children(id) {
-            self.walk(ElementId(child), keep_m, visit);
-        }
-    }
-
-    /// Visits the patches among and below `candidates`, which this shaft has narrowed: patches among
-    /// them are known to be in the way, only clusters are looked into.
-    fn open(&self, candidates: &Candidates, visit: &mut dyn FnMut(PatchId)) {
-        for &candidate in candidates {
-            let id = ElementId(candidate);
-            match self.forest.patch(id) {
-                Some(patch) => visit(patch),
-                None => self.walk(id, -1.0, &mut |id| {
-                    visit(self.forest.patch(id).expect("a walk ends at patches"));
-                }),
-            }
-        }
+        self.forest.children(id).all(|c| self.walk(ElementId(c), keep_m, test, visit))
     }
 
     /// The segments of `bundle` (in the world; `own` in the body's frame) that are blocked.
     fn blocked(
         &self,
         simd: Simd,
-        candidates: &Candidates,
+        blockers: &[PatchId],
         world: &SegmentBundle,
         own: Option<&SegmentBundle>,
     ) -> u16 {
         let mut mask = 0_u16;
         let slack = 2.0 * self.slack();
-        self.open(candidates, &mut |patch| {
+        for &patch in blockers {
             if mask == u16::MAX {
-                return;
+                break;
             }
             let rides = self.own.filter(|o| o.0 == self.view.patch(patch).body);
             mask |= match (rides, own) {
@@ -154,21 +209,21 @@ impl Shaft<'_> {
                 }
                 _ => world.blocked_by(simd, &self.view.occluder(patch), slack),
             };
-        });
+        }
         mask
     }
 }
 
-/// Visibility of a pair over `2^log2_count` fixed segments; a pair without candidates is clear
+/// Visibility of a pair over `2^log2_count` fixed segments; a pair without blockers is clear
 /// and traces nothing. `key` names the pair and nothing else.
 pub fn visibility(
     simd: Simd,
     shaft: &Shaft<'_>,
-    candidates: &Candidates,
+    blockers: &[PatchId],
     key: u64,
     log2_count: u32,
 ) -> Visibility {
-    if candidates.is_empty() {
+    if blockers.is_empty() {
         return Visibility::CLEAR;
     }
     let (a, b) = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
@@ -176,7 +231,7 @@ pub fn visibility(
     for block in 0..(1_u32 << log2_count) / SEGMENTS as u32 {
         let world = SegmentBundle::new(shaft.a, shaft.b, key, log2_count, block);
         let own = shaft.own.map(|(_, a, b)| SegmentBundle::new(a, b, key, log2_count, block));
-        let mask = shaft.blocked(simd, candidates, &world, own.as_ref());
+        let mask = shaft.blocked(simd, blockers, &world, own.as_ref());
         // Weights from the body's frame where there is one: they must not follow its motion.
         tally.add(own.as_ref().unwrap_or(&world), mask, a, b);
     }
@@ -187,29 +242,17 @@ pub fn visibility(
 pub const CLIPPED_MAX: usize = 12;
 
 /// Visibility of a pair by clipping, exact from 2 x 2 points in each of `cells` x `cells` parts of
-/// its smaller end (each counts as a segment), if at most twelve polygons stand in
-/// its shaft; `None` if there are more. `candidates` must have been narrowed by this shaft.
-pub fn exact_visibility(
-    shaft: &Shaft<'_>,
-    candidates: &Candidates,
-    cells: u32,
-) -> Option<Visibility> {
-    if candidates.is_empty() {
+/// its smaller end (each counts as a segment), if at most twelve polygons stand in its shaft;
+/// `None` if there are more.
+pub fn exact_visibility(shaft: &Shaft<'_>, blockers: &[PatchId], cells: u32) -> Option<Visibility> {
+    if blockers.is_empty() {
         return Some(Visibility::CLEAR);
     }
-    let mut polygons = Vec::new();
-    if candidates.len() > CLIPPED_MAX {
+    if blockers.len() > CLIPPED_MAX {
         return None;
-    }
-    shaft.open(candidates, &mut |patch| polygons.push(patch));
-    if polygons.len() > CLIPPED_MAX {
-        return None;
-    }
-    if polygons.is_empty() {
-        return Some(Visibility::CLEAR);
     }
     let (a, b) = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
-    let place = |patch: PatchId| {
+    let place = |&patch: &PatchId| {
         // Everything in one frame: that of the pair's body if it has one of its own.
         let body = shaft.view.patch(patch).body;
         match shaft.own {
@@ -222,7 +265,7 @@ pub fn exact_visibility(
             None => shaft.view.occluder(patch).corners.to_vec(),
         }
     };
-    let occluders: Vec<Vec<DVec3>> = polygons.into_iter().map(place).collect();
+    let occluders: Vec<Vec<DVec3>> = blockers.iter().map(place).collect();
     Some(clipped_visibility(a, b, &occluders, cells))
 }
 
@@ -231,14 +274,14 @@ pub fn exact_visibility(
 pub fn light_visibility(
     simd: Simd,
     shaft: &Shaft<'_>,
-    candidates: &Candidates,
+    blockers: &[PatchId],
     segments: &SegmentBundle,
 ) -> Visibility {
-    if candidates.is_empty() {
+    if blockers.is_empty() {
         return Visibility::CLEAR;
     }
     let mut tally = Tally::default();
-    tally.add(segments, shaft.blocked(simd, candidates, segments, None), shaft.a, shaft.a);
+    tally.add(segments, shaft.blocked(simd, blockers, segments, None), shaft.a, shaft.a);
     let both = tally.finish(SEGMENTS as u32, shaft.a, shaft.a);
     Visibility { gradient_b: DVec2::ZERO, spread_b: 0.0, ..both }
 }

@@ -41,17 +41,17 @@ pub(crate) fn audit(session: &Session) -> Audit {
         if !children.is_empty() {
             let sum: f64 = children.map(|c| forest.area_m2(ElementId(c))).sum();
             out.areas = out.areas.max((sum / forest.area_m2(id) - 1.0).abs());
-        } else if forest.kind(id) == Kind::Element {
-            let row = session.row_sum(id);
-            assert!(row.is_finite());
-            out.row_sum = [out.row_sum[0].min(row), out.row_sum[1].max(row)];
-            squares += forest.area_m2(id) * (row - row.clamp(0.0, 1.0)).powi(2);
-            area += forest.area_m2(id);
         }
+    }
+    for (id, row) in session.row_sums() {
+        assert!(row.is_finite() && forest.kind(id) == Kind::Element);
+        out.row_sum = [out.row_sum[0].min(row), out.row_sum[1].max(row)];
+        squares += forest.area_m2(id) * (row - row.clamp(0.0, 1.0)).powi(2);
+        area += forest.area_m2(id);
     }
     out.row_excess = (squares / f64::max(area, f64::MIN_POSITIVE)).sqrt();
     for link in tree.links() {
-        let (x, v) = (f64::from(link.exchange_area_m2), f64::from(link.visibility));
+        let (x, v) = (f64::from(link.exchange_area_m2()), f64::from(link.visibility()));
         assert!(x.is_finite() && v.is_finite());
         out.exchange_min = out.exchange_min.min(x);
         out.visibility = [out.visibility[0].min(v), out.visibility[1].max(v)];
@@ -65,21 +65,22 @@ pub(crate) fn audit(session: &Session) -> Audit {
 
 /// Ordered area product of an unordered pair: a pair of two counts both ways.
 fn weight(tree: &PairTree, forest: &Forest, id: PairId) -> f64 {
-    let pair = tree.pair(id);
-    let product = forest.area_m2(pair.a) * forest.area_m2(pair.b);
-    if pair.a == pair.b { product } else { 2.0 * product }
+    let (a, b) = tree.ends(id);
+    let product = forest.area_m2(a) * forest.area_m2(b);
+    if a == b { product } else { 2.0 * product }
 }
 
 /// Every pair of points is covered exactly once, globally and below every refined pair.
 fn cover(tree: &PairTree, forest: &Forest, out: &mut Audit) {
     let root = weight(tree, forest, PairTree::ROOT);
-    let mut seen = vec![false; tree.len()];
+    let mut seen = std::collections::BTreeSet::new();
     let mut covered = 0.0;
     let mut stack = vec![PairTree::ROOT];
     while let Some(id) = stack.pop() {
-        assert!(!std::mem::replace(&mut seen[id.0 as usize], true), "{id:?} has two parents");
+        assert!(seen.insert(id), "{id:?} has two parents");
         let own = weight(tree, forest, id);
-        if tree.pair(id).state != State::Refined {
+        assert!(!matches!(tree.state(id), State::New | State::Vacant), "{id:?} is unjudged");
+        if !tree.state(id).is_refined() {
             assert!(tree.children(id).is_empty(), "{id:?} is not refined but has children");
             covered += own;
             continue;
@@ -91,7 +92,7 @@ fn cover(tree: &PairTree, forest: &Forest, out: &mut Audit) {
         }
         stack.extend(children);
     }
-    assert!(seen.iter().all(|&s| s), "pairs that no parent knows");
+    assert_eq!(seen.len(), tree.len(), "pairs that no parent knows");
     out.coverage = (covered / root - 1.0).abs();
 }
 

@@ -144,7 +144,7 @@ pub(crate) fn exchange_area(session: &Session, one: &str, two: &str) -> f64 {
     let mut sum = 0.0;
     for pair in tree.links() {
         let (Some(a), Some(b)) = (forest.patch(pair.a), forest.patch(pair.b)) else { continue };
-        let carried = f64::from(pair.exchange_area_m2) * f64::from(pair.visibility);
+        let carried = f64::from(pair.exchange_area_m2()) * f64::from(pair.visibility());
         if ones.contains(&a) && twos.contains(&b) {
             sum += carried;
         }

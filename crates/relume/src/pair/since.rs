@@ -1,0 +1,194 @@
+//! What happened since the last update, and which pairs it may concern.
+
+use crate::element::{ElementId, Forest, Kind, WorldElement, WorldView};
+use crate::scene::{BodyId, LightKind, PatchId, Scene};
+use crate::transport::Shaft;
+
+use super::judge::{BoxShaft, LightPlace, body_of};
+use super::update::Stale;
+
+/// How much of a node of the forest's fixed part has moved, appeared or vanished.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Motion {
+    Still,
+    Some,
+    All,
+}
+
+/// The difference between two instants, as far as pairs may feel it.
+///
+/// Only the two instants count, not what lies between them: the state of a pair is a function of
+/// one of them.
+pub struct Since<'a> {
+    old: &'a WorldView,
+    motion: Vec<Motion>,
+    movers: Vec<BodyId>,
+    /// Coarse elements whose brightness changed, by number.
+    dimmed: Vec<bool>,
+    /// Kept nodes above the coarse level with such an element below.
+    dimmed_below: Vec<bool>,
+}
+
+impl<'a> Since<'a> {
+    /// What moved between two instants. Cost: proportional to the forest's fixed part.
+    pub fn new(scene: &Scene, forest: &Forest, old: &'a WorldView, new: &WorldView) -> Since<'a> {
+        let bodies = (0..scene.bodies.len() as u32).map(BodyId);
+        let moved = |body: &BodyId| {
+            let k = body.0 as usize;
+            old.poses()[k] != new.poses()[k] && !scene.bodies[k].patches.is_empty()
+        };
+        let movers: Vec<BodyId> = bodies.filter(moved).collect();
+        let far = old.far_m() != new.far_m();
+        let mut motion = vec![Motion::Still; forest.fixed_len() as usize];
+        for id in (0..forest.fixed_len()).rev() {
+            let element = ElementId(id);
+            let of = match forest.kind(element) {
+                Kind::Light => {
+                    let light = forest.light(element).expect("a light has an index");
+                    let sun = new.light(light).is_some_and(|l| l.kind == LightKind::Directional);
+                    if old.light(light) != new.light(light) || (far && sun) {
+                        Motion::All
+                    } else {
+                        Motion::Still
+                    }
+                }
+                _ => match body_of(forest, new, element) {
+                    Some(body) if movers.binary_search(&body).is_ok() => Motion::All,
+                    Some(_) => Motion::Still,
+                    None => continue,
+                },
+            };
+            motion[id as usize] = of;
+        }
+        // Groups of bodies: their children come after them.
+        for id in (0..forest.fixed_len()).rev() {
+            let element = ElementId(id);
+            if forest.kind(element) == Kind::Cluster && forest.cluster_body(element).is_none() {
+                let any = forest.children(element).any(|c| motion[c as usize] != Motion::Still);
+                motion[id as usize] = if any { Motion::Some } else { Motion::Still };
+            }
+        }
+        Since { old, motion, movers, dimmed: Vec::new(), dimmed_below: Vec::new() }
+    }
+
+    /// Whether nothing moved at all.
+    pub fn is_still(&self) -> bool {
+        self.motion[Forest::ROOT.0 as usize] == Motion::Still
+    }
+
+    /// Adds which coarse elements (by number) changed their brightness.
+    pub fn dim(&mut self, forest: &Forest, coarse: &[u32], dimmed: Vec<bool>) {
+        self.dimmed_below = vec![false; forest.kept_len() as usize];
+        for (&id, _) in coarse.iter().zip(&dimmed).filter(|(_, dimmed)| **dimmed) {
+            let mut above = forest.parent(ElementId(id));
+            while let Some(id) = above {
+                if std::mem::replace(&mut self.dimmed_below[id.0 as usize], true) {
+                    break;
+                }
+                above = forest.parent(id);
+            }
+        }
+        self.dimmed = dimmed;
+    }
+
+    /// What the changes of brightness mean to a pair.
+    pub(super) fn brightness(&self, forest: &Forest, a: ElementId, b: ElementId) -> Stale {
+        if self.dimmed.is_empty() {
+            return Stale::Nothing;
+        }
+        let dim = |id: ElementId| match forest.coarse(id) {
+            Some(number) => self.dimmed[number],
+            None => self.dimmed_below[id.0 as usize],
+        };
+        // Above the coarse level no verdict depends on brightness.
+        let low = |id| forest.coarse(id).is_some() || forest.kind(id) == Kind::Light;
+        match dim(a) || dim(b) {
+            false => Stale::Nothing,
+            true if low(a) && low(b) => Stale::Brightness,
+            true => Stale::Below,
+        }
+    }
+
+    /// What the motion means to a pair.
+    pub(super) fn geometry(
+        &self,
+        forest: &Forest,
+        new: &WorldView,
+        a: ElementId,
+        b: ElementId,
+    ) -> Stale {
+        let motion = |id| self.motion[forest.fixed(id).0 as usize];
+        let body = body_of(forest, new, a).filter(|&body| body_of(forest, new, b) == Some(body));
+        if body.is_none() && (motion(a) != Motion::Still || motion(b) != Motion::Still) {
+            return Stale::Moved;
+        }
+        if self.movers.is_empty() {
+            return Stale::Nothing;
+        }
+        if let Some(body) = body
+            && self.old.is_present(body) != new.is_present(body)
+        {
+            return Stale::Moved;
+        }
+        let rides = body.filter(|_| motion(a) == Motion::All);
+        let entered = [self.old, new].iter().any(|view| match (forest.kind(a), forest.kind(b)) {
+            (Kind::Element, Kind::Element) => self.enters(forest, view, (a, b), rides),
+            (Kind::Light, Kind::Element) => self.enters_light(forest, view, a, b),
+            (Kind::Element, Kind::Light) => self.enters_light(forest, view, b, a),
+            // Lights have no box: their pairs with groups are looked at always.
+            (Kind::Light, _) | (_, Kind::Light) => true,
+            _ => self.meets(forest, &BoxShaft::new(view, forest, (a, b), body), rides),
+        });
+        if entered { Stale::Occlusion } else { Stale::Nothing }
+    }
+
+    fn meets(&self, forest: &Forest, shaft: &BoxShaft<'_>, rides: Option<BodyId>) -> bool {
+        match rides {
+            // Seen from a moving body, everything else moves.
+            Some(_) => shaft.is_entered_by(Forest::ROOT, rides),
+            None => self.movers.iter().any(|&m| shaft.is_entered_by(forest.body_root(m), None)),
+        }
+    }
+
+    /// Whether a mover stands between two elements.
+    fn enters(
+        &self,
+        forest: &Forest,
+        view: &WorldView,
+        (a, b): (ElementId, ElementId),
+        rides: Option<BodyId>,
+    ) -> bool {
+        let place = |id| WorldElement::new(view, forest, id, false);
+        let patch = |id| forest.patch(id).expect("elements have patches");
+        self.stands_in(forest, view, (&place(a), &place(b)), (patch(a), patch(b)), rides)
+    }
+
+    fn enters_light(
+        &self,
+        forest: &Forest,
+        view: &WorldView,
+        light: ElementId,
+        element: ElementId,
+    ) -> bool {
+        let Some(lamp) = forest.light(light).and_then(|l| view.light(l)) else { return false };
+        let e = WorldElement::new(view, forest, element, false);
+        let place = LightPlace::new(lamp, &e, view.far_m());
+        let patch = forest.patch(element).expect("elements have patches");
+        self.stands_in(forest, view, (&e, &place.stand_in), (patch, patch), None)
+    }
+
+    fn stands_in(
+        &self,
+        forest: &Forest,
+        view: &WorldView,
+        (a, b): (&WorldElement, &WorldElement),
+        patches: (PatchId, PatchId),
+        rides: Option<BodyId>,
+    ) -> bool {
+        let shaft = Shaft { forest, view, a, b, own: None, patches };
+        match rides {
+            Some(_) => shaft.is_entered_by(Forest::ROOT, rides),
+            None => self.movers.iter().any(|&m| shaft.is_entered_by(forest.body_root(m), None)),
+        }
+    }
+}

@@ -1,0 +1,477 @@
+//! Bringing a pair tree up to date: judge in parallel what may have changed, then edit in order.
+//!
+//! Work goes in blocks of fixed size; every block is judged in chunks of fixed size, whose results
+//! are applied in order. The tree is the same for any number of threads. A cold build is the update
+//! of a tree that holds nothing but its root.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use crate::element::{ElementId, ElementKey};
+
+use super::hash::{PairHash, pair_key};
+use super::oracle::Side;
+use super::tree::{Carried, CullReason, PairId, PairTree, State};
+
+/// What is decided on a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// It becomes a link.
+    Link,
+    /// One side is replaced by its children.
+    Refine(Side),
+    /// A cluster paired with itself: all pairs of its children.
+    RefineSelf,
+    /// It exchanges nothing.
+    Cull(CullReason),
+    /// Undecided: it is left as it is, and reported.
+    Hold,
+}
+
+/// A verdict with what it rests on.
+#[derive(Clone, Copy, Debug)]
+pub struct Judgement {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// What the pair carries as a link, or while it is held.
+    pub carried: Carried,
+    /// Visibility segments traced.
+    pub segments: u32,
+}
+
+/// What may have changed of a pair since it was judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stale {
+    /// Nothing, and nothing of any pair below it.
+    Nothing,
+    /// Nothing of the pair itself.
+    Below,
+    /// How bright its ends are: its verdict, not what it carries.
+    Brightness,
+    /// What stands between its ends.
+    Occlusion,
+    /// Where its ends are.
+    Moved,
+}
+
+/// The hierarchy that the two ends of a pair come from.
+pub trait Hierarchy {
+    /// Ids of the children; empty for a leaf.
+    fn children(&self, id: ElementId) -> Range<u32>;
+    /// The children, made where there are none yet; and whether they were. Each call is a use of
+    /// them, until [`Hierarchy::release`].
+    fn split(&mut self, id: ElementId) -> (Range<u32>, bool);
+    /// Takes back one use of the children.
+    fn release(&mut self, id: ElementId);
+    /// The name of an element, which does not depend on history.
+    fn key(&self, id: ElementId) -> ElementKey;
+    /// Elements alive.
+    fn element_count(&self) -> usize;
+}
+
+/// What the pair tree asks of the space it works in.
+pub trait Judge: Hierarchy + Sync {
+    /// Judges a pair. `candidates` are the possible occluders of the pair above; those of this
+    /// pair are appended to `narrowed`, whose present content belongs to other pairs. A pure
+    /// function of the space: `candidates` only say where to look.
+    fn judge(
+        &self,
+        a: ElementId,
+        b: ElementId,
+        candidates: &[u32],
+        narrowed: &mut Vec<u32>,
+    ) -> Judgement;
+
+    /// What may have changed of a pair since the last update.
+    fn stale(&self, a: ElementId, b: ElementId) -> Stale;
+
+    /// Whether this pair is one of those that are held when it is not culled.
+    fn holds(&self, a: ElementId, b: ElementId) -> bool;
+}
+
+/// Exact counts of what was done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Pairs met on the walk, those included that turned out to be unaffected.
+    pub visited: u64,
+    /// Pairs judged.
+    pub examined: u64,
+    /// Pairs judged because an end moved, or for the first time.
+    pub reevaluated: u64,
+    /// Pairs judged because something moved between their ends.
+    pub visibility_only: u64,
+    /// Pairs judged because the light on their ends changed.
+    pub brightness_only: u64,
+    /// Pairs whose state, or what they carry as a link, differs from before.
+    pub changed: u64,
+    /// Refined pairs that became links.
+    pub promoted: u64,
+    /// Links that were refined.
+    pub demoted: u64,
+    /// Links whose visibility changed.
+    pub occlusion_changed: u64,
+    /// Links with an end that moved against the other.
+    pub dynamic_links: u64,
+    /// Visibility segments traced.
+    pub segments: u64,
+    /// Elements made.
+    pub elements_made: u64,
+}
+
+impl std::ops::AddAssign for Work {
+    fn add_assign(&mut self, other: Work) {
+        self.visited += other.visited;
+        self.examined += other.examined;
+        self.reevaluated += other.reevaluated;
+        self.visibility_only += other.visibility_only;
+        self.brightness_only += other.brightness_only;
+        self.changed += other.changed;
+        self.promoted += other.promoted;
+        self.demoted += other.demoted;
+        self.occlusion_changed += other.occlusion_changed;
+        self.dynamic_links += other.dynamic_links;
+        self.segments += other.segments;
+        self.elements_made += other.elements_made;
+    }
+}
+
+/// One edit to the set of links.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Edit {
+    /// This pair is a link with new values.
+    Set(PairId),
+    /// These two are linked no more.
+    Removed(ElementId, ElementId),
+}
+
+/// A pair that was held, with what it would carry.
+#[derive(Clone, Copy, Debug)]
+pub struct Held {
+    /// First end.
+    pub a: ElementId,
+    /// Second end.
+    pub b: ElementId,
+    /// What it would carry.
+    pub carried: Carried,
+}
+
+/// What an update did.
+#[derive(Clone, Debug, Default)]
+pub struct Changes {
+    /// Counts.
+    pub work: Work,
+    /// Edits to the links, in order; empty where they are not recorded.
+    pub edits: Vec<Edit>,
+    /// Pairs held.
+    pub held: Vec<Held>,
+    /// Pairs that were held once and may be so no more; both ends may have vanished since.
+    pub dropped: Vec<(ElementId, ElementId)>,
+}
+
+/// The memory that an update may use is spent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OutOfMemory;
+
+/// Pairs judged by one task.
+const CHUNK: usize = 128;
+
+/// Pairs judged before their results are applied.
+const BLOCK: usize = 1 << 15;
+
+/// Brings `tree`, with the hash over its links, up to date.
+///
+/// Edits are recorded if `record` says so. `may_go_on` is asked after each block with the tree, the
+/// number of elements and the scratch memory in bytes.
+///
+/// # Errors
+/// [`OutOfMemory`] as soon as `may_go_on` says no; the tree is of no use then.
+pub fn update<J: Judge>(
+    (tree, hash): (&mut PairTree, &mut PairHash),
+    judge: &mut J,
+    root_candidates: &[u32],
+    record: bool,
+    may_go_on: &dyn Fn(&PairTree, usize, u64) -> bool,
+) -> Result<Changes, OutOfMemory> {
+    let mut editor =
+        Editor { tree, hash, judge, record, changes: Changes::default(), next: Wave::default() };
+    let list = editor.next.push_candidates(root_candidates);
+    editor.next.items.push(Item { pair: PairTree::ROOT, list });
+    while !editor.next.items.is_empty() {
+        let wave = std::mem::take(&mut editor.next);
+        for block in wave.items.chunks(BLOCK) {
+            let judged = judge_block(editor.tree, editor.judge, block, &wave.candidates);
+            for chunk in &judged {
+                editor.apply_chunk(chunk, &wave);
+            }
+            let held = editor.changes.held.capacity() * size_of::<Held>();
+            let scratch = wave.memory_bytes() + editor.next.memory_bytes() + held as u64;
+            if !may_go_on(editor.tree, editor.judge.element_count(), scratch) {
+                return Err(OutOfMemory);
+            }
+        }
+    }
+    Ok(editor.changes)
+}
+
+/// Pairs to be looked at, with the possible occluders of the pairs above them.
+#[derive(Clone, Debug, Default)]
+struct Wave {
+    items: Vec<Item>,
+    candidates: Vec<u32>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Item {
+    pair: PairId,
+    list: List,
+}
+
+/// Some candidates of a wave.
+#[derive(Clone, Copy, Debug)]
+struct List {
+    start: u32,
+    len: u32,
+}
+
+impl Wave {
+    fn push_candidates(&mut self, list: &[u32]) -> List {
+        let start = self.candidates.len() as u32;
+        self.candidates.extend_from_slice(list);
+        List { start, len: list.len() as u32 }
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        (self.items.capacity() * size_of::<Item>() + self.candidates.capacity() * 4) as u64
+    }
+}
+
+impl List {
+    fn of(self, candidates: &[u32]) -> &[u32] {
+        &candidates[self.start as usize..(self.start + self.len) as usize]
+    }
+}
+
+struct Chunk<'a> {
+    items: &'a [Item],
+    looks: Vec<Look>,
+    candidates: Vec<u32>,
+}
+
+/// What a look at a pair found.
+enum Look {
+    /// Nothing can have changed here or below.
+    Unaffected,
+    /// Look at the children.
+    Descend,
+    /// Judged, with the candidates of its children.
+    Judged(Judgement, Stale, List),
+}
+
+fn judge_block<'a, J: Judge>(
+    tree: &PairTree,
+    judge: &J,
+    items: &'a [Item],
+    candidates: &[u32],
+) -> Vec<Chunk<'a>> {
+    let judge_chunk = |items: &'a [Item]| {
+        let mut narrowed = Vec::new();
+        let look = |item: &Item| {
+            let (a, b) = tree.ends(item.pair);
+            let stale = match tree.state(item.pair) {
+                State::New => Stale::Moved,
+                _ => judge.stale(a, b),
+            };
+            match stale {
+                Stale::Nothing => Look::Unaffected,
+                Stale::Below => Look::Descend,
+                Stale::Brightness | Stale::Occlusion | Stale::Moved => {
+                    let start = narrowed.len();
+                    let found = judge.judge(a, b, item.list.of(candidates), &mut narrowed);
+                    if !matches!(found.verdict, Verdict::Refine(_) | Verdict::RefineSelf) {
+                        narrowed.truncate(start);
+                    }
+                    let len = (narrowed.len() - start) as u32;
+                    Look::Judged(found, stale, List { start: start as u32, len })
+                }
+            }
+        };
+        let looks = items.iter().map(look).collect();
+        Chunk { items, looks, candidates: narrowed }
+    };
+    items.par_chunks(CHUNK).map(judge_chunk).collect()
+}
+
+/// The one writer of a tree.
+struct Editor<'a, J> {
+    tree: &'a mut PairTree,
+    hash: &'a mut PairHash,
+    judge: &'a mut J,
+    record: bool,
+    changes: Changes,
+    next: Wave,
+}
+
+impl<J: Judge> Editor<'_, J> {
+    fn apply_chunk(&mut self, chunk: &Chunk<'_>, wave: &Wave) {
+        for (item, look) in chunk.items.iter().zip(&chunk.looks) {
+            self.changes.work.visited += 1;
+            match look {
+                Look::Unaffected => {}
+                Look::Descend => {
+                    let children = self.tree.children(item.pair);
+                    self.look_at(children, item.list.of(&wave.candidates));
+                }
+                Look::Judged(found, stale, list) => {
+                    self.count(found, *stale);
+                    let children = self.apply(item.pair, found, *stale);
+                    self.look_at(children, list.of(&chunk.candidates));
+                }
+            }
+        }
+    }
+
+    fn count(&mut self, found: &Judgement, stale: Stale) {
+        let work = &mut self.changes.work;
+        work.examined += 1;
+        work.segments += u64::from(found.segments);
+        match stale {
+            Stale::Occlusion => work.visibility_only += 1,
+            Stale::Brightness => work.brightness_only += 1,
+            Stale::Moved | Stale::Below | Stale::Nothing => work.reevaluated += 1,
+        }
+    }
+
+    fn look_at(&mut self, pairs: Range<u32>, candidates: &[u32]) {
+        if !pairs.is_empty() {
+            let list = self.next.push_candidates(candidates);
+            self.next.items.extend(pairs.map(|id| Item { pair: PairId(id), list }));
+        }
+    }
+
+    /// Carries out a verdict; returns the children to be looked at.
+    fn apply(&mut self, pair: PairId, found: &Judgement, stale: Stale) -> Range<u32> {
+        let before = self.tree.state(pair);
+        let (a, b) = self.tree.ends(pair);
+        let wanted = match found.verdict {
+            Verdict::Hold => {
+                self.changes.held.push(Held { a, b, carried: found.carried });
+                return 0..0;
+            }
+            Verdict::Link => State::Active,
+            Verdict::Refine(side) => State::Refined(side),
+            Verdict::RefineSelf => State::RefinedSelf,
+            Verdict::Cull(reason) => State::Culled(reason),
+        };
+        let work = &mut self.changes.work;
+        work.dynamic_links += u64::from(wanted == State::Active && stale == Stale::Moved);
+        if before != wanted {
+            work.changed += 1;
+            work.promoted += u64::from(before.is_refined() && wanted == State::Active);
+            work.demoted += u64::from(before == State::Active && wanted.is_refined());
+            self.leave(pair, before);
+            return self.enter(pair, wanted, found);
+        }
+        match wanted {
+            State::Active => self.carry(pair, &found.carried),
+            _ => return self.tree.children(pair),
+        }
+        0..0
+    }
+
+    /// A link stays one; it may carry something else.
+    fn carry(&mut self, pair: PairId, carried: &Carried) {
+        let before = self.tree.link(pair).expect("a link").carried;
+        if before != *carried {
+            let key = self.key(pair);
+            self.hash.remove(key, &before);
+            self.hash.add(key, carried);
+            self.changes.work.changed += 1;
+            self.changes.work.occlusion_changed +=
+                u64::from(before.visibility != carried.visibility);
+            self.tree.set_carried(pair, carried);
+            self.record(Edit::Set(pair));
+        }
+    }
+
+    /// Undoes what a pair was: it is as good as new then.
+    fn leave(&mut self, pair: PairId, before: State) {
+        match before {
+            State::Active => self.unlink(pair),
+            State::Refined(_) | State::RefinedSelf => self.remove_below(pair),
+            State::Culled(_) | State::New | State::Vacant => {}
+        }
+    }
+
+    fn enter(&mut self, pair: PairId, wanted: State, found: &Judgement) -> Range<u32> {
+        let (a, b) = self.tree.ends(pair);
+        match wanted {
+            State::Refined(side) => {
+                let (children, made) = self.judge.split(if side == Side::A { a } else { b });
+                self.changes.work.elements_made += if made { children.len() as u64 } else { 0 };
+                let ends = (0..children.len()).map(|k| {
+                    let child = ElementId(children.start + k as u32);
+                    if side == Side::A { (child, b) } else { (a, child) }
+                });
+                self.tree.refine(pair, wanted, ends)
+            }
+            State::RefinedSelf => {
+                let children = self.judge.children(a);
+                let with = |one: u32| (one..children.end).map(move |two| (one, two));
+                let ends: Vec<_> = children.clone().flat_map(with).collect();
+                let ends = ends.into_iter().map(|(one, two)| (ElementId(one), ElementId(two)));
+                self.tree.refine(pair, wanted, ends)
+            }
+            State::Active => {
+                self.tree.set_state(pair, wanted);
+                self.tree.set_carried(pair, &found.carried);
+                self.hash.add(self.key(pair), &found.carried);
+                self.record(Edit::Set(pair));
+                0..0
+            }
+            State::Culled(_) | State::New | State::Vacant => {
+                self.tree.set_state(pair, wanted);
+                self.drop_held(pair);
+                0..0
+            }
+        }
+    }
+
+    fn unlink(&mut self, pair: PairId) {
+        let link = self.tree.link(pair).expect("a link");
+        self.hash.remove(self.key(pair), &link.carried);
+        self.record(Edit::Removed(link.a, link.b));
+    }
+
+    /// Removes everything below a refined pair, from the leaves up.
+    fn remove_below(&mut self, pair: PairId) {
+        for child in self.tree.children(pair).map(PairId) {
+            let state = self.tree.state(child);
+            self.leave(child, state);
+            self.drop_held(child);
+        }
+        if let State::Refined(side) = self.tree.state(pair) {
+            let (a, b) = self.tree.ends(pair);
+            self.judge.release(if side == Side::A { a } else { b });
+        }
+        self.tree.remove_children(pair);
+    }
+
+    fn drop_held(&mut self, pair: PairId) {
+        let (a, b) = self.tree.ends(pair);
+        if self.judge.holds(a, b) {
+            self.changes.dropped.push((a, b));
+        }
+    }
+
+    fn key(&self, pair: PairId) -> u64 {
+        let (a, b) = self.tree.ends(pair);
+        pair_key(self.judge.key(a), self.judge.key(b))
+    }
+
+    fn record(&mut self, edit: Edit) {
+        if self.record {
+            self.changes.edits.push(edit);
+        }
+    }
+}

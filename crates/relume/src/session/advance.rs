@@ -1,0 +1,218 @@
+//! One step: from the state at one instant to that at another, by edits.
+//!
+//! Without a state to start from, the same edits build it: a cold build is the update of nothing.
+
+use crate::element::{ElementId, Forest, Kind, WorldView};
+use crate::pair::{Changes, OutOfMemory, PairHash, PairTree, Placed, Since, Stage, update};
+use crate::scene::BodyId;
+use crate::solver::{Dirty, Links, Radiosity, Stop, Surfaces};
+
+use super::coarse::{self, Coarse};
+use super::report::FrameReport;
+use super::surfaces::{LitForest, apply_edits, links_of};
+use super::{Clock, RESIDUAL_SHARE, Session, SessionError, Solved, tally};
+
+impl Session {
+    /// Whether nothing at all differs between the last state and this time.
+    pub(super) fn is_still(&self, last: &Solved, time_s: f64) -> bool {
+        let bodies = (0..self.scene.bodies.len())
+            .all(|b| last.view.poses()[b] == self.scene.pose(BodyId(b as u32), time_s));
+        bodies
+            && self.scene.lights.iter().enumerate().all(|(k, light)| {
+                last.view.light(k) == WorldView::light_at(&self.scene, light, time_s).as_ref()
+            })
+    }
+
+    /// The state at `report.time_s`, from the last one if there is one. `from` is the time that
+    /// dynamic links are counted from where there is none.
+    pub(super) fn advance(
+        &self,
+        last: Option<Solved>,
+        from: Option<f64>,
+        mut report: FrameReport,
+    ) -> Result<Solved, SessionError> {
+        let mut clock = Clock::start();
+        let (time_s, frame) = (report.time_s, report.frame);
+        let cold = last.is_none();
+        let mut solved = last.unwrap_or_else(|| self.blank(time_s));
+        let view = WorldView::new(&self.scene, &solved.forest, time_s);
+        let old = std::mem::replace(&mut solved.view, view);
+        let mut since =
+            (!cold).then(|| Since::new(&self.scene, &solved.forest, &old, &solved.view));
+        report.seconds.moving = clock.lap();
+
+        let mut changes = Changes::default();
+        let bring = |solved: &mut Solved, since: Option<&Since<'_>>, level| {
+            let found = self.update(solved, since, level, !cold);
+            found.map_err(|OutOfMemory| self.too_large(solved, frame))
+        };
+        if !self.coarse_ids.is_empty() {
+            changes = bring(&mut solved, since.as_ref(), Level::Coarse)?;
+            self.follow_coarse(&mut solved, &changes, since.as_mut());
+        }
+        let fine = bring(&mut solved, since.as_ref(), Level::Fine)?;
+        changes.work += fine.work;
+        changes.edits.extend(fine.edits);
+        let work = changes.work;
+        report.seconds.evaluate = clock.lap();
+
+        let dirty = self.edit_links(&mut solved, &changes, cold, &mut report);
+        report.seconds.judge = clock.lap();
+
+        let lit = LitForest::new(&self.scene, &solved.forest);
+        let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
+        let stop = Stop::Residual(self.options.tolerance * RESIDUAL_SHARE);
+        solved.radiosity.solve(&lit, &solved.links, dirty, stop);
+        report.seconds.solve = clock.lap();
+
+        solved.time_s = time_s;
+        report.count(&work);
+        tally::fill(&mut report, &self.scene, &solved);
+        if cold {
+            report.dynamic_links = from.map_or(0, |from| self.dynamic_links(&solved, from));
+        }
+        report.seconds.total = clock.total();
+        solved.report = report;
+        Ok(solved)
+    }
+
+    /// Nothing but the seed and an unjudged root.
+    fn blank(&self, time_s: f64) -> Solved {
+        Solved {
+            time_s,
+            forest: self.seed.clone(),
+            view: WorldView::new(&self.scene, &self.seed, time_s),
+            tree: PairTree::new(Forest::ROOT),
+            hash: PairHash::default(),
+            links: Links::default(),
+            coarse: Coarse::default(),
+            radiosity: Radiosity::default(),
+            report: FrameReport::default(),
+        }
+    }
+
+    fn update(
+        &self,
+        solved: &mut Solved,
+        since: Option<&Since<'_>>,
+        level: Level,
+        record: bool,
+    ) -> Result<Changes, OutOfMemory> {
+        let limit = self.options.max_memory_bytes.unwrap_or(u64::MAX);
+        let may_go_on = |tree: &PairTree, elements: usize, scratch: u64| {
+            // Links by receiver and radiosities may be still to come.
+            let pairs = tree.memory_bytes() + tree.len() as u64 * PAIR_LINKS_BYTES;
+            pairs + elements as u64 * ELEMENT_BYTES + scratch <= limit
+        };
+        let stage = match level {
+            Level::Coarse => Stage::Coarse,
+            Level::Fine => Stage::Fine(&solved.coarse.brightness),
+        };
+        let mut placed = Placed {
+            forest: &mut solved.forest,
+            view: &solved.view,
+            stage,
+            oracle: self.options.pair_oracle(),
+            simd: self.simd,
+            since,
+        };
+        let tree = (&mut solved.tree, &mut solved.hash);
+        update(tree, &mut placed, &[Forest::ROOT.0], record, &may_go_on)
+    }
+
+    /// Solves over the coarse pairs anew where any changed, and says which elements' brightness did.
+    fn follow_coarse(&self, solved: &mut Solved, changes: &Changes, since: Option<&mut Since<'_>>) {
+        let changed = solved.coarse.follow(&self.seed, changes);
+        if !changed && since.is_some() {
+            return;
+        }
+        let before = std::mem::take(&mut solved.coarse.brightness);
+        solved.coarse.solve(&self.scene, &self.seed, &self.coarse_ids);
+        if let Some(since) = since {
+            let dimmed = solved.coarse.brightness.differences(&before);
+            since.dim(&self.seed, &self.coarse_ids, dimmed);
+        }
+    }
+
+    /// Carries the changes of the pair tree over to links and elements; what is to be solved anew.
+    fn edit_links(
+        &self,
+        solved: &mut Solved,
+        changes: &Changes,
+        cold: bool,
+        report: &mut FrameReport,
+    ) -> Dirty {
+        let many = changes.edits.len() as u64 > solved.tree.counts().active / 2;
+        let receivers = if cold || many {
+            report.elements_reaped = solved.forest.reap();
+            solved.links = links_of(&solved.forest, &solved.tree);
+            None
+        } else {
+            let Solved { links, forest, tree, .. } = solved;
+            let receivers = apply_edits(links, forest, tree, &changes.edits);
+            report.elements_reaped = forest.reap();
+            Some(receivers)
+        };
+        let split = solved.forest.take_changed();
+        let lit = LitForest::new(&self.scene, &solved.forest);
+        if cold {
+            solved.radiosity = self.first_guess(solved, &lit);
+            return Dirty::All;
+        }
+        solved.radiosity.extend(solved.forest.len());
+        let alive = |id: &ElementId| solved.forest.kind(*id) == Kind::Element;
+        let split: Vec<u32> = split.iter().filter(|id| alive(id)).map(|id| id.0).collect();
+        for &parent in &split {
+            solved.radiosity.inherit(&lit, parent);
+        }
+        let facets = split.iter().map(|&id| lit.facet_of(id)).collect();
+        match receivers {
+            None => Dirty::All,
+            Some(receivers) => Dirty::Some {
+                receivers: receivers.into_iter().filter(|&id| alive(&ElementId(id))).collect(),
+                facets,
+            },
+        }
+    }
+
+    /// The coarse solution, where there is one; else exitances.
+    fn first_guess(&self, solved: &Solved, lit: &LitForest<'_>) -> Radiosity {
+        let mut out = coarse::start(&self.scene, &solved.forest, lit);
+        for id in 0..solved.forest.len() as u32 {
+            if let Some(number) = solved.forest.coarse(ElementId(id)) {
+                out.set(id, solved.coarse.radiosity(self.coarse_ids[number]));
+            }
+        }
+        out
+    }
+
+    fn dynamic_links(&self, solved: &Solved, from_s: f64) -> u64 {
+        let moved = |b: BodyId| self.scene.pose(b, from_s) != solved.view.poses()[b.0 as usize];
+        let light_moved = |k: usize| {
+            let before = WorldView::light_at(&self.scene, &self.scene.lights[k], from_s);
+            before.as_ref() != solved.view.light(k)
+        };
+        tally::dynamic_links(&self.scene, &solved.forest, &solved.tree, &moved, &light_moved)
+    }
+
+    fn too_large(&self, solved: &Solved, frame: u32) -> SessionError {
+        SessionError::OutOfMemory {
+            frame,
+            tolerance: self.options.tolerance,
+            limit_bytes: self.options.max_memory_bytes.unwrap_or(u64::MAX),
+            links: solved.tree.len() as u64,
+        }
+    }
+}
+
+/// Links by receiver, for each pair of the tree, bytes.
+const PAIR_LINKS_BYTES: u64 = 20;
+
+/// An element with its radiosity, bytes.
+const ELEMENT_BYTES: u64 = 128;
+
+#[derive(Clone, Copy)]
+enum Level {
+    Coarse,
+    Fine,
+}

@@ -1,0 +1,55 @@
+//! Incremental equals from scratch: after any motion the links are those of a cold build, bit for
+//! bit, the elements are the same, and the radiosities agree within the residuals' bound.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::{at_tolerance, form_factor_oracle, lit_room};
+use relume::scene::Scene;
+use relume::session::{Options, Session, Update};
+
+fn pair_of(scene: &Arc<Scene>, options: &Options) -> (Session, Session) {
+    let scratch = Options { update: Update::Scratch, ..options.clone() };
+    (
+        Session::new(Arc::clone(scene), options.clone()).unwrap(),
+        Session::new(Arc::clone(scene), scratch).unwrap(),
+    )
+}
+
+#[test]
+fn there_and_back_again_equals_cold_builds() {
+    let scene = Arc::new(lit_room());
+    for (name, options) in
+        [("error", at_tolerance(0.1)), ("form factor", form_factor_oracle(0.05, 1e-3))]
+    {
+        let (mut warm, mut cold) = pair_of(&scene, &options);
+        for (k, time) in [0.0, 0.05, 0.1, 0.2, 1.0, 0.5, 0.1, 0.1, 0.0].into_iter().enumerate() {
+            let one = warm.step(k as u32, time).unwrap();
+            let two = cold.step(k as u32, time).unwrap();
+            println!(
+                "{name} {time}: links {} visited {} examined {} changed {} promoted {} demoted {} occluded {} made {} reaped {} sweeps {} gathers {} | {:.4} {:.4} cold {:.4} {:.4} sweeps {} gathers {}",
+                one.links,
+                one.visited,
+                one.examined,
+                one.changed,
+                one.promoted,
+                one.demoted,
+                one.occlusion_changed,
+                one.elements_made,
+                one.elements_reaped,
+                one.sweeps,
+                one.gathers,
+                one.seconds.total,
+                one.seconds.solve,
+                two.seconds.total,
+                two.seconds.solve,
+                two.sweeps,
+                two.gathers
+            );
+            assert_eq!(one.hash, two.hash, "{name} at {time}");
+            assert_eq!(one.elements, two.elements, "{name} at {time}");
+            assert_eq!(one.leaves, two.leaves, "{name} at {time}");
+        }
+    }
+}

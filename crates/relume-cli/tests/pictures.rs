@@ -67,11 +67,15 @@ fn parts_of_a_clip_match_the_whole() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
     let (whole, part) = (path("whole"), path("part"));
-    succeeded(&relume(&["demo", "room", "-o", &whole, "--frames", "0-6x3"]));
+    // From scratch, so that radiosities are the same to the last bit; else they agree within the
+    // solver's residual, and a few pixels differ by one level.
+    let scratch = ["--update", "scratch"];
+    let demo = ["demo", "room", "-o", &whole, "--frames", "0-6x3"];
+    succeeded(&relume(&[&demo[..], &scratch].concat()));
     let scene = format!("{whole}/room.glb");
     // Frame 6 alone: the exposure is still that of frame 0.
     let render = ["render", &scene, "-o", &part, "--frames", "6", "--shading", "flat"];
-    succeeded(&relume(&render));
+    succeeded(&relume(&[&render[..], &scratch].concat()));
     let picture = |dir: &str| fs::read(format!("{dir}/frame-0006.png")).unwrap();
     assert!(picture(&whole) == picture(&part), "the pictures differ");
     let ev = |dir: &str| report(Path::new(dir))["options"]["picture"]["exposure_ev"].clone();

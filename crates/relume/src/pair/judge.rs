@@ -161,11 +161,13 @@ impl Placed<'_> {
         }
         let body = self.body_of(a).filter(|&body| self.body_of(b) == Some(body));
         BoxShaft::new(self.view, self.forest, (a, b), body).narrow(candidates, narrowed);
-        let size = |id: ElementId, bounds: &Aabb| match self.forest.kind(id) {
+        // By area, which no motion changes: the extent of a group follows each of its bodies, and all
+        // pairs below would be made anew.
+        let size = |id: ElementId| match self.forest.kind(id) {
             Kind::Element => -1.0,
-            _ => bounds.diagonal(),
+            _ => self.forest.area_m2(id),
         };
-        let side = if size(a, box_a) >= size(b, box_b) { Side::A } else { Side::B };
+        let side = if size(a) >= size(b) { Side::A } else { Side::B };
         passing(Verdict::Refine(side), 0)
     }
 

@@ -163,6 +163,8 @@ pub struct Changes {
     pub work: Work,
     /// Edits to the links, in order; empty where they are not recorded.
     pub edits: Vec<Edit>,
+    /// Pairs that were refined anew, ascending; empty where edits are not recorded.
+    pub refined: Vec<PairId>,
     /// Pairs held.
     pub held: Vec<Held>,
     /// Pairs that were held once and may be so no more; both ends may have vanished since.
@@ -181,7 +183,8 @@ const BLOCK: usize = 1 << 15;
 
 /// Brings `tree`, with the hash over its links, up to date.
 ///
-/// Edits are recorded if `record` says so. `may_go_on` is asked after each block with the tree, the
+/// Edits are recorded if `record` says so. `fresh` are pairs (ascending) that an update with the same
+/// [`Judge::stale`] has refined already: all of their children are looked at. `may_go_on` is asked after each block with the tree, the
 /// number of elements and the scratch memory in bytes.
 ///
 /// # Errors
@@ -190,7 +193,7 @@ pub fn update<J: Judge>(
     (tree, hash): (&mut PairTree, &mut PairHash),
     judge: &mut J,
     root_candidates: &[u32],
-    record: bool,
+    (record, fresh): (bool, &[PairId]),
     may_go_on: &dyn Fn(&PairTree, usize, u64) -> bool,
 ) -> Result<Changes, OutOfMemory> {
     let mut editor =
@@ -200,7 +203,7 @@ pub fn update<J: Judge>(
     while !editor.next.items.is_empty() {
         let wave = std::mem::take(&mut editor.next);
         for block in wave.items.chunks(BLOCK) {
-            let judged = judge_block(editor.tree, editor.judge, block, &wave.candidates);
+            let judged = judge_block(editor.tree, editor.judge, block, &wave.candidates, fresh);
             for chunk in &judged {
                 editor.apply_chunk(chunk, &wave);
             }
@@ -211,6 +214,7 @@ pub fn update<J: Judge>(
             }
         }
     }
+    editor.changes.refined.sort_unstable();
     Ok(editor.changes)
 }
 
@@ -273,6 +277,7 @@ fn judge_block<'a, J: Judge>(
     judge: &J,
     items: &'a [Item],
     candidates: &[u32],
+    fresh: &[PairId],
 ) -> Vec<Chunk<'a>> {
     let judge_chunk = |items: &'a [Item]| {
         let mut narrowed = Vec::new();
@@ -280,6 +285,7 @@ fn judge_block<'a, J: Judge>(
             let (a, b) = tree.ends(item.pair);
             let stale = match tree.state(item.pair) {
                 State::New => Stale::Moved,
+                _ if fresh.binary_search(&item.pair).is_ok() => Stale::Moved,
                 _ => judge.stale(a, b),
             };
             match stale {
@@ -405,6 +411,9 @@ impl<J: Judge> Editor<'_, J> {
 
     fn enter(&mut self, pair: PairId, wanted: State, found: &Judgement) -> Range<u32> {
         let (a, b) = self.tree.ends(pair);
+        if self.record && wanted.is_refined() {
+            self.changes.refined.push(pair);
+        }
         match wanted {
             State::Refined(side) => {
                 let (children, made) = self.judge.split(if side == Side::A { a } else { b });

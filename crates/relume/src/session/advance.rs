@@ -3,7 +3,7 @@
 //! Without a state to start from, the same edits build it: a cold build is the update of nothing.
 
 use crate::element::{ElementId, Forest, Kind, WorldView};
-use crate::pair::{Changes, OutOfMemory, PairHash, PairTree, Placed, Since, Stage, update};
+use crate::pair::{Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Since, Stage, update};
 use crate::scene::BodyId;
 use crate::solver::{Dirty, Links, Radiosity, Stop, Surfaces};
 
@@ -42,15 +42,15 @@ impl Session {
         report.seconds.moving = clock.lap();
 
         let mut changes = Changes::default();
-        let bring = |solved: &mut Solved, since: Option<&Since<'_>>, level| {
-            let found = self.update(solved, since, level, !cold);
+        let bring = |solved: &mut Solved, since: Option<&Since<'_>>, level, fresh: &[PairId]| {
+            let found = self.update(solved, since, level, (!cold, fresh));
             found.map_err(|OutOfMemory| self.too_large(solved, frame))
         };
         if !self.coarse_ids.is_empty() {
-            changes = bring(&mut solved, since.as_ref(), Level::Coarse)?;
+            changes = bring(&mut solved, since.as_ref(), Level::Coarse, &[])?;
             self.follow_coarse(&mut solved, &changes, since.as_mut());
         }
-        let fine = bring(&mut solved, since.as_ref(), Level::Fine)?;
+        let fine = bring(&mut solved, since.as_ref(), Level::Fine, &changes.refined)?;
         changes.work += fine.work;
         changes.edits.extend(fine.edits);
         let work = changes.work;
@@ -96,7 +96,7 @@ impl Session {
         solved: &mut Solved,
         since: Option<&Since<'_>>,
         level: Level,
-        record: bool,
+        record_and_fresh: (bool, &[PairId]),
     ) -> Result<Changes, OutOfMemory> {
         let limit = self.options.max_memory_bytes.unwrap_or(u64::MAX);
         let may_go_on = |tree: &PairTree, elements: usize, scratch: u64| {
@@ -117,7 +117,7 @@ impl Session {
             since,
         };
         let tree = (&mut solved.tree, &mut solved.hash);
-        update(tree, &mut placed, &[Forest::ROOT.0], record, &may_go_on)
+        update(tree, &mut placed, &[Forest::ROOT.0], record_and_fresh, &may_go_on)
     }
 
     /// Solves over the coarse pairs anew where any changed, and says which elements' brightness did.

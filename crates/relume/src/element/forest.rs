@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::{DVec2, DVec3};
 
 use super::clusters::{Branch, binary_tree};
-use super::split::{Chart, Place, Shape};
+use super::split::{Chart, Extent, Place, Shape};
 use crate::geometry::{Aabb, split_convex};
 use crate::scene::{BodyId, PatchId, Scene};
 
@@ -349,6 +349,13 @@ impl Forest {
     pub fn shape(&self, id: ElementId) -> Shape {
         let node = &self.nodes[id.0 as usize];
         self.charts[node.facet as usize].shape(&node.place)
+    }
+
+    /// Where an element lies in its patch's frame, and how far it reaches.
+    #[inline]
+    pub fn extent(&self, id: ElementId) -> Extent {
+        let node = &self.nodes[id.0 as usize];
+        self.charts[node.facet as usize].extent(&node.place)
     }
 
     /// Index of the coarse element that holds this one, if coarse elements have been numbered.

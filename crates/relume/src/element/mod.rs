@@ -9,5 +9,5 @@ mod split;
 mod world;
 
 pub use forest::{Counts, ElementId, ElementKey, Forest, Kind};
-pub use split::{Shape, bilinear, bilinear_area};
+pub use split::{Extent, Shape, bilinear, bilinear_area};
 pub use world::{OccluderPolygon, WorldElement, WorldLight, WorldPatch, WorldView};

@@ -53,10 +53,12 @@ impl Shape {
         [e.x * e.x + f.x * f.x, e.x * e.y + f.x * f.y, e.y * e.y + f.y * f.y].map(|v| v / 12.0)
     }
 
-    /// Largest distance of a corner from the centroid, metres.
-    pub fn radius(&self) -> f64 {
-        let m = self.centroid();
-        self.corners.iter().map(|c| (*c - m).length_squared()).fold(0.0, f64::max).sqrt()
+    /// Centroid, radius and second moment at once.
+    pub fn extent(&self) -> Extent {
+        let centroid = self.centroid();
+        let reach2 = |c: &DVec2| (*c - centroid).length_squared();
+        let radius = self.corners.iter().map(reach2).fold(0.0, f64::max).sqrt();
+        Extent { centroid, radius, second_moment: self.second_moment() }
     }
 
     /// How this shape is cut so that its children are well shaped.
@@ -84,6 +86,17 @@ impl Shape {
         let longest = (0..3).fold(0, |m, k| if edges[k] > edges[m] { k } else { m });
         if edges[longest] > SLENDER * self.area() { Cut::Edge(longest) } else { Cut::Quarters }
     }
+}
+
+/// Where an element lies in its patch's frame, and how far it reaches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// Centroid, metres.
+    pub centroid: DVec2,
+    /// Largest distance of a corner from the centroid, metres.
+    pub radius: f64,
+    /// Mean of (x x, x y, y y) about the centroid, m2.
+    pub second_moment: [f64; 3],
 }
 
 /// Ways to cut an element.
@@ -206,6 +219,28 @@ impl Chart {
         Chart { origin: a, e, f, g: if even { DVec2::ZERO } else { g }, len: facet.len }
     }
 
+    /// Extent of the element at a place; quick for parallelograms.
+    #[inline]
+    pub(super) fn extent(&self, place: &Place) -> Extent {
+        if self.len == 3 || self.g != DVec2::ZERO {
+            return self.shape(place).extent();
+        }
+        let [a, _, c, _] = place.corners(4);
+        let (middle, half) = ((a + c) * 0.5, (c - a) * 0.5);
+        let (e, f) = (self.e * half.x, self.f * half.y);
+        let reach2 = (e + f).length_squared().max((e - f).length_squared());
+        let moment = |k: f64, l: f64| (k + l) / 3.0;
+        Extent {
+            centroid: self.origin + self.e * middle.x + self.f * middle.y,
+            radius: reach2.sqrt(),
+            second_moment: [
+                moment(e.x * e.x, f.x * f.x),
+                moment(e.x * e.y, f.x * f.y),
+                moment(e.y * e.y, f.y * f.y),
+            ],
+        }
+    }
+
     /// The element at a place. Neighbours get the same values at shared corners, bit for bit.
     #[inline]
     pub(super) fn shape(&self, place: &Place) -> Shape {
@@ -272,6 +307,21 @@ mod tests {
             for (p, q) in shape.corners.iter().zip(again.corners) {
                 assert!((*p - q).length() < 1e-15, "{p} {q}");
             }
+        }
+    }
+
+    #[test]
+    fn the_quick_extent_is_the_extent() {
+        let v = DVec2::new;
+        let shape = Shape::new(&[v(0.2, 0.1), v(1.2, 0.3), v(1.5, 1.3), v(0.5, 1.1)]);
+        let chart = Chart::of(&shape);
+        let (places, _) = Place::whole(4).children(4, Cut::Quarters);
+        for place in places {
+            let (one, two) = (chart.extent(&place), chart.shape(&place).extent());
+            assert!((one.centroid - two.centroid).length() < 1e-15);
+            assert!((one.radius - two.radius).abs() < 1e-15);
+            let moments = one.second_moment.iter().zip(two.second_moment);
+            assert!(moments.into_iter().all(|(m, n)| (m - n).abs() < 1e-15), "{one:?} {two:?}");
         }
     }
 

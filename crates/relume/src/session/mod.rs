@@ -128,7 +128,8 @@ impl Session {
                 let report = last.report.of_a_still_frame(label);
                 Solved { time_s, report, ..last }
             }
-            last => self.advance(last, from, label)?,
+            // On a thread of the pool: entering it anew for every small task would cost more.
+            last => rayon::scope(|_| self.advance(last, from, label))?,
         };
         let report = solved.report.clone();
         self.solved = Some(solved);

@@ -40,12 +40,11 @@ fn place_of(forest: &Forest, id: ElementId) -> Place {
     if forest.kind(id) != Kind::Element {
         return Place { centroid: [0.0; 2], radius: 1.0, moment: [1.0, 0.0, 1.0] };
     }
-    let shape = forest.shape(id);
-    let centroid = shape.centroid();
+    let extent = forest.extent(id);
     Place {
-        centroid: [centroid.x as f32, centroid.y as f32],
-        radius: shape.radius() as f32,
-        moment: shape.second_moment().map(|m| m as f32),
+        centroid: [extent.centroid.x as f32, extent.centroid.y as f32],
+        radius: extent.radius as f32,
+        moment: extent.second_moment.map(|m| m as f32),
     }
 }
 

@@ -82,19 +82,79 @@ pub struct Linear {
     pub gradient: [[f32; 3]; 2],
 }
 
+/// A [`Linear`] for each element: nine numbers each, one after the other.
+#[derive(Clone, Debug)]
+struct Field(Vec<f32>);
+
+/// Numbers of one element.
+const NINE: usize = 9;
+
+/// Numbers beyond the last element that [`Field::lanes`] may read.
+const BEYOND: usize = 1;
+
+impl Default for Field {
+    fn default() -> Field {
+        Field(vec![0.0; BEYOND])
+    }
+}
+
+impl Field {
+    fn len(&self) -> usize {
+        self.0.len() / NINE
+    }
+
+    fn extend(&mut self, len: usize) {
+        if len > self.len() {
+            self.0.reserve_exact(len * NINE + BEYOND - self.0.len());
+            self.0.resize(len * NINE + BEYOND, 0.0);
+        }
+    }
+
+    #[inline]
+    fn get(&self, id: u32) -> Linear {
+        let at = id as usize * NINE;
+        let [r, g, b, ur, ug, ub, vr, vg, vb] =
+            *self.0[at..].first_chunk::<NINE>().expect("an element");
+        Linear { mean: [r, g, b], gradient: [[ur, ug, ub], [vr, vg, vb]] }
+    }
+
+    #[inline]
+    fn set(&mut self, id: u32, value: &Linear) {
+        let at = id as usize * NINE;
+        let [[ur, ug, ub], [vr, vg, vb]] = value.gradient;
+        let [r, g, b] = value.mean;
+        self.0[at..at + NINE].copy_from_slice(&[r, g, b, ur, ug, ub, vr, vg, vb]);
+    }
+
+    /// Mean and both gradients, each with the number that follows it.
+    #[inline]
+    fn lanes(&self, id: u32) -> [[f32; 4]; 3] {
+        let at = id as usize * NINE;
+        let all = self.0[at..].first_chunk::<10>().expect("an element");
+        let four = |k: usize| [all[k], all[k + 1], all[k + 2], all[k + 3]];
+        [four(0), four(3), four(6)]
+    }
+
+    fn bytes(&self) -> u64 {
+        (self.0.capacity() * size_of::<f32>()) as u64
+    }
+}
+
 /// The solution: 72 bytes an element.
 #[derive(Clone, Debug, Default)]
 pub struct Radiosity {
     /// Gradients are per radius of the element.
-    radiosity: Vec<Linear>,
+    radiosity: Field,
     /// What an element's own links bring, without those of its ancestors. Gradients are per metre.
-    gathered: Vec<Linear>,
+    gathered: Field,
     /// Sweeps made by the last solve.
     pub sweeps: u32,
     /// Receivers gathered by the last solve, each time counted.
     pub gathers: u64,
-    /// Largest change that was left undone, relative to the mean radiosity.
+    /// Largest change that was not followed to who depends on it, relative to the mean radiosity.
     pub residual: f64,
+    /// The same of the last sweep over everything alone, W/m2.
+    passed_over: f32,
 }
 
 /// Sweeps after which a solve is given up as not converging (reflectances are below 1).
@@ -105,6 +165,9 @@ const CHUNK: usize = 256;
 
 /// Share of the receivers above which all are gathered: to find out which is dearer then.
 const MANY: usize = 4;
+
+/// Share of the elements that must change in a sweep over all for the next to be over all.
+const FEW: usize = 16;
 
 impl Linear {
     /// Value at an offset from the centroid (in the unit of the gradient), unclamped.
@@ -158,61 +221,102 @@ impl Radiosity {
 
     /// Makes room for elements with higher ids.
     pub fn extend(&mut self, len: usize) {
-        if len > self.radiosity.len() {
-            self.radiosity.resize(len, Linear::default());
-            self.gathered.resize(len, Linear::default());
-        }
+        self.radiosity.extend(len);
+        self.gathered.extend(len);
     }
 
     /// Gives an element a constant radiosity to begin with.
     pub fn set(&mut self, id: u32, radiosity: [f32; 3]) {
-        self.radiosity[id as usize] = Linear { mean: radiosity, ..Linear::default() };
+        self.radiosity.set(id, &Linear { mean: radiosity, ..Linear::default() });
     }
 
     /// Gives the new children of an element its radiosity to begin with.
     pub fn inherit(&mut self, surfaces: &impl Surfaces, parent: u32) {
         let own = surfaces.place(parent);
-        let from = self.radiosity[parent as usize];
+        let from = self.radiosity.get(parent);
         for child in surfaces.children(parent) {
             let place = surfaces.place(child);
             let [x, y] = [0, 1].map(|k| (place.centroid[k] - own.centroid[k]) / own.radius);
             let scale = place.radius / own.radius;
             let gradient = from.gradient.map(|g| g.map(|v| v * scale));
-            self.radiosity[child as usize] = Linear { mean: from.at(x, y), gradient };
-            self.gathered[child as usize] = Linear::default();
+            self.radiosity.set(child, &Linear { mean: from.at(x, y), gradient });
+            self.gathered.set(child, &Linear::default());
         }
     }
 
     /// Gathers, pushes and pulls until the solution is settled, beginning with what is dirty.
     ///
-    /// A radiosity that would change by no more than the residual stays as it is, so that whoever
-    /// gathered it has gathered its present value: nothing drifts, however often this is called.
+    /// Facets go in batches, each with what the batches before it have found in the same sweep
+    /// (Gauss-Seidel), and in parallel within. Sweeps over everything go on until no radiosity
+    /// changes by more than the residual. Sweeps over a part follow only larger changes: a radiosity
+    /// that would change by less stays as it is, so that whoever gathered it has gathered its present
+    /// value, and nothing drifts however often this is called.
     pub fn solve(&mut self, surfaces: &impl Surfaces, links: &Links, dirty: Dirty, stop: Stop) {
         let mut work = Work::new(surfaces, dirty);
-        (self.sweeps, self.gathers, self.residual) = (0, 0, 0.0);
+        let mut jump = Jump::default();
+        (self.sweeps, self.gathers) = (0, 0);
         loop {
             let mean = self.mean(surfaces);
-            let keep = match stop {
+            let limit = match stop {
                 Stop::Sweeps(_) => 0.0,
                 Stop::Residual(limit) => (limit * mean) as f32,
             };
-            self.gather(surfaces, links, &work);
-            let settled = self.settle(surfaces, &work, keep);
-            let largest = settled.iter().map(|s| s.kept).fold(0.0, f32::max);
-            self.residual = if mean > 0.0 { f64::from(largest) / mean } else { 0.0 };
+            if work.all {
+                jump.before(&self.radiosity);
+            }
+            let small = self.sweep(surfaces, links, &mut work, limit);
+            if work.all {
+                self.passed_over = small;
+            }
+            let left = self.passed_over + if work.all { 0.0 } else { small };
+            self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
             self.sweeps += 1;
             let done = match stop {
                 Stop::Sweeps(count) => self.sweeps >= count,
-                Stop::Residual(_) => settled.iter().all(|s| s.changed.is_empty()),
+                Stop::Residual(_) => !work.is_left(surfaces, links),
             };
-            for &(id, value) in settled.iter().flat_map(|s| &s.changed) {
-                self.radiosity[id as usize] = value;
-            }
             if done || self.sweeps >= SWEEPS_MAX {
                 return;
             }
-            work.follow(surfaces, links, &settled);
+            if work.all && matches!(stop, Stop::Residual(_)) {
+                jump.after(&mut self.radiosity);
+            }
         }
+    }
+
+    /// One pass over all batches; returns the largest change that is too small to be followed.
+    fn sweep(
+        &mut self,
+        surfaces: &impl Surfaces,
+        links: &Links,
+        work: &mut Work,
+        limit: f32,
+    ) -> f32 {
+        let mut small = 0.0_f32;
+        work.changed.clear();
+        let mut scratch = std::mem::take(&mut work.scratch);
+        for batch in 0..work.batches.len() {
+            let mut now = work.take(surfaces, batch);
+            self.gather(surfaces, links, &now.receivers, &mut scratch.gathered);
+            self.settle(surfaces, &now.facets, (limit, work.all), &mut scratch.settled);
+            for settled in &scratch.settled[..now.facets.len()] {
+                small = small.max(settled.small);
+                for (id, value, large) in &settled.changed {
+                    self.radiosity.set(*id, value);
+                    if *large {
+                        work.changed.push(*id);
+                    }
+                    if !work.all {
+                        work.mark_neighbours(surfaces, links, *id);
+                    }
+                }
+            }
+            if work.all {
+                std::mem::swap(&mut work.batches[batch], &mut now);
+            }
+        }
+        work.scratch = scratch;
+        small
     }
 
     /// Area-weighted mean radiosity of all surfaces and channels.
@@ -220,62 +324,74 @@ impl Radiosity {
         let (mut flux, mut area) = (0.0, 0.0);
         for facet in surfaces.facets() {
             let a = surfaces.area_m2(facet.0);
-            let b: f32 = self.radiosity[facet.0 as usize].mean.iter().sum();
+            let b: f32 = self.radiosity.get(facet.0).mean.iter().sum();
             flux += a * f64::from(b) / 3.0;
             area += a;
         }
         if area > 0.0 { flux / area } else { 0.0 }
     }
 
-    fn gather(&mut self, surfaces: &impl Surfaces, links: &Links, work: &Work) {
-        let radiosity = &self.radiosity;
+    fn gather(
+        &mut self,
+        surfaces: &impl Surfaces,
+        links: &Links,
+        receivers: &[u32],
+        found: &mut Vec<Linear>,
+    ) {
+        self.gathers += receivers.len() as u64;
+        let Radiosity { radiosity, gathered, .. } = self;
         let one = |id: u32| match links.of(id) {
             [] => Linear::default(),
             list => gather_one(radiosity, list, 1.0 / surfaces.place(id).radius),
         };
-        match &work.receivers {
-            None => {
-                self.gathers += self.gathered.len() as u64;
-                self.gathered.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
-                    for (k, h) in out.iter_mut().enumerate() {
-                        *h = one((chunk * CHUNK + k) as u32);
-                    }
-                });
-            }
-            Some(receivers) => {
-                self.gathers += receivers.len() as u64;
-                let gathered: Vec<Linear> =
-                    receivers.par_iter().with_min_len(CHUNK).map(|&id| one(id)).collect();
-                for (&id, h) in receivers.iter().zip(gathered) {
-                    self.gathered[id as usize] = h;
-                }
-            }
+        if receivers.len() <= CHUNK {
+            receivers.iter().for_each(|&id| gathered.set(id, &one(id)));
+            return;
+        }
+        found.resize(found.len().max(receivers.len()), Linear::default());
+        let chunks = receivers.par_chunks(CHUNK).zip(found.par_chunks_mut(CHUNK));
+        chunks.for_each(|(ids, out)| {
+            ids.iter().zip(out).for_each(|(&id, h)| *h = one(id));
+        });
+        for (&id, h) in receivers.iter().zip(found.iter()) {
+            gathered.set(id, h);
         }
     }
 
-    /// New radiosities of all elements of the facets concerned, as far as they differ.
-    fn settle(&self, surfaces: &impl Surfaces, work: &Work, keep: f32) -> Vec<Settled> {
-        let facet = |&facet: &u32| {
-            let mut out = Settled { changed: Vec::new(), kept: 0.0 };
+    /// New radiosities of all elements of some facets, as far as they differ.
+    fn settle(
+        &self,
+        surfaces: &impl Surfaces,
+        facets: &[u32],
+        (limit, all): (f32, bool),
+        settled: &mut Vec<Settled>,
+    ) {
+        settled.resize_with(settled.len().max(facets.len()), Settled::default);
+        let facet = |(&facet, out): (&u32, &mut Settled)| {
+            out.changed.clear();
+            out.small = 0.0;
             let lit = surfaces.lit(facet);
             let place = surfaces.place(facet);
-            let below = Below { solution: self, surfaces, lit, keep };
-            below.settle(facet, &place, &Linear::default(), &mut out);
-            out
+            let below = Below { solution: self, surfaces, lit, limit, all };
+            below.settle(facet, &place, &Linear::default(), out);
         };
-        work.facets.par_iter().map(facet).collect()
+        if facets.len() == 1 {
+            facet((&facets[0], &mut settled[0]));
+        } else {
+            facets.par_iter().zip(settled).for_each(facet);
+        }
     }
 
     /// Radiosity of an element: mean, and gradient per radius, W/m2.
     #[inline]
-    pub fn linear_radiosity(&self, id: u32) -> &Linear {
-        &self.radiosity[id as usize]
+    pub fn linear_radiosity(&self, id: u32) -> Linear {
+        self.radiosity.get(id)
     }
 
     /// Radiosity of an element, W/m2.
     #[inline]
     pub fn radiosity(&self, id: u32) -> [f32; 3] {
-        self.radiosity[id as usize].mean
+        self.radiosity.get(id).mean
     }
 
     /// Calls `visit` with the irradiance (mean, and gradient per metre) of each leaf of a facet,
@@ -286,13 +402,13 @@ impl Radiosity {
         facet: u32,
         visit: &mut dyn FnMut(u32, &Linear),
     ) {
-        let own = |id: u32| self.gathered[id as usize];
+        let own = |id: u32| self.gathered.get(id);
         push(surfaces, (facet, &surfaces.place(facet)), &Linear::default(), &own, visit);
     }
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> u64 {
-        ((self.radiosity.capacity() + self.gathered.capacity()) * size_of::<Linear>()) as u64
+        self.radiosity.bytes() + self.gathered.bytes()
     }
 }
 
@@ -352,76 +468,191 @@ fn for_each_below(surfaces: &impl Surfaces, id: u32, visit: &mut dyn FnMut(u32))
     }
 }
 
-/// What one sweep has to do.
-struct Work {
-    /// Receivers to be gathered; `None` for all.
-    receivers: Option<Vec<u32>>,
-    facets: Vec<u32>,
-    /// Receivers marked for the next sweep, a bit each.
-    marks: Vec<u64>,
+/// Aitken's extrapolation: once successive changes are all but parallel, one mode is left, and its
+/// geometric series is summed at once.
+#[derive(Default)]
+struct Jump {
+    before: Vec<f32>,
+    change: Vec<f32>,
+    last: Vec<f32>,
 }
+
+/// Square of the cosine between successive changes above which they count as parallel.
+const PARALLEL: f64 = 0.9;
+
+impl Jump {
+    fn before(&mut self, field: &Field) {
+        self.before.clone_from(&field.0);
+    }
+
+    fn after(&mut self, field: &mut Field) {
+        let change = field.0.iter().zip(&self.before).map(|(now, before)| now - before);
+        self.change.clear();
+        self.change.extend(change);
+        if self.last.len() == self.change.len() {
+            let dot = |x: &[f32], y: &[f32]| -> f64 {
+                x.iter().zip(y).map(|(a, b)| f64::from(a * b)).sum()
+            };
+            let (along, now, last) = (
+                dot(&self.change, &self.last),
+                dot(&self.change, &self.change),
+                dot(&self.last, &self.last),
+            );
+            let ratio = along / last.max(f64::MIN_POSITIVE);
+            if along * along > PARALLEL * now * last && ratio > 0.0 && ratio < 0.95 {
+                let step = (ratio / (1.0 - ratio)) as f32;
+                field.0.iter_mut().zip(&self.change).for_each(|(b, d)| *b += d * step);
+                self.last.clear();
+                return;
+            }
+        }
+        std::mem::swap(&mut self.last, &mut self.change);
+    }
+}
+
+/// What is left to be done, batch by batch.
+struct Work {
+    batches: Vec<Batch>,
+    /// Batch of each facet, by the facet's id.
+    batch_of: Vec<u16>,
+    /// Receivers that wait in some batch, a bit each.
+    marks: Vec<u64>,
+    /// Every sweep gathers everything.
+    all: bool,
+    /// Elements that the last sweep changed.
+    changed: Vec<u32>,
+    scratch: Scratch,
+}
+
+/// Room that is used again and again.
+#[derive(Default)]
+struct Scratch {
+    gathered: Vec<Linear>,
+    settled: Vec<Settled>,
+}
+
+/// Facets that go together: consecutive ones.
+#[derive(Default)]
+struct Batch {
+    facets: Vec<u32>,
+    /// Receivers to be gathered; the facets they are in are settled.
+    receivers: Vec<u32>,
+    /// Further facets to be settled.
+    dirty: Vec<u32>,
+}
+
+/// Batches there are at most.
+const BATCHES: usize = 16;
 
 impl Work {
     fn new(surfaces: &impl Surfaces, dirty: Dirty) -> Work {
-        let mut work =
-            Work { receivers: None, facets: Vec::new(), marks: vec![0; surfaces.len() / 64 + 1] };
+        let facets = surfaces.facets();
+        let count = facets.len().min(BATCHES);
+        let mut batches: Vec<Batch> = (0..count).map(|_| Batch::default()).collect();
+        let mut batch_of = vec![0; facets.last().map_or(0, |f| f.0 as usize + 1)];
+        for (k, facet) in facets.iter().enumerate() {
+            let batch = k * count / facets.len();
+            batches[batch].facets.push(facet.0);
+            batch_of[facet.0 as usize] = batch as u16;
+        }
+        let marks = vec![0; surfaces.len() / 64 + 1];
+        let mut work = Work {
+            batches,
+            batch_of,
+            marks,
+            all: false,
+            changed: Vec::new(),
+            scratch: Scratch::default(),
+        };
         match dirty {
-            Dirty::All => work.all(surfaces),
-            Dirty::Some { receivers, facets } => work.some(surfaces, receivers, facets),
+            Dirty::Some { receivers, facets } if receivers.len() <= surfaces.len() / MANY => {
+                for facet in facets {
+                    work.batches[usize::from(work.batch_of[facet as usize])].dirty.push(facet);
+                }
+                receivers.into_iter().for_each(|id| work.mark(surfaces, id));
+            }
+            _ => work.start_all(surfaces),
         }
         work
     }
 
-    fn all(&mut self, surfaces: &impl Surfaces) {
-        self.receivers = None;
-        self.facets = surfaces.facets().iter().map(|f| f.0).collect();
-    }
-
-    fn some(&mut self, surfaces: &impl Surfaces, receivers: Vec<u32>, mut facets: Vec<u32>) {
-        if receivers.len() > surfaces.len() / MANY {
-            return self.all(surfaces);
-        }
-        facets.extend(receivers.iter().map(|&id| surfaces.facet_of(id)));
-        facets.sort_unstable();
-        facets.dedup();
-        self.facets = facets;
-        self.receivers = Some(receivers);
-    }
-
-    /// The next sweep gathers whoever has a link from an element that changed.
-    fn follow(&mut self, surfaces: &impl Surfaces, links: &Links, settled: &[Settled]) {
-        let changed: usize = settled.iter().map(|s| s.changed.len()).sum();
-        if changed > surfaces.len() / MANY {
-            return self.all(surfaces);
-        }
-        let mut receivers = Vec::new();
-        // Whoever an element gathers from gathers from it.
-        for &(id, _) in settled.iter().flat_map(|s| &s.changed) {
-            for link in links.of(id) {
-                let bit = 1 << (link.source % 64);
-                let word = &mut self.marks[link.source as usize / 64];
-                if *word & bit == 0 {
-                    *word |= bit;
-                    receivers.push(link.source);
-                }
+    fn start_all(&mut self, surfaces: &impl Surfaces) {
+        self.all = true;
+        self.marks.fill(0);
+        for batch in &mut self.batches {
+            batch.receivers.clear();
+            for &facet in &batch.facets {
+                for_each_below(surfaces, facet, &mut |id| batch.receivers.push(id));
             }
         }
-        receivers.sort_unstable();
-        for &id in &receivers {
-            self.marks[id as usize / 64] = 0;
+    }
+
+    fn mark(&mut self, surfaces: &impl Surfaces, id: u32) {
+        let bit = 1 << (id % 64);
+        let word = &mut self.marks[id as usize / 64];
+        if *word & bit == 0 {
+            *word |= bit;
+            let batch = self.batch_of[surfaces.facet_of(id) as usize];
+            self.batches[usize::from(batch)].receivers.push(id);
         }
-        // Sources that are no surfaces receive nothing: they have no links of their own.
-        receivers.retain(|&id| !links.of(id).is_empty());
-        self.some(surfaces, receivers, Vec::new());
+    }
+
+    /// Whoever an element gathers from gathers from it.
+    fn mark_neighbours(&mut self, surfaces: &impl Surfaces, links: &Links, id: u32) {
+        for link in links.of(id) {
+            // Sources that are no surfaces receive nothing: they have no links of their own.
+            if !links.of(link.source).is_empty() {
+                self.mark(surfaces, link.source);
+            }
+        }
+    }
+
+    /// What a batch has to do now. Of a sweep over all it is to be put back.
+    fn take(&mut self, surfaces: &impl Surfaces, batch: usize) -> Batch {
+        if self.all {
+            return std::mem::take(&mut self.batches[batch]);
+        }
+        let batch = &mut self.batches[batch];
+        let mut receivers = std::mem::take(&mut batch.receivers);
+        receivers.sort_unstable();
+        let mut facets = std::mem::take(&mut batch.dirty);
+        for &id in &receivers {
+            self.marks[id as usize / 64] &= !(1 << (id % 64));
+            facets.push(surfaces.facet_of(id));
+        }
+        facets.sort_unstable();
+        facets.dedup();
+        Batch { receivers, facets, dirty: Vec::new() }
+    }
+
+    /// Whether another sweep is needed.
+    fn is_left(&mut self, surfaces: &impl Surfaces, links: &Links) -> bool {
+        if !self.all {
+            if self.changed.len() > surfaces.len() / MANY {
+                self.start_all(surfaces);
+            }
+            return self.all || self.batches.iter().any(|b| !b.receivers.is_empty());
+        }
+        if self.changed.len() <= surfaces.len() / FEW {
+            // From now on only what depends on a change.
+            self.all = false;
+            self.batches.iter_mut().for_each(|b| b.receivers.clear());
+            for id in std::mem::take(&mut self.changed) {
+                self.mark_neighbours(surfaces, links, id);
+            }
+            return self.is_left(surfaces, links);
+        }
+        true
     }
 }
 
 /// What pushing and pulling through one facet found.
+#[derive(Default)]
 struct Settled {
-    /// Elements with their new radiosities.
-    changed: Vec<(u32, Linear)>,
-    /// Largest change that was not made.
-    kept: f32,
+    /// Elements with their new radiosities, and whether those differ by more than the limit.
+    changed: Vec<(u32, Linear, bool)>,
+    /// Largest difference within the limit.
+    small: f32,
 }
 
 /// One facet being settled.
@@ -429,13 +660,15 @@ struct Below<'a, S> {
     solution: &'a Radiosity,
     surfaces: &'a S,
     lit: &'a Lit,
-    keep: f32,
+    limit: f32,
+    /// Whether small differences are made too.
+    all: bool,
 }
 
 impl<S: Surfaces> Below<'_, S> {
     /// Pushes irradiance down and pulls radiosity up; returns the new radiosity of `id`.
     fn settle(&self, id: u32, place: &Place, inherited: &Linear, out: &mut Settled) -> Linear {
-        let h = self.solution.gathered[id as usize].plus(inherited);
+        let h = self.solution.gathered.get(id).plus(inherited);
         let children = self.surfaces.children(id);
         let b = if children.is_empty() {
             self.reflect(&h, place.radius)
@@ -448,11 +681,13 @@ impl<S: Surfaces> Below<'_, S> {
             }
             fit.linear(place.radius)
         };
-        let difference = b.difference(&self.solution.radiosity[id as usize]);
-        if difference > self.keep {
-            out.changed.push((id, b));
-        } else {
-            out.kept = out.kept.max(difference);
+        let difference = b.difference(&self.solution.radiosity.get(id));
+        let large = difference > self.limit;
+        if large || self.all {
+            out.changed.push((id, b, large));
+        }
+        if !large {
+            out.small = out.small.max(difference);
         }
         b
     }
@@ -515,25 +750,23 @@ impl Fit {
 }
 
 /// Everything one receiver gathers; in the order of its links.
+///
+/// Four lanes at a time: red, green, blue and one of no meaning, the number next in memory.
 #[inline]
-fn gather_one(radiosity: &[Linear], list: &[Link], per_radius: f32) -> Linear {
-    let mut out = Linear::default();
-    let [mut gx, mut gy] = [[0.0_f32; 3]; 2];
+fn gather_one(radiosity: &Field, list: &[Link], per_radius: f32) -> Linear {
+    let [mut mean, mut gx, mut gy] = [[0.0_f32; 4]; 3];
     for link in list {
-        let b = &radiosity[link.source as usize];
-        let [su, sv] = link.source_gradient();
-        let [ru, rv] = link.receiver_gradient();
-        let moment = SOURCE_MOMENT * link.coupling;
-        for c in 0..3 {
-            let mean = link.coupling * b.mean[c];
-            let sent = mean + moment * (su * b.gradient[0][c] + sv * b.gradient[1][c]);
-            out.mean[c] += sent;
-            gx[c] += ru * mean;
-            gy[c] += rv * mean;
+        let [m, u, v] = radiosity.lanes(link.source);
+        let [ru, rv, su, sv] = link.both_gradients().map(|g| g * link.coupling);
+        let (su, sv) = (su * SOURCE_MOMENT, sv * SOURCE_MOMENT);
+        for c in 0..4 {
+            mean[c] += link.coupling * m[c] + (su * u[c] + sv * v[c]);
+            gx[c] += ru * m[c];
+            gy[c] += rv * m[c];
         }
     }
-    out.gradient = [gx.map(|g| g * per_radius), gy.map(|g| g * per_radius)];
-    out
+    let three = |lanes: [f32; 4], scale: f32| [0, 1, 2].map(|c| lanes[c] * scale);
+    Linear { mean: three(mean, 1.0), gradient: [three(gx, per_radius), three(gy, per_radius)] }
 }
 
 /// Mean of x^2 / radius^2 over an element, for the product of two gradients: 1/6 for a square.

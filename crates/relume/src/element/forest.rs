@@ -127,6 +127,7 @@ impl Forest {
         if !scene.patches.is_empty() {
             forest.plant_bodies(scene, 1);
         }
+        forest.facets.sort_unstable();
         forest.fixed_len = forest.nodes.len() as u32;
         forest.kept_len = forest.fixed_len;
         forest.sum_areas();

@@ -32,7 +32,7 @@ fn bits(snapshot: &Snapshot, report: &FrameReport) -> Vec<u64> {
         out.extend(numbers.map(|x| u64::from(x.to_bits())));
     }
     out.extend([report.links, report.elements, report.segments, u64::from(report.sweeps)]);
-    let (rows, energy) = (&report.row_sum_error, &report.energy);
+    let (rows, energy) = (report.row_sum_error.unwrap(), report.energy.unwrap());
     let numbers = [
         rows.rms,
         rows.max,

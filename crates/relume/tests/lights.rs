@@ -147,7 +147,7 @@ fn the_flux_of_a_point_light_is_its_solid_angle_less_the_shadow() {
         assert!((plate - 1.0).abs() < 1e-3, "{plate}");
         // What is emitted arrives on the floor or the plate, or escapes.
         let emitted = 4.0 * PI * I.iter().sum::<f64>();
-        let e = report.energy;
+        let e = report.energy.unwrap();
         assert!((e.emitted_w / emitted - 1.0).abs() < 1e-6, "{e:?}");
         assert!(((e.absorbed_w + e.escaped_w) / emitted - 1.0).abs() < 1e-4, "{e:?}");
     }
@@ -205,7 +205,7 @@ fn a_closed_room_takes_all_light_in() {
             let node = b.node("lamp", None, v(0.2, 0.1, 0.6), DQuat::IDENTITY);
             b.light("lamp", node, kind, I);
             let (session, report) = solved(b.build().unwrap(), at_tolerance(0.05));
-            let e = report.energy;
+            let e = report.energy.unwrap();
             let emitted = sr * I.iter().sum::<f64>();
             println!("{name} rho {rho}: {e:?} emitted {emitted:.5}, {} links", report.links);
             assert!((e.emitted_w / emitted - 1.0).abs() < 1e-6);
@@ -280,7 +280,7 @@ fn a_body_that_is_absent_casts_no_shadow_and_carries_nothing() {
     let after = session.step(2, 2.0).unwrap();
     assert_eq!(after.hash, before.hash);
     assert_eq!(leaves(&session), 0);
-    let e = after.energy;
+    let e = after.energy.unwrap();
     let left = (e.emitted_w - e.absorbed_w - e.escaped_w) / e.emitted_w;
     assert!(left.abs() < 1e-3, "{e:?}");
 }

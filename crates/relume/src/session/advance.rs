@@ -5,12 +5,12 @@
 use crate::element::{ElementId, Forest, Kind, WorldView};
 use crate::pair::{Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Since, Stage, update};
 use crate::scene::BodyId;
-use crate::solver::{Dirty, Links, Radiosity, Stop, Surfaces};
+use crate::solver::{Dirty, Links, Radiosity, Stop};
 
 use super::coarse::{self, Coarse};
 use super::report::FrameReport;
 use super::surfaces::{LitForest, apply_edits, links_of};
-use super::{Clock, RESIDUAL_SHARE, Session, SessionError, Solved, tally};
+use super::{Clock, FOLLOWED_SHARE, RESIDUAL_SHARE, Session, SessionError, Solved, tally};
 
 impl Session {
     /// Whether nothing at all differs between the last state and this time.
@@ -61,13 +61,17 @@ impl Session {
 
         let lit = LitForest::new(&self.scene, &solved.forest);
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
-        let stop = Stop::Residual(self.options.tolerance * RESIDUAL_SHARE);
+        let share = |share: f64| self.options.tolerance * share;
+        let stop = Stop::Residual { all: share(RESIDUAL_SHARE), part: share(FOLLOWED_SHARE) };
         solved.radiosity.solve(&lit, &solved.links, dirty, stop);
         report.seconds.solve = clock.lap();
 
         solved.time_s = time_s;
         report.count(&work);
-        tally::fill(&mut report, &self.scene, &solved);
+        tally::fill(&mut report, &solved);
+        if self.options.balance {
+            tally::fill_balance(&mut report, &self.scene, &solved);
+        }
         if cold {
             report.dynamic_links = from.map_or(0, |from| self.dynamic_links(&solved, from));
         }
@@ -165,12 +169,11 @@ impl Session {
         for &parent in &split {
             solved.radiosity.inherit(&lit, parent);
         }
-        let facets = split.iter().map(|&id| lit.facet_of(id)).collect();
         match receivers {
             None => Dirty::All,
             Some(receivers) => Dirty::Some {
                 receivers: receivers.into_iter().filter(|&id| alive(&ElementId(id))).collect(),
-                facets,
+                parents: split,
             },
         }
     }

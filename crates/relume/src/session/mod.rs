@@ -80,6 +80,10 @@ const LINK_SHARE: f64 = 0.25;
 /// Residual of the solver relative to the tolerance.
 const RESIDUAL_SHARE: f64 = 0.005;
 
+/// Changes of radiosity that are followed where a part of the scene is solved anew, relative to the
+/// tolerance.
+const FOLLOWED_SHARE: f64 = 0.05;
+
 impl Session {
     /// Prepares a scene for solving; the links are built by the first [`Session::step`].
     ///

@@ -9,6 +9,8 @@ pub struct Options {
     pub oracle: Oracle,
     /// How the pair tree follows the motion.
     pub update: Update,
+    /// Whether every step measures row sums and energies: a pass over all links, whatever moved.
+    pub balance: bool,
     /// Limit on the engine's memory, bytes; `None` for no limit.
     pub max_memory_bytes: Option<u64>,
 }
@@ -19,6 +21,7 @@ impl Default for Options {
             tolerance: 0.02,
             oracle: Oracle::Error,
             update: Update::Reinspect,
+            balance: true,
             max_memory_bytes: None,
         }
     }

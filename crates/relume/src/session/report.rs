@@ -54,10 +54,10 @@ pub struct FrameReport {
     pub gathers: u64,
     /// Largest change of radiosity that the last sweep left undone, relative to the mean radiosity.
     pub residual: f64,
-    /// How far the row sums of the form factors are from 1.
-    pub row_sum_error: RowSumError,
-    /// Where the flux goes, summed over the three channels.
-    pub energy: Energy,
+    /// How far the row sums of the form factors are from 1, where it was asked for.
+    pub row_sum_error: Option<RowSumError>,
+    /// Where the flux goes, summed over the three channels, where it was asked for.
+    pub energy: Option<Energy>,
     /// Hash over the active pairs with their exchange areas and visibilities, in key order.
     pub hash: String,
     /// Wall-clock seconds by phase.

@@ -61,6 +61,11 @@ impl Surfaces for LitForest<'_> {
         self.forest.fixed(ElementId(id)).0
     }
 
+    fn parent(&self, id: u32) -> Option<u32> {
+        let parent = self.forest.parent(ElementId(id))?;
+        (self.forest.kind(parent) == Kind::Element).then_some(parent.0)
+    }
+
     fn children(&self, id: u32) -> Range<u32> {
         self.forest.children(ElementId(id))
     }

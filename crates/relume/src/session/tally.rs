@@ -10,7 +10,7 @@ use super::report::{Energy, FrameReport, PairCounts, RowSumError};
 use super::surfaces::LitForest;
 
 /// Fills in what the solution says of itself.
-pub(super) fn fill(report: &mut FrameReport, scene: &Scene, solved: &Solved) {
+pub(super) fn fill(report: &mut FrameReport, solved: &Solved) {
     let counts = solved.tree.counts();
     report.hash = solved.hash.to_string();
     report.links = counts.active;
@@ -21,7 +21,12 @@ pub(super) fn fill(report: &mut FrameReport, scene: &Scene, solved: &Solved) {
     report.sweeps = solved.radiosity.sweeps;
     report.gathers = solved.radiosity.gathers;
     report.residual = solved.radiosity.residual;
-    (report.row_sum_error, report.energy) = balance(scene, solved);
+}
+
+/// Fills in row sums and energies: a pass over all links and elements.
+pub(super) fn fill_balance(report: &mut FrameReport, scene: &Scene, solved: &Solved) {
+    let (rows, energy) = balance(scene, solved);
+    (report.row_sum_error, report.energy) = (Some(rows), Some(energy));
 }
 
 /// Links between bodies (or lights) of which at least one is among those that moved.

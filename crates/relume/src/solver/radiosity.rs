@@ -40,6 +40,8 @@ pub trait Surfaces: Sync {
     fn facets(&self) -> &[ElementId];
     /// Root of the quadtree that an element is in.
     fn facet_of(&self, id: u32) -> u32;
+    /// Parent of an element within its quadtree; `None` for a facet.
+    fn parent(&self, id: u32) -> Option<u32>;
     /// Children of an element within its quadtree.
     fn children(&self, id: u32) -> Range<u32>;
     /// Area, m2.
@@ -56,7 +58,13 @@ pub enum Stop {
     /// After exactly this many sweeps.
     Sweeps(u32),
     /// When no element's radiosity would change by more than this, relative to the mean radiosity.
-    Residual(f64),
+    Residual {
+        /// In sweeps over everything.
+        all: f64,
+        /// Where only a part is solved anew: a small body that moves changes nearly everything a
+        /// little, and that little need not be followed.
+        part: f64,
+    },
 }
 
 /// Which receivers to gather anew to begin with.
@@ -68,8 +76,8 @@ pub enum Dirty {
     Some {
         /// Receivers whose links changed.
         receivers: Vec<u32>,
-        /// Facets whose elements came or went.
-        facets: Vec<u32>,
+        /// Elements whose children came or went.
+        parents: Vec<u32>,
     },
 }
 
@@ -140,13 +148,15 @@ impl Field {
     }
 }
 
-/// The solution: 72 bytes an element.
+/// The solution: 76 bytes an element.
 #[derive(Clone, Debug, Default)]
 pub struct Radiosity {
     /// Gradients are per radius of the element.
     radiosity: Field,
     /// What an element's own links bring, without those of its ancestors. Gradients are per metre.
     gathered: Field,
+    /// By how much the irradiance of an element may have changed since it was gathered, W/m2.
+    pending: Vec<f32>,
     /// Sweeps made by the last solve.
     pub sweeps: u32,
     /// Receivers gathered by the last solve, each time counted.
@@ -168,6 +178,9 @@ const MANY: usize = 4;
 
 /// Share of the elements that must change in a sweep over all for the next to be over all.
 const FEW: usize = 16;
+
+/// Share of the residual to which changes of sources may add up before a receiver gathers anew.
+const PENDING_SHARE: f32 = 0.5;
 
 impl Linear {
     /// Value at an offset from the centroid (in the unit of the gradient), unclamped.
@@ -223,6 +236,10 @@ impl Radiosity {
     pub fn extend(&mut self, len: usize) {
         self.radiosity.extend(len);
         self.gathered.extend(len);
+        if len > self.pending.len() {
+            self.pending.reserve_exact(len - self.pending.len());
+            self.pending.resize(len, 0.0);
+        }
     }
 
     /// Gives an element a constant radiosity to begin with.
@@ -250,7 +267,8 @@ impl Radiosity {
     /// (Gauss-Seidel), and in parallel within. Sweeps over everything go on until no radiosity
     /// changes by more than the residual. Sweeps over a part follow only larger changes: a radiosity
     /// that would change by less stays as it is, so that whoever gathered it has gathered its present
-    /// value, and nothing drifts however often this is called.
+    /// value; and a receiver gathers anew once the changes of its sources may have added up to half
+    /// the residual since it last did. So nothing drifts, however often this is called.
     pub fn solve(&mut self, surfaces: &impl Surfaces, links: &Links, dirty: Dirty, stop: Stop) {
         let mut work = Work::new(surfaces, dirty);
         let mut jump = Jump::default();
@@ -259,7 +277,7 @@ impl Radiosity {
             let mean = self.mean(surfaces);
             let limit = match stop {
                 Stop::Sweeps(_) => 0.0,
-                Stop::Residual(limit) => (limit * mean) as f32,
+                Stop::Residual { all, part } => ((if work.all { all } else { part }) * mean) as f32,
             };
             if work.all {
                 jump.before(&self.radiosity);
@@ -268,17 +286,18 @@ impl Radiosity {
             if work.all {
                 self.passed_over = small;
             }
-            let left = self.passed_over + if work.all { 0.0 } else { small };
+            let left =
+                self.passed_over + if work.all { 0.0 } else { small + limit * PENDING_SHARE };
             self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
             self.sweeps += 1;
             let done = match stop {
                 Stop::Sweeps(count) => self.sweeps >= count,
-                Stop::Residual(_) => !work.is_left(surfaces, links),
+                Stop::Residual { .. } => !work.is_left(surfaces, links, limit, &mut self.pending),
             };
             if done || self.sweeps >= SWEEPS_MAX {
                 return;
             }
-            if work.all && matches!(stop, Stop::Residual(_)) {
+            if work.all && matches!(stop, Stop::Residual { .. }) {
                 jump.after(&mut self.radiosity);
             }
         }
@@ -298,21 +317,25 @@ impl Radiosity {
         for batch in 0..work.batches.len() {
             let mut now = work.take(surfaces, batch);
             self.gather(surfaces, links, &now.receivers, &mut scratch.gathered);
-            self.settle(surfaces, &now.facets, (limit, work.all), &mut scratch.settled);
+            let way = if work.all { None } else { Some(&*work.way.mark(surfaces, &now)) };
+            self.settle(surfaces, &now.facets, (limit, way), &mut scratch.settled);
             for settled in &scratch.settled[..now.facets.len()] {
                 small = small.max(settled.small);
-                for (id, value, large) in &settled.changed {
+                for (id, value, difference) in &settled.changed {
                     self.radiosity.set(*id, value);
-                    if *large {
-                        work.changed.push(*id);
+                    if *difference > limit {
+                        work.changed.push((*id, *difference));
                     }
                     if !work.all {
-                        work.mark_neighbours(surfaces, links, *id);
+                        let change = (*id, *difference);
+                        work.mark_neighbours((surfaces, links), change, limit, &mut self.pending);
                     }
                 }
             }
             if work.all {
                 std::mem::swap(&mut work.batches[batch], &mut now);
+            } else {
+                work.way.clear(surfaces, &now);
             }
         }
         work.scratch = scratch;
@@ -339,6 +362,7 @@ impl Radiosity {
         found: &mut Vec<Linear>,
     ) {
         self.gathers += receivers.len() as u64;
+        receivers.iter().for_each(|&id| self.pending[id as usize] = 0.0);
         let Radiosity { radiosity, gathered, .. } = self;
         let one = |id: u32| match links.of(id) {
             [] => Linear::default(),
@@ -363,7 +387,7 @@ impl Radiosity {
         &self,
         surfaces: &impl Surfaces,
         facets: &[u32],
-        (limit, all): (f32, bool),
+        (limit, way): (f32, Option<&Way>),
         settled: &mut Vec<Settled>,
     ) {
         settled.resize_with(settled.len().max(facets.len()), Settled::default);
@@ -372,8 +396,8 @@ impl Radiosity {
             out.small = 0.0;
             let lit = surfaces.lit(facet);
             let place = surfaces.place(facet);
-            let below = Below { solution: self, surfaces, lit, limit, all };
-            below.settle(facet, &place, &Linear::default(), out);
+            let below = Below { solution: self, surfaces, lit, limit, way };
+            below.settle(facet, &place, &Linear::default(), way.is_none(), out);
         };
         if facets.len() == 1 {
             facet((&facets[0], &mut settled[0]));
@@ -408,7 +432,8 @@ impl Radiosity {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> u64 {
-        self.radiosity.bytes() + self.gathered.bytes()
+        let pending = (self.pending.capacity() * size_of::<f32>()) as u64;
+        self.radiosity.bytes() + self.gathered.bytes() + pending
     }
 }
 
@@ -519,8 +544,9 @@ struct Work {
     marks: Vec<u64>,
     /// Every sweep gathers everything.
     all: bool,
-    /// Elements that the last sweep changed.
-    changed: Vec<u32>,
+    /// Elements that the last sweep changed by more than the limit, and by how much.
+    changed: Vec<(u32, f32)>,
+    way: Way,
     scratch: Scratch,
 }
 
@@ -535,10 +561,10 @@ struct Scratch {
 #[derive(Default)]
 struct Batch {
     facets: Vec<u32>,
-    /// Receivers to be gathered; the facets they are in are settled.
+    /// Receivers to be gathered, and settled with all that is below them.
     receivers: Vec<u32>,
-    /// Further facets to be settled.
-    dirty: Vec<u32>,
+    /// Further elements to be settled with all that is below them.
+    parents: Vec<u32>,
 }
 
 /// Batches there are at most.
@@ -562,12 +588,14 @@ impl Work {
             marks,
             all: false,
             changed: Vec::new(),
+            way: Way::new(surfaces.len()),
             scratch: Scratch::default(),
         };
         match dirty {
-            Dirty::Some { receivers, facets } if receivers.len() <= surfaces.len() / MANY => {
-                for facet in facets {
-                    work.batches[usize::from(work.batch_of[facet as usize])].dirty.push(facet);
+            Dirty::Some { receivers, parents } if receivers.len() <= surfaces.len() / MANY => {
+                for parent in parents {
+                    let batch = work.batch_of(surfaces, parent);
+                    work.batches[batch].parents.push(parent);
                 }
                 receivers.into_iter().for_each(|id| work.mark(surfaces, id));
             }
@@ -587,22 +615,36 @@ impl Work {
         }
     }
 
+    fn batch_of(&self, surfaces: &impl Surfaces, id: u32) -> usize {
+        usize::from(self.batch_of[surfaces.facet_of(id) as usize])
+    }
+
     fn mark(&mut self, surfaces: &impl Surfaces, id: u32) {
-        let bit = 1 << (id % 64);
-        let word = &mut self.marks[id as usize / 64];
-        if *word & bit == 0 {
-            *word |= bit;
-            let batch = self.batch_of[surfaces.facet_of(id) as usize];
-            self.batches[usize::from(batch)].receivers.push(id);
+        if !set_bit(&mut self.marks, id) {
+            let batch = self.batch_of(surfaces, id);
+            self.batches[batch].receivers.push(id);
         }
     }
 
-    /// Whoever an element gathers from gathers from it.
-    fn mark_neighbours(&mut self, surfaces: &impl Surfaces, links: &Links, id: u32) {
+    /// Marks who gathers from an element that changed, as soon as the changes add up to something.
+    fn mark_neighbours(
+        &mut self,
+        (surfaces, links): (&impl Surfaces, &Links),
+        (id, change): (u32, f32),
+        limit: f32,
+        pending: &mut [f32],
+    ) {
+        let flux = change * surfaces.area_m2(id) as f32;
+        // Whoever an element gathers from gathers from it.
         for link in links.of(id) {
-            // Sources that are no surfaces receive nothing: they have no links of their own.
-            if !links.of(link.source).is_empty() {
-                self.mark(surfaces, link.source);
+            // Sources that are no surfaces receive nothing.
+            let area = surfaces.area_m2(link.source) as f32;
+            if area > 0.0 {
+                let pending = &mut pending[link.source as usize];
+                *pending += flux * link.coupling / area;
+                if *pending > limit * PENDING_SHARE {
+                    self.mark(surfaces, link.source);
+                }
             }
         }
     }
@@ -615,42 +657,95 @@ impl Work {
         let batch = &mut self.batches[batch];
         let mut receivers = std::mem::take(&mut batch.receivers);
         receivers.sort_unstable();
-        let mut facets = std::mem::take(&mut batch.dirty);
-        for &id in &receivers {
-            self.marks[id as usize / 64] &= !(1 << (id % 64));
-            facets.push(surfaces.facet_of(id));
-        }
+        receivers.iter().for_each(|&id| clear_bit(&mut self.marks, id));
+        let parents = std::mem::take(&mut batch.parents);
+        let concerned = receivers.iter().chain(&parents);
+        let mut facets: Vec<u32> = concerned.map(|&id| surfaces.facet_of(id)).collect();
         facets.sort_unstable();
         facets.dedup();
-        Batch { receivers, facets, dirty: Vec::new() }
+        Batch { receivers, facets, parents }
     }
 
     /// Whether another sweep is needed.
-    fn is_left(&mut self, surfaces: &impl Surfaces, links: &Links) -> bool {
-        if !self.all {
-            if self.changed.len() > surfaces.len() / MANY {
-                self.start_all(surfaces);
-            }
-            return self.all || self.batches.iter().any(|b| !b.receivers.is_empty());
-        }
-        if self.changed.len() <= surfaces.len() / FEW {
+    fn is_left(
+        &mut self,
+        surfaces: &impl Surfaces,
+        links: &Links,
+        limit: f32,
+        pending: &mut [f32],
+    ) -> bool {
+        let many = self.changed.len() > surfaces.len() / if self.all { FEW } else { MANY };
+        if self.all && !many {
             // From now on only what depends on a change.
             self.all = false;
             self.batches.iter_mut().for_each(|b| b.receivers.clear());
-            for id in std::mem::take(&mut self.changed) {
-                self.mark_neighbours(surfaces, links, id);
+            for change in std::mem::take(&mut self.changed) {
+                self.mark_neighbours((surfaces, links), change, limit, pending);
             }
-            return self.is_left(surfaces, links);
+        } else if many && !self.all {
+            self.start_all(surfaces);
         }
-        true
+        self.all || self.batches.iter().any(|b| !b.receivers.is_empty())
+    }
+}
+
+/// Sets a bit; whether it was set already.
+fn set_bit(bits: &mut [u64], id: u32) -> bool {
+    let (word, bit) = (&mut bits[id as usize / 64], 1 << (id % 64));
+    let before = *word & bit != 0;
+    *word |= bit;
+    before
+}
+
+fn clear_bit(bits: &mut [u64], id: u32) {
+    bits[id as usize / 64] &= !(1 << (id % 64));
+}
+
+fn bit(bits: &[u64], id: u32) -> bool {
+    bits[id as usize / 64] >> (id % 64) & 1 == 1
+}
+
+/// The ways from facets to the elements that a batch concerns: nothing beside them is looked at.
+struct Way {
+    /// Elements on a way.
+    on: Vec<u64>,
+    /// Ends of the ways: everything below them is concerned.
+    ends: Vec<u64>,
+}
+
+impl Way {
+    fn new(len: usize) -> Way {
+        Way { on: vec![0; len / 64 + 1], ends: vec![0; len / 64 + 1] }
+    }
+
+    fn mark(&mut self, surfaces: &impl Surfaces, batch: &Batch) -> &Way {
+        for &id in batch.receivers.iter().chain(&batch.parents) {
+            set_bit(&mut self.ends, id);
+            let mut at = Some(id);
+            while let Some(id) = at.filter(|&id| !set_bit(&mut self.on, id)) {
+                at = surfaces.parent(id);
+            }
+        }
+        self
+    }
+
+    fn clear(&mut self, surfaces: &impl Surfaces, batch: &Batch) {
+        for &id in batch.receivers.iter().chain(&batch.parents) {
+            clear_bit(&mut self.ends, id);
+            let mut at = Some(id);
+            while let Some(id) = at.filter(|&id| bit(&self.on, id)) {
+                clear_bit(&mut self.on, id);
+                at = surfaces.parent(id);
+            }
+        }
     }
 }
 
 /// What pushing and pulling through one facet found.
 #[derive(Default)]
 struct Settled {
-    /// Elements with their new radiosities, and whether those differ by more than the limit.
-    changed: Vec<(u32, Linear, bool)>,
+    /// Elements with their new radiosities, and by how much those differ.
+    changed: Vec<(u32, Linear, f32)>,
     /// Largest difference within the limit.
     small: f32,
 }
@@ -661,13 +756,25 @@ struct Below<'a, S> {
     surfaces: &'a S,
     lit: &'a Lit,
     limit: f32,
-    /// Whether small differences are made too.
-    all: bool,
+    /// The ways to what is concerned; `None` where everything is, small differences too.
+    way: Option<&'a Way>,
 }
 
 impl<S: Surfaces> Below<'_, S> {
     /// Pushes irradiance down and pulls radiosity up; returns the new radiosity of `id`.
-    fn settle(&self, id: u32, place: &Place, inherited: &Linear, out: &mut Settled) -> Linear {
+    /// `concerned` says that something above has changed.
+    fn settle(
+        &self,
+        id: u32,
+        place: &Place,
+        inherited: &Linear,
+        concerned: bool,
+        out: &mut Settled,
+    ) -> Linear {
+        let concerned = concerned || self.way.is_some_and(|way| bit(&way.ends, id));
+        if !concerned && self.way.is_some_and(|way| !bit(&way.on, id)) {
+            return self.solution.radiosity.get(id);
+        }
         let h = self.solution.gathered.get(id).plus(inherited);
         let children = self.surfaces.children(id);
         let b = if children.is_empty() {
@@ -676,17 +783,16 @@ impl<S: Surfaces> Below<'_, S> {
             let mut fit = Fit::default();
             for child in children {
                 let at = self.surfaces.place(child);
-                let b = self.settle(child, &at, &h.about(place, &at), out);
+                let b = self.settle(child, &at, &h.about(place, &at), concerned, out);
                 fit.add(self.surfaces.area_m2(child), place, &at, &b);
             }
             fit.linear(place.radius)
         };
         let difference = b.difference(&self.solution.radiosity.get(id));
-        let large = difference > self.limit;
-        if large || self.all {
-            out.changed.push((id, b, large));
+        if difference > self.limit || self.way.is_none() {
+            out.changed.push((id, b, difference));
         }
-        if !large {
+        if difference <= self.limit {
             out.small = out.small.max(difference);
         }
         b
@@ -789,6 +895,9 @@ mod tests {
         fn facet_of(&self, id: u32) -> u32 {
             id.min(1)
         }
+        fn parent(&self, id: u32) -> Option<u32> {
+            (id >= 2).then_some(1)
+        }
         fn children(&self, id: u32) -> Range<u32> {
             if id == 1 { 2..4 } else { 0..0 }
         }
@@ -804,6 +913,8 @@ mod tests {
         }
     }
 
+    const STOP: Stop = Stop::Residual { all: 1e-7, part: 1e-7 };
+
     fn plates() -> (Plates, Links) {
         let lit = Lit { reflectance: [0.5, 0.8, 0.0], exitance: [1.0, 2.0, 3.0] };
         let mut links = Links::default();
@@ -818,7 +929,7 @@ mod tests {
     fn a_furnace_reaches_m_over_one_minus_rho_through_every_level() {
         let (plates, links) = plates();
         let mut b = Radiosity::new(&plates);
-        b.solve(&plates, &links, Dirty::All, Stop::Residual(1e-7));
+        b.solve(&plates, &links, Dirty::All, STOP);
         for id in 0..4 {
             for (value, want) in b.radiosity(id).iter().zip([2.0, 10.0, 3.0]) {
                 assert!((value - want).abs() < 1e-4, "{id} {value} {want}");
@@ -830,20 +941,20 @@ mod tests {
     fn a_link_that_changes_is_followed_through_the_scene() {
         let (plates, mut links) = plates();
         let mut warm = Radiosity::new(&plates);
-        warm.solve(&plates, &links, Dirty::All, Stop::Residual(1e-7));
+        warm.solve(&plates, &links, Dirty::All, STOP);
         links.set(2, Link { source: 0, coupling: 0.25, ..Link::default() });
-        let dirty = Dirty::Some { receivers: vec![2], facets: vec![] };
-        warm.solve(&plates, &links, dirty, Stop::Residual(1e-7));
+        let dirty = Dirty::Some { receivers: vec![2], parents: vec![] };
+        warm.solve(&plates, &links, dirty, STOP);
         let mut cold = Radiosity::new(&plates);
-        cold.solve(&plates, &links, Dirty::All, Stop::Residual(1e-7));
+        cold.solve(&plates, &links, Dirty::All, STOP);
         for id in 0..4 {
             for (one, two) in warm.radiosity(id).iter().zip(cold.radiosity(id)) {
                 assert!((one - two).abs() < 1e-4, "{id} {one} {two}");
             }
         }
         // And nothing is done where nothing changed.
-        let dirty = Dirty::Some { receivers: vec![], facets: vec![] };
-        warm.solve(&plates, &links, dirty, Stop::Residual(1e-7));
+        let dirty = Dirty::Some { receivers: vec![], parents: vec![] };
+        warm.solve(&plates, &links, dirty, STOP);
         assert_eq!((warm.sweeps, warm.gathers), (1, 0));
     }
 }

@@ -156,10 +156,16 @@ impl Placed<'_> {
             let side = if lit(a) { Side::B } else { Side::A };
             return passing(Verdict::Refine(side), 0);
         }
-        if self.box_is_behind(a, box_b) || self.box_is_behind(b, box_a) {
+        let body = self.body_of(a).filter(|&body| self.body_of(b) == Some(body));
+        // What is decided on two parts of one body must not depend on where the body is.
+        let (box_a, box_b) = match body {
+            Some(_) => (self.view.box_in_body(a), self.view.box_in_body(b)),
+            None => (box_a, box_b),
+        };
+        let one_body = body.is_some();
+        if self.box_is_behind(a, box_b, one_body) || self.box_is_behind(b, box_a, one_body) {
             return culled(CullReason::FacingAway);
         }
-        let body = self.body_of(a).filter(|&body| self.body_of(b) == Some(body));
         BoxShaft::new(self.view, self.forest, (a, b), body).narrow(candidates, narrowed);
         let size = |id: ElementId, bounds: &Aabb| match self.forest.kind(id) {
             Kind::Element => -1.0,
@@ -169,12 +175,14 @@ impl Placed<'_> {
         passing(Verdict::Refine(side), 0)
     }
 
-    /// Whether a box is wholly behind the plane of a polygon or element.
-    fn box_is_behind(&self, id: ElementId, bounds: &Aabb) -> bool {
+    /// Whether a box is wholly behind the plane of a polygon or element; the box is in the body's
+    /// frame if `in_body`.
+    fn box_is_behind(&self, id: ElementId, bounds: &Aabb, in_body: bool) -> bool {
         let Some(patch) = self.forest.patch(id) else { return false };
         let patch = self.view.patch(patch);
-        let n = patch.world.normal;
-        let plane = Plane::through(patch.world.origin, n);
+        let frame = if in_body { &patch.local } else { &patch.world };
+        let n = frame.normal;
+        let plane = Plane::through(frame.origin, n);
         let far = DVec3::select(n.cmpge(DVec3::ZERO), bounds.hi, bounds.lo);
         plane.distance(far) <= patch.rounding_m
     }

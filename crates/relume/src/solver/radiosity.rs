@@ -89,6 +89,8 @@ pub struct Radiosity {
     radiosity: Vec<Linear>,
     /// What an element's own links bring, without those of its ancestors. Gradients are per metre.
     gathered: Vec<Linear>,
+    /// Largest change that was not made of each facet when it was last settled, W/m2; by id.
+    kept: Vec<f32>,
     /// Sweeps made by the last solve.
     pub sweeps: u32,
     /// Receivers gathered by the last solve, each time counted.
@@ -189,6 +191,8 @@ impl Radiosity {
     /// gathered it has gathered its present value: nothing drifts, however often this is called.
     pub fn solve(&mut self, surfaces: &impl Surfaces, links: &Links, dirty: Dirty, stop: Stop) {
         let mut work = Work::new(surfaces, dirty);
+        let facets = surfaces.facets().iter().map(|f| f.0 as usize + 1).max().unwrap_or(0);
+        self.kept.resize(facets, 0.0);
         (self.sweeps, self.gathers, self.residual) = (0, 0, 0.0);
         loop {
             let mean = self.mean(surfaces);
@@ -196,9 +200,17 @@ impl Radiosity {
                 Stop::Sweeps(_) => 0.0,
                 Stop::Residual(limit) => (limit * mean) as f32,
             };
+            // What was little beside a brighter scene may be too much beside this one.
+            work.settle_too(surfaces.facets().iter().map(|f| f.0).filter(|&f| {
+                self.kept[f as usize] > keep
+            }));
             self.gather(surfaces, links, &work);
             let settled = self.settle(surfaces, &work, keep);
-            let largest = settled.iter().map(|s| s.kept).fold(0.0, f32::max);
+            for (&facet, s) in work.facets.iter().zip(&settled) {
+                self.kept[facet as usize] = s.kept;
+            }
+            // Of all facets, not only of those at work: the bound is one for the whole solution.
+            let largest = self.kept.iter().copied().fold(0.0, f32::max);
             self.residual = if mean > 0.0 { f64::from(largest) / mean } else { 0.0 };
             self.sweeps += 1;
             let done = match stop {
@@ -292,7 +304,8 @@ impl Radiosity {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> u64 {
-        ((self.radiosity.capacity() + self.gathered.capacity()) * size_of::<Linear>()) as u64
+        ((self.radiosity.capacity() + self.gathered.capacity()) * size_of::<Linear>()
+            + self.kept.capacity() * size_of::<f32>()) as u64
     }
 }
 
@@ -375,6 +388,19 @@ impl Work {
     fn all(&mut self, surfaces: &impl Surfaces) {
         self.receivers = None;
         self.facets = surfaces.facets().iter().map(|f| f.0).collect();
+    }
+
+    /// Adds facets to be settled, though nothing new arrives there.
+    fn settle_too(&mut self, facets: impl Iterator<Item = u32>) {
+        if self.receivers.is_none() {
+            return;
+        }
+        let before = self.facets.len();
+        self.facets.extend(facets);
+        if self.facets.len() > before {
+            self.facets.sort_unstable();
+            self.facets.dedup();
+        }
     }
 
     fn some(&mut self, surfaces: &impl Surfaces, receivers: Vec<u32>, mut facets: Vec<u32>) {

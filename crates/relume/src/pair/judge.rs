@@ -364,9 +364,9 @@ impl Placed<'_> {
         let Some(lamp) = self.view.light(index).filter(|_| present) else {
             return culled(CullReason::Absent);
         };
-        if let Stage::Coarse = self.stage
-            && self.forest.coarse(element).is_none()
-        {
+        // Before anything is sampled: both stages must agree down to the coarse level, and a narrow
+        // cone may fall between the sample points of a large element.
+        if matches!(self.oracle, Oracle::Error { .. }) && self.forest.coarse(element).is_none() {
             narrowed.extend_from_slice(candidates);
             return passing(Verdict::Refine(side), 0);
         }
@@ -381,9 +381,6 @@ impl Placed<'_> {
         shaft.narrow(candidates, narrowed);
         let blockers = shaft.blockers(&narrowed[start..]);
         let key = pair_key(self.forest.key(element), self.forest.key(light));
-        if matches!(self.oracle, Oracle::Error { .. }) && self.forest.coarse(element).is_none() {
-            return passing(Verdict::Refine(side), 0);
-        }
         let segments = place.segments(lamp, &e, key);
         let v = light_visibility(self.simd, &shaft, &blockers, &segments);
         let verdict = match (self.stage, self.oracle) {

@@ -167,6 +167,8 @@ pub struct Changes {
     pub held: Vec<Held>,
     /// Pairs that were held once and may be so no more; both ends may have vanished since.
     pub dropped: Vec<(ElementId, ElementId)>,
+    /// Pairs that were held and have not been judged otherwise: the next update is to look at them.
+    pub unjudged: Vec<PairId>,
 }
 
 /// The memory that an update may use is spent.
@@ -181,7 +183,8 @@ const BLOCK: usize = 1 << 15;
 
 /// Brings `tree`, with the hash over its links, up to date.
 ///
-/// Edits are recorded if `record` says so. `may_go_on` is asked after each block with the tree, the
+/// The walk from the root leaves out what nothing concerns; pairs of `unjudged` that it does not come
+/// by are looked at after it. Edits are recorded if `record` says so. `may_go_on` is asked after each block with the tree, the
 /// number of elements and the scratch memory in bytes.
 ///
 /// # Errors
@@ -190,6 +193,7 @@ pub fn update<J: Judge>(
     (tree, hash): (&mut PairTree, &mut PairHash),
     judge: &mut J,
     root_candidates: &[u32],
+    unjudged: &[PairId],
     record: bool,
     may_go_on: &dyn Fn(&PairTree, usize, u64) -> bool,
 ) -> Result<Changes, OutOfMemory> {
@@ -197,14 +201,23 @@ pub fn update<J: Judge>(
         Editor { tree, hash, judge, record, changes: Changes::default(), next: Wave::default() };
     let list = editor.next.push_candidates(root_candidates);
     editor.next.items.push(Item { pair: PairTree::ROOT, list });
-    while !editor.next.items.is_empty() {
+    let mut unjudged = Some(unjudged);
+    loop {
+        if editor.next.items.is_empty() {
+            let Some(pairs) = unjudged.take() else { break };
+            let list = editor.next.push_candidates(root_candidates);
+            let new = pairs.iter().filter(|&&pair| editor.tree.state(pair) == State::New);
+            editor.next.items.extend(new.map(|&pair| Item { pair, list }));
+            continue;
+        }
         let wave = std::mem::take(&mut editor.next);
         for block in wave.items.chunks(BLOCK) {
             let judged = judge_block(editor.tree, editor.judge, block, &wave.candidates);
             for chunk in &judged {
                 editor.apply_chunk(chunk, &wave);
             }
-            let held = editor.changes.held.capacity() * size_of::<Held>();
+            let held = editor.changes.held.capacity() * size_of::<Held>()
+                + editor.changes.unjudged.capacity() * size_of::<PairId>();
             let scratch = wave.memory_bytes() + editor.next.memory_bytes() + held as u64;
             if !may_go_on(editor.tree, editor.judge.element_count(), scratch) {
                 return Err(OutOfMemory);
@@ -355,6 +368,9 @@ impl<J: Judge> Editor<'_, J> {
         let (a, b) = self.tree.ends(pair);
         let wanted = match found.verdict {
             Verdict::Hold => {
+                if before == State::New {
+                    self.changes.unjudged.push(pair);
+                }
                 self.changes.held.push(Held { a, b, carried: found.carried });
                 return 0..0;
             }

@@ -3,7 +3,7 @@
 //! Without a state to start from, the same edits build it: a cold build is the update of nothing.
 
 use crate::element::{ElementId, Forest, Kind, WorldView};
-use crate::pair::{Changes, OutOfMemory, PairHash, PairTree, Placed, Since, Stage, update};
+use crate::pair::{Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Since, Stage, update};
 use crate::scene::BodyId;
 use crate::solver::{Dirty, Links, Radiosity, Stop, Surfaces};
 
@@ -42,24 +42,27 @@ impl Session {
         report.seconds.moving = clock.lap();
 
         let mut changes = Changes::default();
-        let bring = |solved: &mut Solved, since: Option<&Since<'_>>, level| {
-            let found = self.update(solved, since, level, !cold);
+        let bring = |solved: &mut Solved, since: Option<&Since<'_>>, level, unjudged: &[PairId]| {
+            let found = self.update(solved, since, (level, unjudged), !cold);
             found.map_err(|OutOfMemory| self.too_large(solved, frame))
         };
         if !self.coarse_ids.is_empty() {
-            changes = bring(&mut solved, since.as_ref(), Level::Coarse)?;
+            changes = bring(&mut solved, since.as_ref(), Level::Coarse, &[])?;
             self.follow_coarse(&mut solved, &changes, since.as_mut());
         }
-        let fine = bring(&mut solved, since.as_ref(), Level::Fine)?;
+        let fine = bring(&mut solved, since.as_ref(), Level::Fine, &changes.unjudged)?;
         changes.work += fine.work;
         changes.edits.extend(fine.edits);
         let work = changes.work;
         report.seconds.evaluate = clock.lap();
 
-        let dirty = self.edit_links(&mut solved, &changes, cold, &mut report);
+        let mut dirty = self.edit_links(&mut solved, &changes, cold, &mut report);
+        if let Dirty::Some { facets, .. } = &mut dirty {
+            facets.extend(self.came_or_went(&solved, &old));
+        }
         report.seconds.judge = clock.lap();
 
-        let lit = LitForest::new(&self.scene, &solved.forest);
+        let lit = LitForest::new(&self.scene, &solved.forest).present_in(&solved.view);
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
         let stop = Stop::Residual(self.options.tolerance * RESIDUAL_SHARE);
         solved.radiosity.solve(&lit, &solved.links, dirty, stop);
@@ -95,7 +98,7 @@ impl Session {
         &self,
         solved: &mut Solved,
         since: Option<&Since<'_>>,
-        level: Level,
+        (level, unjudged): (Level, &[PairId]),
         record: bool,
     ) -> Result<Changes, OutOfMemory> {
         let limit = self.options.max_memory_bytes.unwrap_or(u64::MAX);
@@ -117,7 +120,7 @@ impl Session {
             since,
         };
         let tree = (&mut solved.tree, &mut solved.hash);
-        update(tree, &mut placed, &[Forest::ROOT.0], record, &may_go_on)
+        update(tree, &mut placed, &[Forest::ROOT.0], unjudged, record, &may_go_on)
     }
 
     /// Solves over the coarse pairs anew where any changed, and says which elements' brightness did.
@@ -154,7 +157,7 @@ impl Session {
             Some(receivers)
         };
         let split = solved.forest.take_changed();
-        let lit = LitForest::new(&self.scene, &solved.forest);
+        let lit = LitForest::new(&self.scene, &solved.forest).present_in(&solved.view);
         if cold {
             solved.radiosity = self.first_guess(solved, &lit);
             return Dirty::All;
@@ -173,6 +176,17 @@ impl Session {
                 facets,
             },
         }
+    }
+
+    /// Facets of bodies that appeared or vanished since `old`: what they emit did too.
+    fn came_or_went(&self, solved: &Solved, old: &WorldView) -> Vec<u32> {
+        let forest = &solved.forest;
+        let toggled = |facet: &&ElementId| {
+            let patch = forest.patch(**facet).expect("a facet has a patch");
+            let body = solved.view.patch(patch).body;
+            solved.view.is_present(body) != old.is_present(body)
+        };
+        forest.facets().iter().filter(toggled).map(|f| f.0).collect()
     }
 
     /// The coarse solution, where there is one; else exitances.

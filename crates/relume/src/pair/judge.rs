@@ -167,12 +167,18 @@ impl Placed<'_> {
             return culled(CullReason::FacingAway);
         }
         BoxShaft::new(self.view, self.forest, (a, b), body).narrow(candidates, narrowed);
-        let size = |id: ElementId, bounds: &Aabb| match self.forest.kind(id) {
-            Kind::Element => -1.0,
-            _ => bounds.diagonal(),
-        };
-        let side = if size(a, box_a) >= size(b, box_b) { Side::A } else { Side::B };
+        let side = if self.girth(a) >= self.girth(b) { Side::A } else { Side::B };
         passing(Verdict::Refine(side), 0)
+    }
+
+    /// What decides which of two groups is opened first, the same wherever bodies are: a size that
+    /// followed them would swap sides as they move, and all pairs below would be made anew.
+    fn girth(&self, id: ElementId) -> f64 {
+        match self.forest.kind(id) {
+            Kind::Element => -1.0,
+            _ if self.body_of(id).is_none() => f64::INFINITY,
+            _ => self.view.box_in_body(id).diagonal(),
+        }
     }
 
     /// Whether a box is wholly behind the plane of a polygon or element; the box is in the body's

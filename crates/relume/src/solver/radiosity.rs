@@ -201,9 +201,9 @@ impl Radiosity {
                 Stop::Residual(limit) => (limit * mean) as f32,
             };
             // What was little beside a brighter scene may be too much beside this one.
-            work.settle_too(surfaces.facets().iter().map(|f| f.0).filter(|&f| {
-                self.kept[f as usize] > keep
-            }));
+            work.settle_too(
+                surfaces.facets().iter().map(|f| f.0).filter(|&f| self.kept[f as usize] > keep),
+            );
             self.gather(surfaces, links, &work);
             let settled = self.settle(surfaces, &work, keep);
             for (&facet, s) in work.facets.iter().zip(&settled) {

@@ -6,9 +6,9 @@ use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use common::pairs::{first_differences, pairs_of};
-use common::{at_tolerance, facing_up, flipped, form_factor_oracle, sliding, still, turn, v};
+use common::{at_tolerance, facing_up, flipped, form_factor_oracle, still, turn, v};
 use glam::{DQuat, DVec3};
-use relume::scene::{LightKind, SceneBuilder};
+use relume::scene::{Interpolation, LightKind, NodeId, RotationTrack, SceneBuilder, Track};
 use relume::session::{Options, Session};
 
 /// A session that has been at all these times, and one that has been at the last only.
@@ -111,25 +111,42 @@ fn r4_pairs_made_anew_where_nothing_moves_are_judged() {
     // A group that holds a mover grew past the rest: the sides of its pairs were swapped, and pairs
     // below that are all at rest were made by the coarse walk and never met by the fine one.
     let mut b = SceneBuilder::new("swapped sides");
-    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
-    let lamp = b.material("lamp", [0.1; 3], [9.0; 3]);
-    for (k, x) in [0.0, 3.0, 6.0].into_iter().enumerate() {
-        let node = still(&mut b, &format!("room {k}"));
-        let size = 1.0 + 0.3 * k as f64;
-        b.cuboid_inward(node, "walls", grey, v(x, 0.0, 0.0), v(x + size, size, size));
-    }
-    for (k, to) in [v(0.2, 0.2, 0.2), v(9.0, 4.0, 3.0)].into_iter().enumerate() {
-        let node = sliding(&mut b, &format!("lamp {k}"), v(0.5, 0.5, 0.8), to);
-        b.polygon(node, "lamp", lamp, &flipped(facing_up([-0.2, 0.2], [-0.2, 0.2], 0.0)));
-    }
-    let scene = Arc::new(b.build().unwrap());
-    let mut warm = Session::new(Arc::clone(&scene), at_tolerance(0.3)).unwrap();
-    for time_s in [0.0, 0.3, 1.0, 0.5, 0.0] {
-        warm.step(0, time_s).unwrap();
-        let mut cold = Session::new(Arc::clone(&scene), at_tolerance(0.3)).unwrap();
-        cold.step(0, time_s).unwrap();
-        same_pairs([&warm, &cold]);
-    }
+    let grey = b.material("grey", [0.5, 0.6, 0.3], [0.0; 3]);
+    let both = b.double_sided_material("both", [0.3, 0.2, 0.7], [0.0; 3]);
+    let lamp = b.material("lamp", [0.1; 3], [9.0, 6.0, 3.0]);
+    let place = still(&mut b, "place");
+    b.cuboid_inward(place, "walls", grey, DVec3::splat(-1.0), DVec3::ONE);
+    b.cuboid_inward(place, "other", grey, v(3.0, -1.0, -1.0), v(4.0, 0.0, 1.0));
+    b.polygon(place, "other lamp", lamp, &flipped(facing_up([3.4, 3.6], [-0.6, -0.4], 0.9)));
+    let node = b.node("lamp", None, DVec3::ZERO, DQuat::IDENTITY);
+    slide(
+        &mut b,
+        node,
+        [v(0.54, -0.375, 0.346), v(-0.334, 0.602, -0.281), v(-0.334, 0.602, -0.281)],
+    );
+    let values = [[-0.619, 0.077, -0.776, -0.097], [-0.539, -0.711, -0.393, 0.208]];
+    let [one, two] = values.map(|q| DQuat::from_array(q).normalize());
+    let times_s = vec![0.0, 4.0, 5.0];
+    let interpolation = Interpolation::Linear;
+    let track = RotationTrack { times_s, values: vec![one, two, two], interpolation };
+    b.animate_rotation(node, track);
+    b.polygon(node, "lamp", lamp, &flipped(facing_up([-0.25, 0.25], [-0.25, 0.25], 0.0)));
+    let tilt = DQuat::from_xyzw(0.217, -0.352, 0.91, -0.013).normalize();
+    let node = b.node("sheet", None, DVec3::ZERO, tilt);
+    slide(
+        &mut b,
+        node,
+        [v(0.175, 0.697, 0.248), v(-0.634, 0.278, 0.572), v(0.236, -0.634, -0.553)],
+    );
+    b.polygon(node, "sheet", both, &facing_up([-0.125, 0.125], [-0.0625, 0.0625], 0.0));
+    let [warm, cold] = warm_and_cold(b, &at_tolerance(0.1), &[4.279, 4.0]);
+    same_pairs([&warm, &cold]);
+}
+
+/// Slides a node through three places, at 0 s, 4 s and 5 s.
+fn slide(b: &mut SceneBuilder, node: NodeId, values: [DVec3; 3]) {
+    let (times_s, values) = (vec![0.0, 4.0, 5.0], values.to_vec());
+    b.animate_translation(node, Track { times_s, values, interpolation: Interpolation::Linear });
 }
 
 #[test]
@@ -150,7 +167,11 @@ fn r5_a_narrow_cone_is_not_lost_between_sample_points() {
     );
     // Shines along -x at the middle of the wall.
     let node = b.node("spot", None, v(0.0, 0.0, 1.0), DQuat::from_rotation_y(FRAC_PI_2));
-    b.light("spot", node, LightKind::Spot { inner: 0.05, outer: 0.1 }, [1.0; 3]);
-    let [warm, cold] = warm_and_cold(b, &at_tolerance(0.1), &[0.0, 1.0]);
+    b.light("spot", node, LightKind::Spot { inner: 0.25, outer: 0.3 }, [1.0; 3]);
+    let [mut warm, cold] = warm_and_cold(b, &at_tolerance(0.1), &[0.0, 1.0]);
     same_pairs([&warm, &cold]);
+    warm.step(0, 0.0).unwrap();
+    let lit = brightest(&warm, "wall");
+    // 1 W/m2 arrives in the middle, half of it is reflected.
+    assert!((lit - 0.5).abs() < 0.1, "the wall sends {lit} W/m2");
 }

@@ -5,9 +5,12 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{at_tolerance, form_factor_oracle, lit_room};
+use common::{at_tolerance, form_factor_oracle, lit_room, shipped};
 use relume::scene::Scene;
-use relume::session::{Options, Session, Update};
+use relume::session::{FrameReport, Options, Session, Update};
+
+/// Frames are checked at this rate.
+const FRAMES_PER_SECOND: f64 = 30.0;
 
 fn pair_of(scene: &Arc<Scene>, options: &Options) -> (Session, Session) {
     let scratch = Options { update: Update::Scratch, ..options.clone() };
@@ -50,6 +53,32 @@ fn there_and_back_again_equals_cold_builds() {
             assert_eq!(one.hash, two.hash, "{name} at {time}");
             assert_eq!(one.elements, two.elements, "{name} at {time}");
             assert_eq!(one.leaves, two.leaves, "{name} at {time}");
+        }
+    }
+}
+
+#[test]
+fn every_frame_of_the_shipped_scenes_equals_a_cold_build() {
+    for name in [
+        "box_room.glb",
+        "cornell_moving_box_and_lamp.glb",
+        "satellite_rotating_arrays.glb",
+        "room_box_static.glb",
+    ] {
+        let scene = Arc::new(shipped(name));
+        let frames = (scene.motion.duration_s * FRAMES_PER_SECOND).round() as u32;
+        for (oracle, options) in
+            [("error", at_tolerance(0.4)), ("form factor", form_factor_oracle(0.2, 0.05))]
+        {
+            let (mut warm, mut cold) = pair_of(&scene, &options);
+            for frame in 0..=frames {
+                let time_s = f64::from(frame) / FRAMES_PER_SECOND;
+                let one = warm.step(frame, time_s).unwrap();
+                let two = cold.step(frame, time_s).unwrap();
+                let state = |r: &FrameReport| (r.hash.clone(), r.links, r.elements, r.leaves);
+                assert_eq!(state(&one), state(&two), "{name}, {oracle}, frame {frame}");
+            }
+            println!("{name}, {oracle}: {} frames, hash equal at each", frames + 1);
         }
     }
 }

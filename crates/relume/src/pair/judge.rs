@@ -156,10 +156,16 @@ impl Placed<'_> {
             let side = if lit(a) { Side::B } else { Side::A };
             return passing(Verdict::Refine(side), 0);
         }
-        if self.box_is_behind(a, box_b) || self.box_is_behind(b, box_a) {
+        let body = self.body_of(a).filter(|&body| self.body_of(b) == Some(body));
+        // What is decided on two parts of one body must not depend on where the body is.
+        let (box_a, box_b) = match body {
+            Some(_) => (self.view.box_in_body(a), self.view.box_in_body(b)),
+            None => (box_a, box_b),
+        };
+        let one_body = body.is_some();
+        if self.box_is_behind(a, box_b, one_body) || self.box_is_behind(b, box_a, one_body) {
             return culled(CullReason::FacingAway);
         }
-        let body = self.body_of(a).filter(|&body| self.body_of(b) == Some(body));
         BoxShaft::new(self.view, self.forest, (a, b), body).narrow(candidates, narrowed);
         // By area, which no motion changes: the extent of a group follows each of its bodies, and all
         // pairs below would be made anew.
@@ -171,12 +177,14 @@ impl Placed<'_> {
         passing(Verdict::Refine(side), 0)
     }
 
-    /// Whether a box is wholly behind the plane of a polygon or element.
-    fn box_is_behind(&self, id: ElementId, bounds: &Aabb) -> bool {
+    /// Whether a box is wholly behind the plane of a polygon or element; the box is in the body's
+    /// frame if `in_body`.
+    fn box_is_behind(&self, id: ElementId, bounds: &Aabb, in_body: bool) -> bool {
         let Some(patch) = self.forest.patch(id) else { return false };
         let patch = self.view.patch(patch);
-        let n = patch.world.normal;
-        let plane = Plane::through(patch.world.origin, n);
+        let frame = if in_body { &patch.local } else { &patch.world };
+        let n = frame.normal;
+        let plane = Plane::through(frame.origin, n);
         let far = DVec3::select(n.cmpge(DVec3::ZERO), bounds.hi, bounds.lo);
         plane.distance(far) <= patch.rounding_m
     }
@@ -358,9 +366,9 @@ impl Placed<'_> {
         let Some(lamp) = self.view.light(index).filter(|_| present) else {
             return culled(CullReason::Absent);
         };
-        if let Stage::Coarse = self.stage
-            && self.forest.coarse(element).is_none()
-        {
+        // Before anything is sampled: both stages must agree down to the coarse level, and a narrow
+        // cone may fall between the sample points of a large element.
+        if matches!(self.oracle, Oracle::Error { .. }) && self.forest.coarse(element).is_none() {
             narrowed.extend_from_slice(candidates);
             return passing(Verdict::Refine(side), 0);
         }
@@ -375,9 +383,6 @@ impl Placed<'_> {
         shaft.narrow(candidates, narrowed);
         let blockers = shaft.blockers(&narrowed[start..]);
         let key = pair_key(self.forest.key(element), self.forest.key(light));
-        if matches!(self.oracle, Oracle::Error { .. }) && self.forest.coarse(element).is_none() {
-            return passing(Verdict::Refine(side), 0);
-        }
         let segments = place.segments(lamp, &e, key);
         let v = light_visibility(self.simd, &shaft, &blockers, &segments);
         let verdict = match (self.stage, self.oracle) {

@@ -53,6 +53,8 @@ pub enum Stale {
     Occlusion,
     /// Where its ends are.
     Moved,
+    /// Everything: it has not been judged yet.
+    New,
 }
 
 /// The hierarchy that the two ends of a pair come from.
@@ -284,14 +286,14 @@ fn judge_block<'a, J: Judge>(
         let look = |item: &Item| {
             let (a, b) = tree.ends(item.pair);
             let stale = match tree.state(item.pair) {
-                State::New => Stale::Moved,
-                _ if fresh.binary_search(&item.pair).is_ok() => Stale::Moved,
+                State::New => Stale::New,
+                _ if fresh.binary_search(&item.pair).is_ok() => Stale::New,
                 _ => judge.stale(a, b),
             };
             match stale {
                 Stale::Nothing => Look::Unaffected,
                 Stale::Below => Look::Descend,
-                Stale::Brightness | Stale::Occlusion | Stale::Moved => {
+                Stale::Brightness | Stale::Occlusion | Stale::Moved | Stale::New => {
                     let start = narrowed.len();
                     let found = judge.judge(a, b, item.list.of(candidates), &mut narrowed);
                     if !matches!(found.verdict, Verdict::Refine(_) | Verdict::RefineSelf) {
@@ -344,7 +346,7 @@ impl<J: Judge> Editor<'_, J> {
         match stale {
             Stale::Occlusion => work.visibility_only += 1,
             Stale::Brightness => work.brightness_only += 1,
-            Stale::Moved | Stale::Below | Stale::Nothing => work.reevaluated += 1,
+            Stale::Moved | Stale::New | Stale::Below | Stale::Nothing => work.reevaluated += 1,
         }
     }
 
@@ -369,8 +371,12 @@ impl<J: Judge> Editor<'_, J> {
             Verdict::RefineSelf => State::RefinedSelf,
             Verdict::Cull(reason) => State::Culled(reason),
         };
+        let moved = match stale {
+            Stale::New => wanted == State::Active && self.judge.stale(a, b) == Stale::Moved,
+            stale => wanted == State::Active && stale == Stale::Moved,
+        };
         let work = &mut self.changes.work;
-        work.dynamic_links += u64::from(wanted == State::Active && stale == Stale::Moved);
+        work.dynamic_links += u64::from(moved);
         if before != wanted {
             work.changed += 1;
             work.promoted += u64::from(before.is_refined() && wanted == State::Active);

@@ -56,14 +56,23 @@ impl Session {
         let work = changes.work;
         report.seconds.evaluate = clock.lap();
 
-        let dirty = self.edit_links(&mut solved, &changes, cold, &mut report);
+        let mut dirty = self.edit_links(&mut solved, &changes, cold, &mut report);
+        if let Dirty::Some { parents, .. } = &mut dirty {
+            parents.extend(self.came_or_went(&solved, &old));
+        }
         report.seconds.judge = clock.lap();
 
-        let lit = LitForest::new(&self.scene, &solved.forest);
+        let lit = LitForest::new(&self.scene, &solved.forest).present_in(&solved.view);
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
         let share = |share: f64| self.options.tolerance * share;
         let stop = Stop::Residual { all: share(RESIDUAL_SHARE), part: share(FOLLOWED_SHARE) };
-        solved.radiosity.solve(&lit, &solved.links, dirty, stop);
+        let lamps = (0..self.scene.lights.len()).any(|k| solved.view.light(k).is_some());
+        if lit.is_dark() && !lamps {
+            // What is left of earlier light would fade for ever.
+            solved.radiosity = coarse::start(&self.scene, &solved.forest, &lit);
+        } else {
+            solved.radiosity.solve(&lit, &solved.links, dirty, stop);
+        }
         report.seconds.solve = clock.lap();
 
         solved.time_s = time_s;
@@ -158,7 +167,7 @@ impl Session {
             Some(receivers)
         };
         let split = solved.forest.take_changed();
-        let lit = LitForest::new(&self.scene, &solved.forest);
+        let lit = LitForest::new(&self.scene, &solved.forest).present_in(&solved.view);
         if cold {
             solved.radiosity = self.first_guess(solved, &lit);
             return Dirty::All;
@@ -176,6 +185,17 @@ impl Session {
                 parents: split,
             },
         }
+    }
+
+    /// Facets of bodies that appeared or vanished since `old`: what they emit did too.
+    fn came_or_went(&self, solved: &Solved, old: &WorldView) -> Vec<u32> {
+        let forest = &solved.forest;
+        let toggled = |facet: &&ElementId| {
+            let patch = forest.patch(**facet).expect("a facet has a patch");
+            let body = solved.view.patch(patch).body;
+            solved.view.is_present(body) != old.is_present(body)
+        };
+        forest.facets().iter().filter(toggled).map(|f| f.0).collect()
     }
 
     /// The coarse solution, where there is one; else exitances.

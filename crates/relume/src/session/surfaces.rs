@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::element::{ElementId, Forest, Kind};
+use crate::element::{ElementId, Forest, Kind, WorldView};
 use crate::pair::{self, Edit, PairTree};
-use crate::scene::Scene;
+use crate::scene::{PatchId, Scene};
 use crate::solver::{Link, Links, LinksBuilder, Lit, Place, Surfaces};
 
 /// A forest with its materials.
@@ -26,6 +26,21 @@ impl<'a> LitForest<'a> {
         };
         let patch_lit = scene.patches.iter().map(of_patch).collect();
         LitForest { forest, patch_lit, places: Vec::new() }
+    }
+
+    /// Absent bodies emit nothing: they do not count in the mean that residuals are relative to.
+    pub(super) fn present_in(mut self, view: &WorldView) -> LitForest<'a> {
+        for (patch, lit) in self.patch_lit.iter_mut().enumerate() {
+            if !view.is_present(view.patch(PatchId(patch as u32)).body) {
+                lit.exitance = [0.0; 3];
+            }
+        }
+        self
+    }
+
+    /// Whether no surface emits anything.
+    pub(super) fn is_dark(&self) -> bool {
+        self.patch_lit.iter().all(|lit| lit.exitance == [0.0; 3])
     }
 
     /// With all places computed ahead: for several sweeps over all of the forest.

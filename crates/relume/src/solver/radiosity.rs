@@ -165,6 +165,8 @@ pub struct Radiosity {
     pub residual: f64,
     /// The same of the last sweep over everything alone, W/m2.
     passed_over: f32,
+    /// Largest change that may have been left undone since, W/m2.
+    held: f32,
 }
 
 /// Sweeps after which a solve is given up as not converging (reflectances are below 1).
@@ -181,6 +183,9 @@ const FEW: usize = 16;
 
 /// Share of the residual to which changes of sources may add up before a receiver gathers anew.
 const PENDING_SHARE: f32 = 0.5;
+
+/// What may be left undone, relative to what may be left undone now.
+const HELD_MAX: f32 = 2.0;
 
 impl Linear {
     /// Value at an offset from the centroid (in the unit of the gradient), unclamped.
@@ -282,12 +287,18 @@ impl Radiosity {
             if work.all {
                 jump.before(&self.radiosity);
             }
+            if !work.all && self.held > HELD_MAX * limit && matches!(stop, Stop::Residual { .. }) {
+                // What was little beside a brighter scene is too much beside this one.
+                work.start_all(surfaces);
+                continue;
+            }
             let small = self.sweep(surfaces, links, &mut work, limit);
             if work.all {
-                self.passed_over = small;
+                (self.passed_over, self.held) = (small, 0.0);
+            } else {
+                self.held = self.held.max(limit);
             }
-            let left =
-                self.passed_over + if work.all { 0.0 } else { small + limit * PENDING_SHARE };
+            let left = self.passed_over + self.held * (1.0 + PENDING_SHARE);
             self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
             self.sweeps += 1;
             let done = match stop {

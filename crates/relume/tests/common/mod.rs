@@ -8,6 +8,7 @@
 
 pub(crate) mod audit;
 pub(crate) mod exact;
+pub(crate) mod pairs;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

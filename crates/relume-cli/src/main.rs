@@ -2,6 +2,7 @@
 
 mod args;
 mod check;
+mod clip;
 mod demo;
 mod failure;
 mod frames;
@@ -13,6 +14,7 @@ mod report;
 mod resume;
 mod run;
 mod scene_file;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -35,6 +37,7 @@ fn execute(command: Command) -> Result<(), Failure> {
     match command {
         Command::Info(args) => info::info(&args),
         Command::Check(args) => check::check(&args),
+        Command::Verify(args) => interrupt::listen().and_then(|()| verify::verify(&args)),
         Command::Solve(args) => interrupt::listen().and_then(|()| run::solve(args)),
         Command::Render(args) => interrupt::listen().and_then(|()| run::render(args)),
         Command::Demo(args) => interrupt::listen().and_then(|()| run::demo(args)),

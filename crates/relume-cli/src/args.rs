@@ -58,6 +58,15 @@ pub(crate) enum Command {
     /// Stops at the first frame that differs, names the first link in question, and exits with 1.
     #[command(after_help = "Example:  relume verify scene.glb --frames 0-48x12 --tolerance 0.1")]
     Verify(VerifyArgs),
+    /// Measure what a frame costs, against building it from scratch.
+    ///
+    /// Prints the paper's Table 0.1 for any scene: frames, average time a frame, standard deviation,
+    /// time to set up and solve frame 1, and their ratio, without and with drawing the pictures
+    /// (which are not kept); beside it what was done in a frame, how far a frame is from its bound,
+    /// and the memory. Frames are built from scratch in turns with the frames measured, so that
+    /// whatever else the machine does hits both alike: go by the ratios.
+    #[command(after_help = "Example:  relume bench --demo room --frames 0-9 --json bench.json")]
+    Bench(BenchArgs),
 }
 
 /// `relume demo`
@@ -224,6 +233,28 @@ pub(crate) struct VerifyArgs {
     pub(crate) clip: ClipFlags,
 }
 
+/// `relume bench`
+#[derive(Debug, Args)]
+pub(crate) struct BenchArgs {
+    #[command(flatten)]
+    pub(crate) source: SourceFlags,
+    #[command(flatten)]
+    pub(crate) clip: ClipFlags,
+    #[command(flatten)]
+    pub(crate) update: UpdateChoice,
+    /// Build only every K-th frame from scratch beside the others: quicker, less exact.
+    #[arg(long, value_name = "K", default_value = "1", value_parser = parse_every, allow_negative_numbers = true)]
+    pub(crate) every: usize,
+    /// Draw no pictures; the row with them is left out.
+    #[arg(long)]
+    pub(crate) no_pictures: bool,
+    #[command(flatten)]
+    pub(crate) picture: PictureFlags,
+    /// Also write all numbers to this file, frame by frame (`relume-bench/1`).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
 /// What every command that renders takes.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct PictureFlags {
@@ -316,6 +347,13 @@ fn parse_tolerance(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(tolerance) if tolerance > 0.0 && tolerance < 1.0 => Ok(tolerance),
         _ => Err("the tolerance is a relative error between 0 and 1, such as 0.02 for 2 %".into()),
+    }
+}
+
+fn parse_every(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(every) if every > 0 => Ok(every),
+        _ => Err("give a whole number of frames, 1 or more".into()),
     }
 }
 

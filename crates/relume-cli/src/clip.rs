@@ -37,6 +37,8 @@ pub(crate) struct Clip {
     pub(crate) threads: usize,
     /// How finely it is solved.
     pub(crate) tolerance: f64,
+    /// How its pictures are shaded, unless the user says.
+    pub(crate) shading: Shading,
     flags: ClipFlags,
 }
 
@@ -69,7 +71,8 @@ impl Clip {
         let threads = use_threads(flags.threads)?;
         let demo = demo::demo(name);
         let scene = (demo.build)().map_err(scene_file::failure)?;
-        Clip::of_scene(scene, flags, threads, demo.tolerance)
+        let clip = Clip::of_scene(scene, flags, threads, demo.tolerance)?;
+        Ok(Clip { shading: demo.shading, ..clip })
     }
 
     fn of_scene(
@@ -85,6 +88,7 @@ impl Clip {
             frames,
             threads,
             tolerance: flags.tolerance.unwrap_or(tolerance),
+            shading: Shading::Gouraud,
             flags: flags.clone(),
         })
     }

@@ -1,10 +1,12 @@
 //! The `relume` command: a thin layer over the engine, the pictures and the exports.
 
 mod args;
+mod bench;
 mod check;
 mod clip;
 mod demo;
 mod failure;
+mod figures;
 mod frames;
 mod info;
 mod interrupt;
@@ -38,6 +40,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Info(args) => info::info(&args),
         Command::Check(args) => check::check(&args),
         Command::Verify(args) => interrupt::listen().and_then(|()| verify::verify(&args)),
+        Command::Bench(args) => interrupt::listen().and_then(|()| bench::bench(&args)),
         Command::Solve(args) => interrupt::listen().and_then(|()| run::solve(args)),
         Command::Render(args) => interrupt::listen().and_then(|()| run::render(args)),
         Command::Demo(args) => interrupt::listen().and_then(|()| run::demo(args)),

@@ -22,7 +22,7 @@ const THREADS_MAX: usize = 1_024;
     version,
     about = "Diffuse light of animated glTF scenes, frame by frame (hierarchical radiosity)",
     after_help = "Start with:  relume demo room\n\
-                  Exit codes:  0 done, 1 an error (or an error found by `check`), 2 wrong usage, 130 interrupted",
+                  Exit codes:  0 done, 1 an error (or one found by `check` or `verify`), 2 wrong usage, 130 interrupted",
     arg_required_else_help = true,
     max_term_width = 100
 )]
@@ -51,6 +51,22 @@ pub(crate) enum Command {
     ///
     /// Exit code 1 if an error is found; warnings alone leave it at 0.
     Check(CheckArgs),
+    /// Solve a clip frame by frame and from scratch side by side, and say where they differ.
+    ///
+    /// Compares all links (which there are, exchange areas, visibilities, gradients: bit for bit),
+    /// the numbers of elements, and the radiosities, which may differ by what the residuals allow.
+    /// Stops at the first frame that differs, names the first link in question, and exits with 1.
+    #[command(after_help = "Example:  relume verify scene.glb --frames 0-48x12 --tolerance 0.1")]
+    Verify(VerifyArgs),
+    /// Measure what a frame costs, against building it from scratch.
+    ///
+    /// Prints the paper's Table 0.1 for any scene: frames, average time a frame, standard deviation,
+    /// time to set up and solve frame 1, and their ratio, without and with drawing the pictures
+    /// (which are not kept); beside it what was done in a frame, how far a frame is from its bound,
+    /// and the memory. Frames are built from scratch in turns with the frames measured, so that
+    /// whatever else the machine does hits both alike: go by the ratios.
+    #[command(after_help = "Example:  relume bench --demo room --frames 0-9 --json bench.json")]
+    Bench(BenchArgs),
 }
 
 /// `relume demo`
@@ -139,9 +155,9 @@ pub(crate) struct AnimationFlag {
     pub(crate) name: Option<String>,
 }
 
-/// What every command that solves takes.
+/// What is solved, and how finely: what every command that solves takes.
 #[derive(Clone, Debug, Args)]
-pub(crate) struct SolveFlags {
+pub(crate) struct ClipFlags {
     /// Frames to solve, inclusive: 0-24, every sixth 0-24x6, a list 3,7. Frame k is the time k / fps
     /// [default: the whole animation].
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
@@ -161,9 +177,6 @@ pub(crate) struct SolveFlags {
     /// form-factor=0.02,0.001.
     #[arg(long, value_name = "ORACLE", default_value = "error")]
     pub(crate) oracle: OracleFlag,
-    /// How the links follow the motion; the links of a frame are the same either way.
-    #[arg(long, value_name = "STRATEGY", value_enum, default_value = "reinspect")]
-    pub(crate) update: UpdateFlag,
     /// Threads to use; the result has the same bits for any number [default: all cores].
     #[arg(long, value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
@@ -171,6 +184,26 @@ pub(crate) struct SolveFlags {
     /// [default: no limit].
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     pub(crate) max_memory: Option<MemorySize>,
+    /// No progress bar, no warnings, no summary; errors only.
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+/// How the links follow the motion.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct UpdateChoice {
+    /// How the links follow the motion; the links of a frame are the same either way.
+    #[arg(long = "update", value_name = "STRATEGY", value_enum, default_value = "reinspect")]
+    pub(crate) strategy: UpdateFlag,
+}
+
+/// What every command that solves a clip and keeps the numbers takes.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct SolveFlags {
+    #[command(flatten)]
+    pub(crate) clip: ClipFlags,
+    #[command(flatten)]
+    pub(crate) update: UpdateChoice,
     /// Also write the report to this file.
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,
@@ -178,9 +211,48 @@ pub(crate) struct SolveFlags {
     /// DIR), after checking that scene and options are the same.
     #[arg(long)]
     pub(crate) resume: bool,
-    /// No progress bar, no warnings, no summary; errors only.
-    #[arg(short, long)]
-    pub(crate) quiet: bool,
+}
+
+/// A scene file, or a demonstration instead.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct SourceFlags {
+    /// The scene, a .glb or .gltf file.
+    #[arg(value_name = "SCENE", required_unless_present = "demo", conflicts_with = "demo")]
+    pub(crate) scene: Option<PathBuf>,
+    /// Instead of a file, a scene that ships with relume, at its own tolerance by default.
+    #[arg(long, value_name = "DEMO", value_enum)]
+    pub(crate) demo: Option<DemoScene>,
+}
+
+/// `relume verify`
+#[derive(Debug, Args)]
+pub(crate) struct VerifyArgs {
+    #[command(flatten)]
+    pub(crate) source: SourceFlags,
+    #[command(flatten)]
+    pub(crate) clip: ClipFlags,
+}
+
+/// `relume bench`
+#[derive(Debug, Args)]
+pub(crate) struct BenchArgs {
+    #[command(flatten)]
+    pub(crate) source: SourceFlags,
+    #[command(flatten)]
+    pub(crate) clip: ClipFlags,
+    #[command(flatten)]
+    pub(crate) update: UpdateChoice,
+    /// Build only every K-th frame from scratch beside the others: quicker, less exact.
+    #[arg(long, value_name = "K", default_value = "1", value_parser = parse_every, allow_negative_numbers = true)]
+    pub(crate) every: usize,
+    /// Draw no pictures; the row with them is left out.
+    #[arg(long)]
+    pub(crate) no_pictures: bool,
+    #[command(flatten)]
+    pub(crate) picture: PictureFlags,
+    /// Also write all numbers to this file, frame by frame (`relume-bench/1`).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
 }
 
 /// What every command that renders takes.
@@ -275,6 +347,13 @@ fn parse_tolerance(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(tolerance) if tolerance > 0.0 && tolerance < 1.0 => Ok(tolerance),
         _ => Err("the tolerance is a relative error between 0 and 1, such as 0.02 for 2 %".into()),
+    }
+}
+
+fn parse_every(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(every) if every > 0 => Ok(every),
+        _ => Err("give a whole number of frames, 1 or more".into()),
     }
 }
 

@@ -1,9 +1,12 @@
 //! The `relume` command: a thin layer over the engine, the pictures and the exports.
 
 mod args;
+mod bench;
 mod check;
+mod clip;
 mod demo;
 mod failure;
+mod figures;
 mod frames;
 mod info;
 mod interrupt;
@@ -13,6 +16,7 @@ mod report;
 mod resume;
 mod run;
 mod scene_file;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -35,6 +39,8 @@ fn execute(command: Command) -> Result<(), Failure> {
     match command {
         Command::Info(args) => info::info(&args),
         Command::Check(args) => check::check(&args),
+        Command::Verify(args) => interrupt::listen().and_then(|()| verify::verify(&args)),
+        Command::Bench(args) => interrupt::listen().and_then(|()| bench::bench(&args)),
         Command::Solve(args) => interrupt::listen().and_then(|()| run::solve(args)),
         Command::Render(args) => interrupt::listen().and_then(|()| run::render(args)),
         Command::Demo(args) => interrupt::listen().and_then(|()| run::demo(args)),

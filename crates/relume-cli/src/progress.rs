@@ -47,6 +47,11 @@ impl Progress {
         self.bar.inc(1);
     }
 
+    /// Does something, such as printing a line, with the bar out of the way.
+    pub(crate) fn suspend<T>(&self, action: impl FnOnce() -> T) -> T {
+        self.bar.suspend(action)
+    }
+
     /// Takes the bar away.
     pub(crate) fn clear(&self) {
         self.bar.finish_and_clear();

@@ -9,16 +9,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use indicatif::HumanBytes;
 use relume::scene::{BodyId, Scene};
-use relume::session::{Options, Oracle, Session, SessionError, Snapshot, Update};
+use relume::session::{Session, SessionError, Snapshot};
 use relume_picture::export::{probe, write_glb};
-use relume_picture::picture::{self, Exposure, Settings, Viewpoint};
+use relume_picture::picture::{self, Exposure, Viewpoint};
 
 use crate::args::{
-    DemoArgs, ExposureFlag, OracleFlag, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags,
-    UpdateFlag,
+    DemoArgs, ExposureFlag, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags,
 };
+use crate::clip::{self, Clip, TOLERANCE, fixed, now};
 use crate::demo;
 use crate::failure::Failure;
 use crate::frames;
@@ -28,14 +27,6 @@ use crate::progress::Progress;
 use crate::report::{PictureOptions, Report, RunOptions, SceneSummary, peak_memory_bytes};
 use crate::resume;
 use crate::scene_file;
-
-/// Default tolerance, relative error of irradiance.
-const TOLERANCE: f64 = 0.02;
-
-/// Share of the scene's area below which the form-factor oracle does not refine, unless it is told
-/// an area. A share, so that a scene in other units gives the same elements; with it a closed cube
-/// has at most 6 x 4^5 elements, about as many as the paper draws.
-const MIN_AREA_SHARE: f64 = 1.0 / 5_000.0;
 
 /// The report is written again after a frame if the last time was this long ago. A run that is
 /// killed outright computes the frames of this time again when it is resumed.
@@ -59,7 +50,7 @@ pub(crate) fn demo(args: DemoArgs) -> Result<(), Failure> {
     let job = Job {
         scene: path,
         dir: Some(dir),
-        tolerance: args.solve.tolerance.unwrap_or(demo.tolerance),
+        tolerance: demo.tolerance,
         picture: Some((args.picture.shading.unwrap_or(demo.shading), args.picture)),
         solve: args.solve,
     };
@@ -71,7 +62,7 @@ pub(crate) fn render(args: RenderArgs) -> Result<(), Failure> {
     let job = Job {
         scene: args.scene,
         dir: Some(args.output),
-        tolerance: args.solve.tolerance.unwrap_or(TOLERANCE),
+        tolerance: TOLERANCE,
         picture: Some((args.picture.shading.unwrap_or(Shading::Gouraud), args.picture)),
         solve: args.solve,
     };
@@ -83,7 +74,7 @@ pub(crate) fn solve(args: SolveArgs) -> Result<(), Failure> {
     let job = Job {
         scene: args.scene,
         dir: args.output,
-        tolerance: args.solve.tolerance.unwrap_or(TOLERANCE),
+        tolerance: TOLERANCE,
         picture: None,
         solve: args.solve,
     };
@@ -94,6 +85,7 @@ pub(crate) fn solve(args: SolveArgs) -> Result<(), Failure> {
 struct Job {
     scene: PathBuf,
     dir: Option<PathBuf>,
+    /// Unless the flags give one.
     tolerance: f64,
     picture: Option<(Shading, PictureFlags)>,
     solve: SolveFlags,
@@ -107,33 +99,26 @@ impl Job {
                 "give the directory of the earlier run with -o, or its report with --report",
             ));
         }
-        // Before anything runs in parallel: choosing a view does.
-        let threads = use_threads(self.solve.threads)?;
-        let scene = scene_file::load(&self.scene, &self.solve.animation)?;
-        let wanted =
-            frames::resolve(self.solve.frames.as_ref(), scene.motion.duration_s, self.solve.fps)
-                .map_err(|error| Failure::new(error).help("`relume info` lists the frames"))?;
+        let clip = Clip::of_file(&self.scene, &self.solve.clip, self.tolerance)?;
         let camera = self.picture.as_ref().map(|(_, flags)| {
-            Viewpoint::new(&scene, flags.camera.as_deref()).map_err(Failure::new)
+            Viewpoint::new(&clip.scene, flags.camera.as_deref()).map_err(Failure::new)
         });
         let camera = camera.transpose()?;
-        if !self.solve.quiet {
-            scene_file::warn(&scene);
-        }
+        clip.warn();
         if let Some(dir) = &self.dir {
             make_directory(dir)?;
         }
-        let report = self.open_report(&scene, threads)?;
+        let report = self.open_report(&clip)?;
+        let wanted = &clip.frames;
         let pending: Vec<u32> =
             wanted.iter().copied().filter(|frame| !report.frames.contains_key(frame)).collect();
-        if !self.solve.quiet {
-            self.warn_of_old_pictures(&wanted, &report);
+        if !self.quiet() {
+            self.warn_of_old_pictures(wanted, &report);
         }
-        let session =
-            Session::new(Arc::new(scene), self.options_for(&report)).map_err(Failure::new)?;
-        let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.solve.quiet);
+        let session = clip.session(self.solve.update.strategy)?;
+        let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.quiet());
         let mut run = Run { job: &self, session, camera, report, progress, links: 0 };
-        let outcome = run.frames(&wanted, &pending);
+        let outcome = run.frames(wanted, &pending);
         run.progress.clear();
         // Also where a frame failed: what was finished stays.
         if !run.report.frames.is_empty() {
@@ -142,28 +127,12 @@ impl Job {
         let finished = wanted.iter().filter(|f| run.report.frames.contains_key(f)).count();
         match outcome? {
             Outcome::Interrupted => Err(self.interrupted(finished, wanted.len())),
-            Outcome::Done => self.summary(&wanted, &pending, run.links, started.elapsed()),
+            Outcome::Done => self.summary(wanted, &pending, run.links, started.elapsed()),
         }
     }
 
-    fn options_for(&self, report: &Report) -> Options {
-        let oracle = match self.solve.oracle {
-            OracleFlag::Error => Oracle::Error,
-            OracleFlag::FormFactor { epsilon, min_area_m2 } => Oracle::FormFactor {
-                epsilon,
-                min_area_m2: min_area_m2.unwrap_or(report.scene.area_m2 * MIN_AREA_SHARE),
-            },
-        };
-        let update = match self.solve.update {
-            UpdateFlag::Reinspect => Update::Reinspect,
-            UpdateFlag::Scratch => Update::Scratch,
-        };
-        Options {
-            tolerance: self.tolerance,
-            oracle,
-            update,
-            max_memory_bytes: self.solve.max_memory.map(|memory| memory.bytes),
-        }
+    fn quiet(&self) -> bool {
+        self.solve.clip.quiet
     }
 
     /// Where the report goes.
@@ -174,9 +143,9 @@ impl Job {
 
     /// The report of this run, with what an earlier one finished. An older report stays until a
     /// frame is finished; that it can be replaced is tried at once.
-    fn open_report(&self, scene: &Scene, threads: usize) -> Result<Report, Failure> {
-        let summary = SceneSummary::new(scene, resume::content_hash(&self.scene)?);
-        let mut report = Report::new(summary, self.run_options(threads));
+    fn open_report(&self, clip: &Clip) -> Result<Report, Failure> {
+        let summary = SceneSummary::new(&clip.scene, resume::content_hash(&self.scene)?);
+        let mut report = Report::new(summary, self.run_options(clip));
         let paths = self.report_paths();
         if self.solve.resume
             && let Some(earlier) = Report::read(&paths[0])?
@@ -189,7 +158,7 @@ impl Job {
         Ok(report)
     }
 
-    fn run_options(&self, threads: usize) -> RunOptions {
+    fn run_options(&self, clip: &Clip) -> RunOptions {
         let picture = self.picture.as_ref().map(|(shading, flags)| PictureOptions {
             size: flags.size.to_string(),
             shading: *shading,
@@ -201,15 +170,16 @@ impl Job {
             },
             mesh: flags.mesh,
         });
+        let flags = &self.solve.clip;
         RunOptions {
-            frames: self.solve.frames.as_ref().map_or("all".into(), ToString::to_string),
-            fps: self.solve.fps,
-            animation: self.solve.animation.name.clone(),
-            tolerance: self.tolerance,
-            oracle: self.solve.oracle.to_string(),
-            update: self.solve.update.name().to_owned(),
-            threads,
-            max_memory_bytes: self.solve.max_memory.map(|memory| memory.bytes),
+            frames: flags.frames.as_ref().map_or("all".into(), ToString::to_string),
+            fps: flags.fps,
+            animation: flags.animation.name.clone(),
+            tolerance: clip.tolerance,
+            oracle: flags.oracle.to_string(),
+            update: self.solve.update.strategy.name().to_owned(),
+            threads: clip.threads,
+            max_memory_bytes: flags.max_memory.map(|memory| memory.bytes),
             picture,
         }
     }
@@ -272,7 +242,7 @@ impl Job {
         links: u64,
         elapsed: Duration,
     ) -> Result<(), Failure> {
-        if self.solve.quiet {
+        if self.quiet() {
             return Ok(());
         }
         let mut line = counted(wanted.len(), "frame");
@@ -323,7 +293,7 @@ impl Run<'_> {
                 return Ok(Outcome::Interrupted);
             }
             let before = wanted.iter().rev().find(|&&earlier| earlier < frame);
-            self.session.came_from(before.map(|&f| frames::time_of(f, self.job.solve.fps)));
+            self.session.came_from(before.map(|&f| frames::time_of(f, self.job.solve.clip.fps)));
             self.frame(frame)?;
             self.progress.finish_frame();
             if written.is_none_or(|at| at.elapsed() >= interval) {
@@ -340,7 +310,7 @@ impl Run<'_> {
         self.progress.start(frame, self.links, self.session.memory_bytes());
         let entry = self
             .session
-            .step(frame, frames::time_of(frame, self.job.solve.fps))
+            .step(frame, frames::time_of(frame, self.job.solve.clip.fps))
             .map_err(|error| self.session_failure(error))?;
         self.links = entry.links;
         if let Some(path) = self.job.picture_path(frame) {
@@ -355,17 +325,8 @@ impl Run<'_> {
             self.choose_exposure(frame, &snapshot)?;
         }
         let Some((view, options, flags)) = self.view(frame)? else { return Ok(()) };
-        let settings = Settings {
-            width: flags.size.width,
-            height: flags.size.height,
-            shading: match options.shading {
-                Shading::Flat => picture::Shading::Flat,
-                Shading::Gouraud => picture::Shading::Gouraud,
-            },
-            exposure: options.exposure_ev.map_or(Exposure::Automatic, fixed),
-            mesh: flags.mesh,
-            ..Settings::default()
-        };
+        let exposure = options.exposure_ev.map_or(Exposure::Automatic, fixed);
+        let settings = clip::picture_settings(flags, options.shading, exposure);
         let image = picture::render(&snapshot, &view, &settings);
         let _guard = interrupt::writing();
         image.write_png(path).map_err(|error| {
@@ -381,7 +342,7 @@ impl Run<'_> {
     ) -> Result<Option<(picture::View, &PictureOptions, &PictureFlags)>, Failure> {
         let parts = (&self.camera, &self.report.options.picture, &self.job.picture);
         let (Some(camera), Some(options), Some((_, flags))) = parts else { return Ok(None) };
-        let time_s = frames::time_of(frame, self.job.solve.fps);
+        let time_s = frames::time_of(frame, self.job.solve.clip.fps);
         let view = camera.at(self.session.scene(), time_s).map_err(Failure::new)?;
         Ok(Some((view, options, flags)))
     }
@@ -396,7 +357,7 @@ impl Run<'_> {
         if !self.exposure_is_open() {
             return Ok(());
         }
-        let fps = self.job.solve.fps;
+        let fps = self.job.solve.clip.fps;
         let scene = Arc::clone(self.session.scene());
         let frame = first_lit_frame(&scene, fps).unwrap_or(next);
         if frame == next {
@@ -429,20 +390,8 @@ impl Run<'_> {
 
     fn session_failure(&self, error: SessionError) -> Failure {
         let kept = !self.report.frames.is_empty() && !self.job.report_paths().is_empty();
-        let kept = if kept { "; the frames before it are finished and stay" } else { "" };
-        match error {
-            SessionError::OutOfMemory { frame, tolerance, limit_bytes, links } => {
-                Failure::new(format_args!(
-                    "frame {frame} at tolerance {tolerance} needs more than the {} of memory \
-                     allowed ({} pairs so far)",
-                    HumanBytes(limit_bytes),
-                    count(links)
-                ))
-                .help(format_args!("raise --max-memory or the tolerance{kept}"))
-            }
-            other if kept.is_empty() => Failure::new(other),
-            other => Failure::new(other).help(kept.trim_start_matches("; ")),
-        }
+        let kept = if kept { "the frames before it are finished and stay" } else { "" };
+        clip::step_failure(error, kept)
     }
 
     fn write_report(&mut self) -> Result<(), Failure> {
@@ -450,11 +399,6 @@ impl Run<'_> {
         self.report.peak_memory_bytes = self.report.peak_memory_bytes.max(peak);
         self.job.report_paths().iter().try_for_each(|path| self.report.write(path))
     }
-}
-
-/// Wall-clock time, for the summary and for how often the report is written; no result uses it.
-fn now() -> Instant {
-    Instant::now()
 }
 
 /// The first frame of the animation in which a surface or a light emits; `None` if none does.
@@ -476,26 +420,10 @@ fn first_lit_frame(scene: &Scene, fps: f64) -> Option<u32> {
     })
 }
 
-/// Display value = radiance (W/m2/sr) x 2^EV.
-fn fixed(stops: f64) -> Exposure {
-    Exposure::Fixed(stops.exp2())
-}
-
 /// The stops of a scale, rounded to a thousandth so that what the report says is what was used.
 fn stops(scale: f64) -> f64 {
     let stops = scale.log2();
     if stops.is_finite() { (stops * 1000.0).round() / 1000.0 } else { 0.0 }
-}
-
-/// Sets the number of threads of the process; the number in use.
-fn use_threads(threads: Option<usize>) -> Result<usize, Failure> {
-    if let Some(threads) = threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(|error| {
-            Failure::new(format_args!("cannot start {}: {error}", counted(threads, "thread")))
-                .help("ask for fewer with --threads")
-        })?;
-    }
-    Ok(rayon::current_num_threads())
 }
 
 fn make_directory(dir: &Path) -> Result<(), Failure> {

@@ -2,63 +2,13 @@
 //!
 //! Runs the binary itself. Scenes are the demonstrations, written into a temporary directory.
 
+mod common;
+
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
+use common::{json, relume, room, text};
 use serde_json::Value;
-use tempfile::TempDir;
-
-/// What a run printed, and its exit code.
-struct Ran {
-    code: Option<i32>,
-    out: String,
-    err: String,
-}
-
-impl Ran {
-    /// Asserts an exit code and that stderr holds each of the texts.
-    #[track_caller]
-    fn fails(&self, code: i32, texts: &[&str]) {
-        assert_eq!(self.code, Some(code), "{}{}", self.out, self.err);
-        assert!(!self.err.contains("panicked"), "{}", self.err);
-        for text in texts {
-            assert!(self.err.contains(text), "`{text}` is missing in:\n{}", self.err);
-        }
-    }
-
-    #[track_caller]
-    fn succeeds(self) -> Ran {
-        assert_eq!(self.code, Some(0), "{}{}", self.out, self.err);
-        self
-    }
-}
-
-fn relume(arguments: &[&str]) -> Ran {
-    let Output { status, stdout, stderr } =
-        Command::new(env!("CARGO_BIN_EXE_relume")).args(arguments).output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    Ran { code: status.code(), out: text(stdout), err: text(stderr) }
-}
-
-/// A directory with `room.glb` in it.
-fn room() -> (TempDir, PathBuf) {
-    let dir = tempfile::tempdir().unwrap();
-    // The scene is written before anything is solved; frame 99 does not exist, so nothing is.
-    let out = dir.path().to_str().unwrap();
-    relume(&["demo", "room", "-o", out, "--frames", "99"]).fails(1, &["frame 99"]);
-    let scene = dir.path().join("room.glb");
-    assert!(scene.is_file());
-    (dir, scene)
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
-}
 
 fn frames_of(report: &Value) -> Vec<u64> {
     report["frames"].as_array().unwrap().iter().map(|f| f["frame"].as_u64().unwrap()).collect()
@@ -303,7 +253,7 @@ fn places_that_cannot_be_written_are_named() {
 #[cfg(unix)]
 #[test]
 fn a_reader_that_goes_away_is_no_error() {
-    use std::process::Stdio;
+    use std::process::{Command, Stdio};
     let (_dir, scene) = room();
     let mut child = Command::new(env!("CARGO_BIN_EXE_relume"))
         .args(["info", text(&scene)])

@@ -11,6 +11,7 @@ use crate::transport::Simd;
 
 mod advance;
 mod coarse;
+mod compare;
 mod gather;
 mod options;
 mod report;
@@ -18,6 +19,7 @@ mod snapshot;
 mod surfaces;
 mod tally;
 
+pub use compare::{Difference, ElementName, RadiosityGap, Which, compare, radiosity_gap};
 pub use options::{Options, Oracle, Update};
 pub use report::{Energy, FrameReport, PairCounts, RowSumError, Seconds};
 pub use snapshot::{Leaf, Snapshot};

@@ -1,0 +1,220 @@
+//! `relume bench`: what a frame costs against building it from scratch.
+//!
+//! Measures only; `figures` makes tables of it. Every frame is measured in two sessions in turns:
+//! one that follows the motion, and one set up for this frame alone. So whatever else the machine
+//! does hits both alike, and ratios hold where seconds do not.
+
+use relume::session::{FrameReport, Session};
+use relume_picture::export::{probe, write_atomically};
+use relume_picture::picture::{self, Exposure, Viewpoint};
+
+use crate::args::{BenchArgs, ExposureFlag, UpdateFlag};
+use crate::clip::{self, Clip, fixed, now, step_failure};
+use crate::failure::Failure;
+use crate::figures::{Cold, Figures, Held, Measured};
+use crate::interrupt;
+use crate::output::{self, count, counted};
+use crate::progress::Progress;
+use crate::report::peak_memory_bytes;
+
+/// Runs the command.
+pub(crate) fn bench(args: &BenchArgs) -> Result<(), Failure> {
+    let clip = Clip::open(&args.source, &args.clip)?;
+    if clip.frames.len() < 2 {
+        return Err(Failure::new(
+            "a bench takes two frames or more: the first is built from scratch",
+        )
+        .help("ask for more with --frames; a scene in which nothing moves has frame 0 only"));
+    }
+    clip.warn();
+    if let Some(path) = &args.json {
+        probe(path).map_err(|error| Failure::write(path, &error))?;
+    }
+    let mut bench = Bench::new(args, &clip)?;
+    let outcome = bench.frames();
+    bench.progress.clear();
+    let finished = outcome?;
+    let measured = bench.frames.len() + usize::from(bench.first.is_some());
+    // Also where the run was stopped: what was measured stays.
+    if let Some(figures) = bench.figures() {
+        if !args.clip.quiet {
+            output::print(&figures.text())?;
+        }
+        if let Some(path) = &args.json {
+            let _guard = interrupt::writing();
+            write_atomically(path, figures.json()?.as_bytes())
+                .map_err(|error| Failure::write(path, &error))?;
+        }
+    }
+    if finished {
+        return Ok(());
+    }
+    Err(Failure::interrupted(format_args!(
+        "stopped: {} of {} measured",
+        count(measured as u64),
+        counted(clip.frames.len(), "frame")
+    )))
+}
+
+/// A bench under way.
+struct Bench<'a> {
+    args: &'a BenchArgs,
+    clip: &'a Clip,
+    session: Session,
+    drawing: Option<Drawing<'a>>,
+    progress: Progress,
+    first: Option<Measured>,
+    frames: Vec<Measured>,
+}
+
+impl<'a> Bench<'a> {
+    fn new(args: &'a BenchArgs, clip: &'a Clip) -> Result<Bench<'a>, Failure> {
+        let drawing = if args.no_pictures { None } else { Some(Drawing::new(args, clip)?) };
+        Ok(Bench {
+            args,
+            clip,
+            // Set up again, and timed, with the first frame.
+            session: clip.session(args.update.strategy)?,
+            drawing,
+            progress: Progress::new(clip.frames.len(), 0, args.clip.quiet),
+            first: None,
+            frames: Vec::new(),
+        })
+    }
+
+    /// Measures frame after frame; whether all were.
+    fn frames(&mut self) -> Result<bool, Failure> {
+        for (k, &frame) in self.clip.frames.iter().enumerate() {
+            if interrupt::requested() {
+                return Ok(false);
+            }
+            let links = self.frames.last().map_or(0, |m| m.report.links);
+            self.progress.start(frame, links, self.session.memory_bytes());
+            if k == 0 {
+                self.first = Some(self.first(frame)?);
+            } else {
+                let next = self.next(k, frame)?;
+                self.frames.push(next);
+            }
+            self.progress.finish_frame();
+        }
+        Ok(true)
+    }
+
+    /// Sets up and solves the first frame.
+    fn first(&mut self, frame: u32) -> Result<Measured, Failure> {
+        let (session, Cold { seconds, report }) =
+            self.build(frame, None, self.args.update.strategy)?;
+        self.session = session;
+        let picture_seconds = self.draw(frame)?;
+        Ok(Measured { seconds, picture_seconds, report, cold: None })
+    }
+
+    /// Follows the motion to a frame, and builds it from scratch where that is asked for: the two in
+    /// turns before and after each other.
+    fn next(&mut self, k: usize, frame: u32) -> Result<Measured, Failure> {
+        let asked = (k - 1).is_multiple_of(self.args.every);
+        let before = k.is_multiple_of(2);
+        let from = self.clip.frames[k - 1];
+        let mut cold = if asked && before { Some(self.cold(frame, from)?) } else { None };
+        let started = now();
+        let report = step(&mut self.session, self.clip, frame)?;
+        let seconds = started.elapsed().as_secs_f64();
+        let picture_seconds = self.draw(frame)?;
+        if asked && !before {
+            cold = Some(self.cold(frame, from)?);
+        }
+        Ok(Measured { seconds, picture_seconds, report, cold })
+    }
+
+    fn cold(&self, frame: u32, from: u32) -> Result<Cold, Failure> {
+        Ok(self.build(frame, Some(from), UpdateFlag::Scratch)?.1)
+    }
+
+    /// A session set up for one frame, with the time that took; dynamic links are counted from
+    /// another.
+    fn build(
+        &self,
+        frame: u32,
+        from: Option<u32>,
+        update: UpdateFlag,
+    ) -> Result<(Session, Cold), Failure> {
+        let started = now();
+        let mut session = self.clip.session(update)?;
+        session.came_from(from.map(|frame| self.clip.time_of(frame)));
+        let report = step(&mut session, self.clip, frame)?;
+        let seconds = started.elapsed().as_secs_f64();
+        Ok((session, Cold { seconds, report }))
+    }
+
+    /// Draws the present frame, if pictures are drawn; the seconds that took.
+    fn draw(&mut self, frame: u32) -> Result<Option<f64>, Failure> {
+        let Some(drawing) = &mut self.drawing else { return Ok(None) };
+        drawing.draw(&self.session, self.clip.time_of(frame)).map(Some)
+    }
+
+    /// What was measured; `None` before the second frame.
+    fn figures(self) -> Option<Figures> {
+        let memory = self.session.memory();
+        let peak = peak_memory_bytes().unwrap_or_else(|| self.session.memory_bytes());
+        let report = &self.frames.last()?.report;
+        let held = Held {
+            pair_bytes: memory.pairs,
+            element_bytes: memory.elements,
+            fixed_bytes: memory.fixed,
+            peak_bytes: peak,
+            pairs: report.pairs.active + report.pairs.refined + report.pairs.culled,
+            elements: report.elements,
+            links: report.links,
+        };
+        let options = self.clip.options(self.args.update.strategy);
+        Some(Figures {
+            sequence: self.clip.scene.name.clone(),
+            tolerance: options.tolerance,
+            oracle: self.args.clip.oracle.to_string(),
+            update: self.args.update.strategy.name(),
+            threads: self.clip.threads,
+            first: self.first?,
+            frames: self.frames,
+            held,
+        })
+    }
+}
+
+fn step(session: &mut Session, clip: &Clip, frame: u32) -> Result<FrameReport, Failure> {
+    session.step(frame, clip.time_of(frame)).map_err(|error| step_failure(error, ""))
+}
+
+/// Pictures that are drawn and thrown away.
+struct Drawing<'a> {
+    args: &'a BenchArgs,
+    clip: &'a Clip,
+    camera: Viewpoint,
+    /// Chosen at the first picture where the flags say `auto`.
+    exposure: Option<Exposure>,
+}
+
+impl<'a> Drawing<'a> {
+    fn new(args: &'a BenchArgs, clip: &'a Clip) -> Result<Drawing<'a>, Failure> {
+        let camera = Viewpoint::new(&clip.scene, args.picture.camera.as_deref());
+        let exposure = match args.picture.exposure {
+            ExposureFlag::Auto => None,
+            ExposureFlag::Stops(stops) => Some(fixed(stops)),
+        };
+        Ok(Drawing { args, clip, camera: camera.map_err(Failure::new)?, exposure })
+    }
+
+    /// Seconds from the solution to the pixels.
+    fn draw(&mut self, session: &Session, time_s: f64) -> Result<f64, Failure> {
+        let view = self.camera.at(&self.clip.scene, time_s).map_err(Failure::new)?;
+        let automatic = || Exposure::automatic(&session.snapshot(), &view);
+        let exposure = *self.exposure.get_or_insert_with(automatic);
+        let shading = self.args.picture.shading.unwrap_or(self.clip.shading);
+        let settings = clip::picture_settings(&self.args.picture, shading, exposure);
+        let started = now();
+        let image = picture::render(&session.snapshot(), &view, &settings);
+        let seconds = started.elapsed().as_secs_f64();
+        drop(image);
+        Ok(seconds)
+    }
+}

@@ -1,0 +1,191 @@
+//! A clip to be solved: its scene, its frames and the options, as every command that solves reads
+//! them from the command line. Knows nothing of what becomes of the frames.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use indicatif::HumanBytes;
+use relume::scene::Scene;
+use relume::session::{Options, Oracle, Session, SessionError, Update};
+use relume_picture::picture::{self, Exposure, Settings};
+
+use crate::args::{
+    ClipFlags, DemoScene, OracleFlag, PictureFlags, Shading, SourceFlags, UpdateFlag,
+};
+use crate::demo;
+use crate::failure::Failure;
+use crate::frames;
+use crate::output::{count, counted};
+use crate::scene_file;
+
+/// Default tolerance, relative error of irradiance.
+pub(crate) const TOLERANCE: f64 = 0.02;
+
+/// Share of the scene's area below which the form-factor oracle does not refine, unless it is told
+/// an area. A share, so that a scene in other units gives the same elements; with it a closed cube
+/// has at most 6 x 4^5 elements, about as many as the paper draws.
+const MIN_AREA_SHARE: f64 = 1.0 / 5_000.0;
+
+/// A scene with the frames asked for.
+pub(crate) struct Clip {
+    /// The scene.
+    pub(crate) scene: Arc<Scene>,
+    /// Frames to solve, ascending, each once; never empty.
+    pub(crate) frames: Vec<u32>,
+    /// Threads in use.
+    pub(crate) threads: usize,
+    /// How finely it is solved.
+    pub(crate) tolerance: f64,
+    /// How its pictures are shaded, unless the user says.
+    pub(crate) shading: Shading,
+    flags: ClipFlags,
+}
+
+impl Clip {
+    /// The clip that a scene file and the flags describe; `tolerance` where the flags give none.
+    ///
+    /// Sets the threads of the process: before anything runs in parallel, as choosing a view does.
+    pub(crate) fn of_file(path: &Path, flags: &ClipFlags, tolerance: f64) -> Result<Clip, Failure> {
+        let threads = use_threads(flags.threads)?;
+        let scene = scene_file::load(path, &flags.animation)?;
+        Clip::of_scene(scene, flags, threads, tolerance)
+    }
+
+    /// The clip of a scene file or of a demonstration.
+    pub(crate) fn open(source: &SourceFlags, flags: &ClipFlags) -> Result<Clip, Failure> {
+        match (&source.scene, source.demo) {
+            (Some(path), _) => Clip::of_file(path, flags, TOLERANCE),
+            (None, Some(demo)) => Clip::of_demo(demo, flags),
+            (None, None) => {
+                Err(Failure::usage("there is no scene").help("name a .glb or .gltf file"))
+            }
+        }
+    }
+
+    fn of_demo(name: DemoScene, flags: &ClipFlags) -> Result<Clip, Failure> {
+        if flags.animation.name.is_some() {
+            return Err(Failure::usage("the demonstrations have one animation, without a name")
+                .help("leave out --animation"));
+        }
+        let threads = use_threads(flags.threads)?;
+        let demo = demo::demo(name);
+        let scene = (demo.build)().map_err(scene_file::failure)?;
+        let clip = Clip::of_scene(scene, flags, threads, demo.tolerance)?;
+        Ok(Clip { shading: demo.shading, ..clip })
+    }
+
+    fn of_scene(
+        scene: Scene,
+        flags: &ClipFlags,
+        threads: usize,
+        tolerance: f64,
+    ) -> Result<Clip, Failure> {
+        let frames = frames::resolve(flags.frames.as_ref(), scene.motion.duration_s, flags.fps)
+            .map_err(|error| Failure::new(error).help("`relume info` lists the frames"))?;
+        Ok(Clip {
+            scene: Arc::new(scene),
+            frames,
+            threads,
+            tolerance: flags.tolerance.unwrap_or(tolerance),
+            shading: Shading::Gouraud,
+            flags: flags.clone(),
+        })
+    }
+
+    /// Says on stderr what is doubtful about the scene, unless the user wants quiet.
+    pub(crate) fn warn(&self) {
+        if !self.flags.quiet {
+            scene_file::warn(&self.scene);
+        }
+    }
+
+    /// Time of a frame, seconds.
+    pub(crate) fn time_of(&self, frame: u32) -> f64 {
+        frames::time_of(frame, self.flags.fps)
+    }
+
+    /// What the engine is asked for.
+    pub(crate) fn options(&self, update: UpdateFlag) -> Options {
+        let oracle = match self.flags.oracle {
+            OracleFlag::Error => Oracle::Error,
+            OracleFlag::FormFactor { epsilon, min_area_m2 } => Oracle::FormFactor {
+                epsilon,
+                min_area_m2: min_area_m2.unwrap_or(self.scene.area_m2() * MIN_AREA_SHARE),
+            },
+        };
+        let update = match update {
+            UpdateFlag::Reinspect => Update::Reinspect,
+            UpdateFlag::Scratch => Update::Scratch,
+        };
+        Options {
+            tolerance: self.tolerance,
+            oracle,
+            update,
+            max_memory_bytes: self.flags.max_memory.map(|memory| memory.bytes),
+        }
+    }
+
+    /// A session that has solved nothing yet.
+    pub(crate) fn session(&self, update: UpdateFlag) -> Result<Session, Failure> {
+        Session::new(Arc::clone(&self.scene), self.options(update)).map_err(Failure::new)
+    }
+}
+
+/// The message of a step that failed; `kept` says what stays of the frames before it, if anything.
+pub(crate) fn step_failure(error: SessionError, kept: &str) -> Failure {
+    match error {
+        SessionError::OutOfMemory { frame, tolerance, limit_bytes, links } => {
+            let separator = if kept.is_empty() { "" } else { "; " };
+            Failure::new(format_args!(
+                "frame {frame} at tolerance {tolerance} needs more than the {} of memory \
+                 allowed ({} pairs so far)",
+                HumanBytes(limit_bytes),
+                count(links)
+            ))
+            .help(format_args!("raise --max-memory or the tolerance{separator}{kept}"))
+        }
+        other if kept.is_empty() => Failure::new(other),
+        other => Failure::new(other).help(kept),
+    }
+}
+
+/// How a picture is drawn.
+pub(crate) fn picture_settings(
+    flags: &PictureFlags,
+    shading: Shading,
+    exposure: Exposure,
+) -> Settings {
+    Settings {
+        width: flags.size.width,
+        height: flags.size.height,
+        shading: match shading {
+            Shading::Flat => picture::Shading::Flat,
+            Shading::Gouraud => picture::Shading::Gouraud,
+        },
+        exposure,
+        mesh: flags.mesh,
+        ..Settings::default()
+    }
+}
+
+/// Display value = radiance (W/m2/sr) x 2^EV.
+pub(crate) fn fixed(stops: f64) -> Exposure {
+    Exposure::Fixed(stops.exp2())
+}
+
+/// Wall-clock time, for summaries and measurements; no result of the engine uses it.
+pub(crate) fn now() -> Instant {
+    Instant::now()
+}
+
+/// Sets the number of threads of the process; the number in use.
+fn use_threads(threads: Option<usize>) -> Result<usize, Failure> {
+    if let Some(threads) = threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(|error| {
+            Failure::new(format_args!("cannot start {}: {error}", counted(threads, "thread")))
+                .help("ask for fewer with --threads")
+        })?;
+    }
+    Ok(rayon::current_num_threads())
+}

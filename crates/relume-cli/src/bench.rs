@@ -74,7 +74,7 @@ impl<'a> Bench<'a> {
             args,
             clip,
             // Set up again, and timed, with the first frame.
-            session: clip.session(args.update.strategy)?,
+            session: clip.session(args.update.strategy, false)?,
             drawing,
             progress: Progress::new(clip.frames.len(), 0, args.clip.quiet),
             first: None,
@@ -140,7 +140,7 @@ impl<'a> Bench<'a> {
         update: UpdateFlag,
     ) -> Result<(Session, Cold), Failure> {
         let started = now();
-        let mut session = self.clip.session(update)?;
+        let mut session = self.clip.session(update, false)?;
         session.came_from(from.map(|frame| self.clip.time_of(frame)));
         let report = step(&mut session, self.clip, frame)?;
         let seconds = started.elapsed().as_secs_f64();
@@ -167,7 +167,7 @@ impl<'a> Bench<'a> {
             elements: report.elements,
             links: report.links,
         };
-        let options = self.clip.options(self.args.update.strategy);
+        let options = self.clip.options(self.args.update.strategy, false);
         Some(Figures {
             sequence: self.clip.scene.name.clone(),
             tolerance: options.tolerance,

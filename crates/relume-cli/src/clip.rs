@@ -106,7 +106,7 @@ impl Clip {
     }
 
     /// What the engine is asked for.
-    pub(crate) fn options(&self, update: UpdateFlag) -> Options {
+    pub(crate) fn options(&self, update: UpdateFlag, balance: bool) -> Options {
         let oracle = match self.flags.oracle {
             OracleFlag::Error => Oracle::Error,
             OracleFlag::FormFactor { epsilon, min_area_m2 } => Oracle::FormFactor {
@@ -122,13 +122,15 @@ impl Clip {
             tolerance: self.tolerance,
             oracle,
             update,
+            balance,
             max_memory_bytes: self.flags.max_memory.map(|memory| memory.bytes),
         }
     }
 
-    /// A session that has solved nothing yet.
-    pub(crate) fn session(&self, update: UpdateFlag) -> Result<Session, Failure> {
-        Session::new(Arc::clone(&self.scene), self.options(update)).map_err(Failure::new)
+    /// A session that has solved nothing yet; `balance` says whether its reports hold row sums and
+    /// energies.
+    pub(crate) fn session(&self, update: UpdateFlag, balance: bool) -> Result<Session, Failure> {
+        Session::new(Arc::clone(&self.scene), self.options(update, balance)).map_err(Failure::new)
     }
 }
 

@@ -115,7 +115,7 @@ impl Job {
         if !self.quiet() {
             self.warn_of_old_pictures(wanted, &report);
         }
-        let session = clip.session(self.solve.update.strategy)?;
+        let session = clip.session(self.solve.update.strategy, true)?;
         let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.quiet());
         let mut run = Run { job: &self, session, camera, report, progress, links: 0 };
         let outcome = run.frames(wanted, &pending);

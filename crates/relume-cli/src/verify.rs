@@ -18,8 +18,8 @@ pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
     let clip = Clip::open(&args.source, &args.clip)?;
     clip.warn();
     let mut sides = Sides {
-        warm: clip.session(UpdateFlag::Reinspect)?,
-        cold: clip.session(UpdateFlag::Scratch)?,
+        warm: clip.session(UpdateFlag::Reinspect, false)?,
+        cold: clip.session(UpdateFlag::Scratch, false)?,
     };
     let progress = Progress::new(clip.frames.len(), 0, args.clip.quiet);
     let outcome = sides.frames(&clip, &progress, args.clip.quiet);

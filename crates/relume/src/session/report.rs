@@ -55,8 +55,10 @@ pub struct FrameReport {
     /// Largest change of radiosity that the last sweep left undone, relative to the mean radiosity.
     pub residual: f64,
     /// How far the row sums of the form factors are from 1, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub row_sum_error: Option<RowSumError>,
     /// Where the flux goes, summed over the three channels, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub energy: Option<Energy>,
     /// Hash over the active pairs with their exchange areas and visibilities, in key order.
     pub hash: String,

@@ -328,7 +328,7 @@ impl Radiosity {
         for batch in 0..work.batches.len() {
             let mut now = work.take(surfaces, batch);
             self.gather(surfaces, links, &now.receivers, &mut scratch.gathered);
-            let way = if work.all { None } else { Some(&*work.way.mark(surfaces, &now)) };
+            let way = if work.all { None } else { Some(work.way.mark(surfaces, &now)) };
             self.settle(surfaces, &now.facets, (limit, way), &mut scratch.settled);
             for settled in &scratch.settled[..now.facets.len()] {
                 small = small.max(settled.small);

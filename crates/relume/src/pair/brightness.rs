@@ -2,6 +2,8 @@
 
 use crate::element::{ElementId, Forest};
 
+use super::margin::Shift;
+
 /// What the oracle may know about the light of one coarse element; W/m2, mean of the channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
@@ -50,10 +52,10 @@ impl Brightness {
         forest.coarse(id).map_or(Light::UNIFORM, |c| self.coarse[c])
     }
 
-    /// Which coarse elements, by number, have another brightness than in `other`.
-    pub fn differences(&self, other: &Brightness) -> Vec<bool> {
-        let of = |k: usize| other.coarse.get(k);
-        (0..self.coarse.len()).map(|k| of(k) != self.coarse.get(k)).collect()
+    /// How the light of each coarse element, by number, changed since `before`, if it did.
+    pub fn shifts(&self, before: &Brightness) -> Vec<Option<Shift>> {
+        let pairs = before.coarse.iter().zip(&self.coarse);
+        pairs.map(|(before, after)| Shift::between(before, after)).collect()
     }
 
     /// Area at which an element weighs 1 in the error norm, m2.

@@ -14,6 +14,7 @@ use crate::transport::{
 
 use super::brightness::Brightness;
 use super::hash::pair_key;
+use super::margin::Margin;
 use super::oracle::{End, Oracle, Side, estimate};
 use super::since::Since;
 use super::tree::{Carried, CullReason, Gradients};
@@ -88,6 +89,20 @@ impl Judge for Placed<'_> {
         }
     }
 
+    fn withstands(
+        &self,
+        a: ElementId,
+        b: ElementId,
+        is_link: bool,
+        margin: Margin,
+    ) -> Option<Margin> {
+        let (least, most) = self.since?.growth(self.forest, a, b);
+        // Of a link the error must not grow; of a refined pair it must not shrink, and its sides must
+        // keep their order.
+        let error = Margin::less(margin.error, if is_link { most } else { -least })?;
+        Some(Margin { error, side: Margin::less(margin.side, most - least)? })
+    }
+
     fn stale(&self, a: ElementId, b: ElementId) -> Stale {
         let Some(since) = self.since else { return Stale::Moved };
         let brightness = match self.stage {
@@ -108,7 +123,7 @@ impl Judge for Placed<'_> {
 
 /// A verdict of which the numbers do not matter.
 fn passing(verdict: Verdict, segments: u32) -> Judgement {
-    Judgement { verdict, carried: Carried::default(), segments }
+    Judgement { verdict, carried: Carried::default(), margin: Margin::FIRM, segments }
 }
 
 fn culled(reason: CullReason) -> Judgement {
@@ -128,7 +143,7 @@ fn carrying(
     );
     let visibility = (v.value * 65_535.0).round() as u16;
     let carried = Carried { exchange_area_m2: x.area_m2 as f32, visibility, gradients };
-    Judgement { verdict, carried, segments: v.segments }
+    Judgement { verdict, carried, margin: Margin::FIRM, segments: v.segments }
 }
 
 impl Placed<'_> {
@@ -277,14 +292,19 @@ impl Placed<'_> {
         let end = |id, area| End { area, light: brightness.of(self.forest, id) };
         let ends = (end(a, place_a.area), end(b, place_b.area));
         let e = estimate(&x, &v, (&ends.0, &ends.1), brightness.reference_area_m2());
-        if e.error > threshold
-            && let Some(side) = self.splittable((a, b), e.side(&ends.0, &ends.1))
-        {
-            return passing(Verdict::Refine(side), v.segments);
-        }
         let stake = x.area_m2 / place_a.area.min(place_b.area) / threshold.max(FINEST);
+        let mut margin = Margin::FIRM;
+        if let Some((side, firm)) = self.splittable((a, b), e.side(&ends.0, &ends.1)) {
+            if e.error > threshold {
+                let error = Margin::between(e.error, threshold);
+                let side_margin = if firm { Margin::ENDLESS } else { e.side_margin() };
+                let margin = Margin { error, side: side_margin };
+                return Judgement { margin, ..passing(Verdict::Refine(side), v.segments) };
+            }
+            margin.error = Margin::between(threshold, e.error);
+        }
         let v = self.settle(v, shaft, &blockers, key, stake);
-        carrying(Verdict::Link, &x, &v, (place_a, place_b))
+        Judgement { margin, ..carrying(Verdict::Link, &x, &v, (place_a, place_b)) }
     }
 
     /// A link that is partly blocked is looked at more closely, the more so the larger
@@ -346,10 +366,15 @@ impl Placed<'_> {
         })
     }
 
-    fn splittable(&self, (a, b): (ElementId, ElementId), wish: Side) -> Option<Side> {
-        let order = if wish == Side::A { [Side::A, Side::B] } else { [Side::B, Side::A] };
-        let id = |side| if side == Side::A { a } else { b };
-        order.into_iter().find(|&side| self.forest.can_split(id(side)))
+    /// The side to refine: the one wished for if it can be, else the other; and whether there was no
+    /// choice.
+    fn splittable(&self, (a, b): (ElementId, ElementId), wish: Side) -> Option<(Side, bool)> {
+        match (self.forest.can_split(a), self.forest.can_split(b)) {
+            (true, true) => Some((wish, false)),
+            (true, false) => Some((Side::A, true)),
+            (false, true) => Some((Side::B, true)),
+            (false, false) => None,
+        }
     }
 
     fn judge_light(
@@ -385,6 +410,7 @@ impl Placed<'_> {
         let key = pair_key(self.forest.key(element), self.forest.key(light));
         let segments = place.segments(lamp, &e, key);
         let v = light_visibility(self.simd, &shaft, &blockers, &segments);
+        let mut margin = Margin::FIRM;
         let verdict = match (self.stage, self.oracle) {
             (Stage::Coarse, _) => Verdict::Hold,
             (Stage::Fine(brightness), Oracle::Error { threshold }) => {
@@ -393,7 +419,14 @@ impl Placed<'_> {
                     End { area: 0.0, light: brightness.of(self.forest, light) },
                 );
                 let est = estimate(&x, &v, (&ends.0, &ends.1), brightness.reference_area_m2());
-                self.refine_if(est.error > threshold && self.forest.can_split(element), side)
+                let wanted = est.error > threshold;
+                if self.forest.can_split(element) {
+                    margin.error = match wanted {
+                        true => Margin::between(est.error, threshold),
+                        false => Margin::between(threshold, est.error),
+                    };
+                }
+                self.refine_if(wanted && self.forest.can_split(element), side)
             }
             (Stage::Fine(_), Oracle::FormFactor { epsilon, min_area_m2 }) => {
                 let uneven = x.over_a.slope.max(v.spread_a) > epsilon;
@@ -401,7 +434,7 @@ impl Placed<'_> {
                 self.refine_if(uneven && room, side)
             }
         };
-        carrying(verdict, &x, &v, (&e, &place.stand_in))
+        Judgement { margin, ..carrying(verdict, &x, &v, (&e, &place.stand_in)) }
     }
 
     fn refine_if(&self, wanted: bool, side: Side) -> Verdict {

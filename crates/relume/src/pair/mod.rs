@@ -6,6 +6,7 @@
 mod brightness;
 mod hash;
 mod judge;
+mod margin;
 mod oracle;
 mod since;
 mod tree;
@@ -14,6 +15,7 @@ mod update;
 pub use brightness::{Brightness, Light};
 pub use hash::{PairHash, pair_key};
 pub use judge::{Placed, Stage};
+pub use margin::{Margin, Shift};
 pub use oracle::{Oracle, Side};
 pub use since::Since;
 pub use tree::{Carried, CullReason, Gradients, Link, PairId, PairTree, State, StateCounts};

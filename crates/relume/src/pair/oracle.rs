@@ -3,6 +3,7 @@
 use crate::transport::{Exchange, SEGMENTS, Variation, Visibility};
 
 use super::brightness::Light;
+use super::margin::Margin;
 
 /// What decides on a pair of elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,6 +52,12 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
+    /// How far the better side is ahead.
+    pub(super) fn side_margin(&self) -> u16 {
+        let (one, two) = self.mends;
+        Margin::between(one.max(two), one.min(two))
+    }
+
     pub(super) fn side(&self, a: &End, b: &End) -> Side {
         let (one, two) = self.mends;
         if one > two || (one == two && a.area >= b.area) { Side::A } else { Side::B }

@@ -5,6 +5,7 @@ use crate::scene::{BodyId, LightKind, PatchId, Scene};
 use crate::transport::Shaft;
 
 use super::judge::{BoxShaft, LightPlace, body_of};
+use super::margin::Shift;
 use super::update::Stale;
 
 /// How much of a node of the forest's fixed part has moved, appeared or vanished.
@@ -23,8 +24,8 @@ pub struct Since<'a> {
     old: &'a WorldView,
     motion: Vec<Motion>,
     movers: Vec<BodyId>,
-    /// Coarse elements whose brightness changed, by number.
-    dimmed: Vec<bool>,
+    /// How the brightness of coarse elements changed, by number.
+    dimmed: Vec<Option<Shift>>,
     /// Kept nodes above the coarse level with such an element below.
     dimmed_below: Vec<bool>,
 }
@@ -76,10 +77,10 @@ impl<'a> Since<'a> {
         self.motion[Forest::ROOT.0 as usize] == Motion::Still
     }
 
-    /// Adds which coarse elements (by number) changed their brightness.
-    pub fn dim(&mut self, forest: &Forest, coarse: &[u32], dimmed: Vec<bool>) {
+    /// Adds how coarse elements (by number) changed their brightness.
+    pub fn dim(&mut self, forest: &Forest, coarse: &[u32], dimmed: Vec<Option<Shift>>) {
         self.dimmed_below = vec![false; forest.kept_len() as usize];
-        for (&id, _) in coarse.iter().zip(&dimmed).filter(|(_, dimmed)| **dimmed) {
+        for (&id, _) in coarse.iter().zip(&dimmed).filter(|(_, shift)| shift.is_some()) {
             let mut above = forest.parent(ElementId(id));
             while let Some(id) = above {
                 if std::mem::replace(&mut self.dimmed_below[id.0 as usize], true) {
@@ -97,7 +98,7 @@ impl<'a> Since<'a> {
             return Stale::Nothing;
         }
         let dim = |id: ElementId| match forest.coarse(id) {
-            Some(number) => self.dimmed[number],
+            Some(number) => self.dimmed[number].is_some(),
             None => self.dimmed_below[id.0 as usize],
         };
         // Above the coarse level no verdict depends on brightness.
@@ -107,6 +108,14 @@ impl<'a> Since<'a> {
             true if low(a) && low(b) => Stale::Brightness,
             true => Stale::Below,
         }
+    }
+
+    /// By how much the errors of a pair at or below the coarse level grew, at least and at most, in
+    /// the steps of [`Margin`](super::margin::Margin).
+    pub(super) fn growth(&self, forest: &Forest, a: ElementId, b: ElementId) -> (i32, i32) {
+        let shift =
+            |id| forest.coarse(id).and_then(|number| self.dimmed[number]).unwrap_or_default();
+        Shift::of_pair(&shift(a), &shift(b))
     }
 
     /// What the motion means to a pair.

@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use crate::element::ElementId;
 
+use super::margin::Margin;
 use super::oracle::Side;
 
 /// Index of a pair in a [`PairTree`].
@@ -159,7 +160,8 @@ impl Link {
 struct Node {
     a: u32,
     b: u32,
-    /// Of a link X, V and gradients; of a refined pair its first child and their number.
+    /// Of a link X, V (below its margin) and gradients; of a refined pair its first child, their number
+    /// and its margins.
     payload: [u32; 3],
 }
 
@@ -201,7 +203,7 @@ impl Node {
         let Gradients { over_a: [au, av], over_b: [bu, bv] } = carried.gradients;
         self.payload = [
             carried.exchange_area_m2.to_bits(),
-            u32::from(carried.visibility),
+            self.payload[1] & !0xffff | u32::from(carried.visibility),
             u32::from_le_bytes([au, av, bu, bv].map(|g| g as u8)),
         ];
     }
@@ -306,6 +308,32 @@ impl PairTree {
         self.nodes[id.0 as usize].set_carried(carried);
     }
 
+    /// What a pair's verdict withstands.
+    #[inline]
+    pub(super) fn margin(&self, id: PairId) -> Margin {
+        let node = &self.nodes[id.0 as usize];
+        match node.state() {
+            State::Active => {
+                Margin { error: (node.payload[1] >> 16) as u16, side: Margin::ENDLESS }
+            }
+            State::Refined(_) => {
+                let both = node.payload[2];
+                Margin { error: both as u16, side: (both >> 16) as u16 }
+            }
+            _ => Margin::FIRM,
+        }
+    }
+
+    pub(super) fn set_margin(&mut self, id: PairId, margin: Margin) {
+        let node = &mut self.nodes[id.0 as usize];
+        let (error, side) = (u32::from(margin.error), u32::from(margin.side));
+        match node.state() {
+            State::Active => node.payload[1] = error << 16 | node.payload[1] & 0xffff,
+            State::Refined(_) => node.payload[2] = side << 16 | error,
+            _ => {}
+        }
+    }
+
     fn count(&mut self, state: State, by: i64) {
         let slot = match state {
             State::Active => &mut self.counts.active,
@@ -372,9 +400,13 @@ mod tests {
     fn what_a_link_carries_survives_being_packed() {
         let gradients = Gradients { over_a: [-127, 3], over_b: [127, -1] };
         let carried = Carried { exchange_area_m2: 0.123, visibility: 65_535, gradients };
-        let mut node = Node::new(ElementId(1), ElementId(2), State::Active);
-        node.set_carried(&carried);
-        assert_eq!(node.carried(), carried);
+        let mut tree = PairTree::new(ElementId(0));
+        tree.set_state(PairTree::ROOT, State::Active);
+        let margin = Margin { error: 1234, side: Margin::ENDLESS };
+        tree.set_margin(PairTree::ROOT, margin);
+        tree.set_carried(PairTree::ROOT, &carried);
+        assert_eq!(tree.link(PairTree::ROOT).unwrap().carried, carried);
+        assert_eq!(tree.margin(PairTree::ROOT), margin);
         assert_eq!(carried.visibility(), 1.0);
     }
 

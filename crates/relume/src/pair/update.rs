@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use crate::element::{ElementId, ElementKey};
 
 use super::hash::{PairHash, pair_key};
+use super::margin::Margin;
 use super::oracle::Side;
 use super::tree::{Carried, CullReason, PairId, PairTree, State};
 
@@ -36,6 +37,8 @@ pub struct Judgement {
     pub verdict: Verdict,
     /// What the pair carries as a link, or while it is held.
     pub carried: Carried,
+    /// What the verdict withstands.
+    pub margin: Margin,
     /// Visibility segments traced.
     pub segments: u32,
 }
@@ -84,6 +87,16 @@ pub trait Judge: Hierarchy + Sync {
         candidates: &[u32],
         narrowed: &mut Vec<u32>,
     ) -> Judgement;
+
+    /// What is left of the margin of a link (or of a refined pair) after the changes of brightness
+    /// since the last update, if its verdict withstands them.
+    fn withstands(
+        &self,
+        a: ElementId,
+        b: ElementId,
+        is_link: bool,
+        margin: Margin,
+    ) -> Option<Margin>;
 
     /// What may have changed of a pair since the last update.
     fn stale(&self, a: ElementId, b: ElementId) -> Stale;
@@ -270,6 +283,8 @@ enum Look {
     Unaffected,
     /// Look at the children.
     Descend,
+    /// The light changed, the verdict did not; look at the children.
+    Withstands(Margin),
     /// Judged, with the candidates of its children.
     Judged(Judgement, Stale, List),
 }
@@ -285,11 +300,18 @@ fn judge_block<'a, J: Judge>(
         let mut narrowed = Vec::new();
         let look = |item: &Item| {
             let (a, b) = tree.ends(item.pair);
+
             let stale = match tree.state(item.pair) {
                 State::New => Stale::New,
                 _ if fresh.binary_search(&item.pair).is_ok() => Stale::New,
                 _ => judge.stale(a, b),
             };
+            if stale == Stale::Brightness {
+                let is_link = tree.state(item.pair) == State::Active;
+                if let Some(left) = judge.withstands(a, b, is_link, tree.margin(item.pair)) {
+                    return Look::Withstands(left);
+                }
+            }
             match stale {
                 Stale::Nothing => Look::Unaffected,
                 Stale::Below => Look::Descend,
@@ -327,6 +349,11 @@ impl<J: Judge> Editor<'_, J> {
             match look {
                 Look::Unaffected => {}
                 Look::Descend => {
+                    let children = self.tree.children(item.pair);
+                    self.look_at(children, item.list.of(&wave.candidates));
+                }
+                Look::Withstands(margin) => {
+                    self.tree.set_margin(item.pair, *margin);
                     let children = self.tree.children(item.pair);
                     self.look_at(children, item.list.of(&wave.candidates));
                 }
@@ -382,8 +409,11 @@ impl<J: Judge> Editor<'_, J> {
             work.promoted += u64::from(before.is_refined() && wanted == State::Active);
             work.demoted += u64::from(before == State::Active && wanted.is_refined());
             self.leave(pair, before);
-            return self.enter(pair, wanted, found);
+            let children = self.enter(pair, wanted, found);
+            self.tree.set_margin(pair, found.margin);
+            return children;
         }
+        self.tree.set_margin(pair, found.margin);
         match wanted {
             State::Active => self.carry(pair, &found.carried),
             _ => return self.tree.children(pair),

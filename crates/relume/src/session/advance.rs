@@ -142,8 +142,8 @@ impl Session {
         let before = std::mem::take(&mut solved.coarse.brightness);
         solved.coarse.solve(&self.scene, &self.seed, &self.coarse_ids);
         if let Some(since) = since {
-            let dimmed = solved.coarse.brightness.differences(&before);
-            since.dim(&self.seed, &self.coarse_ids, dimmed);
+            let shifts = solved.coarse.brightness.shifts(&before);
+            since.dim(&self.seed, &self.coarse_ids, shifts);
         }
     }
 

@@ -95,7 +95,7 @@ pub(super) fn estimate(
     } else {
         ((v.value * (1.0 - v.value) + 0.02) / f64::from(v.segments)).sqrt() * NOISE
     };
-    let sends = |over: &Variation, spread: f64| (v.value * (over.slope + over.bend)).hypot(spread);
+    let sends = |over: &Variation, spread: f64| length(v.value * (over.slope + over.bend), spread);
     let over = |over: &Variation, edge: f64| Uneven {
         bend: v.value * over.bend,
         edge,
@@ -106,6 +106,11 @@ pub(super) fn estimate(
     let (on_a, by_a, by_b) = one_way(&link, (a, &over_a), (b, &over_b));
     let (on_b, cy_b, cy_a) = one_way(&link, (b, &over_b), (a, &over_a));
     Estimate { error: on_a.max(on_b), mends: (by_a + cy_a, by_b + cy_b) }
+}
+
+/// The hypotenuse; `f64::hypot` is the platform's, and differs from one to another.
+fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
 }
 
 /// What both directions of a link share.
@@ -142,7 +147,7 @@ fn one_way(
     // source does not mend it, so it counts as if the source were as large as the receiver.
     let whole = if source.area > 0.0 { (receiver.area / source.area).max(1.0) } else { 1.0 };
     let edge = EDGE_EMITTED * (radiosity - reflected) + EDGE_REFLECTED * reflected;
-    let uneven = (radiosity * over_receiver.bend).hypot(edge * over_receiver.edge);
+    let uneven = length(radiosity * over_receiver.bend, edge * over_receiver.edge);
     let by_receiver = per_radiosity * uneven * whole;
     let by_source = per_radiosity * reflected * varies * over_source.sends;
     let by_noise = per_radiosity * radiosity * link.noise;

@@ -140,14 +140,17 @@ impl<'a> Since<'a> {
             return Stale::Moved;
         }
         let rides = body.filter(|_| motion(a) == Motion::All);
-        let entered = [self.old, new].iter().any(|view| match (forest.kind(a), forest.kind(b)) {
-            (Kind::Element, Kind::Element) => self.enters(forest, view, (a, b), rides),
-            (Kind::Light, Kind::Element) => self.enters_light(forest, view, a, b),
-            (Kind::Element, Kind::Light) => self.enters_light(forest, view, b, a),
+        let views = [self.old, new];
+        let entered = match (forest.kind(a), forest.kind(b)) {
+            (Kind::Element, Kind::Element) => self.enters(forest, views, (a, b), rides),
+            (Kind::Light, Kind::Element) => self.enters_light(forest, views, a, b),
+            (Kind::Element, Kind::Light) => self.enters_light(forest, views, b, a),
             // Lights have no box: their pairs with groups are looked at always.
             (Kind::Light, _) | (_, Kind::Light) => true,
-            _ => self.meets(forest, &BoxShaft::new(view, forest, (a, b), body), rides),
-        });
+            _ => views
+                .iter()
+                .any(|v| self.meets(forest, &BoxShaft::new(v, forest, (a, b), body), rides)),
+        };
         if entered { Stale::Occlusion } else { Stale::Nothing }
     }
 
@@ -159,45 +162,55 @@ impl<'a> Since<'a> {
         }
     }
 
-    /// Whether a mover stands between two elements.
+    /// Whether a mover stood or stands between two elements.
     fn enters(
         &self,
         forest: &Forest,
-        view: &WorldView,
+        views: [&WorldView; 2],
         (a, b): (ElementId, ElementId),
         rides: Option<BodyId>,
     ) -> bool {
-        let place = |id| WorldElement::new(view, forest, id, false);
         let patch = |id| forest.patch(id).expect("elements have patches");
-        self.stands_in(forest, view, (&place(a), &place(b)), (patch(a), patch(b)), rides)
+        let patches = (patch(a), patch(b));
+        let place = |view, id| WorldElement::new(view, forest, id, false);
+        if rides.is_some() {
+            // Seen from a moving body, everything else moves.
+            return views.iter().any(|view| {
+                let (a, b) = (&place(view, a), &place(view, b));
+                let shaft = Shaft { forest, view, a, b, own: None, patches };
+                shaft.is_entered_by(Forest::ROOT, rides)
+            });
+        }
+        let (a, b) = (&place(views[1], a), &place(views[1], b));
+        self.enter_any(forest, views, (a, b), patches)
     }
 
     fn enters_light(
         &self,
         forest: &Forest,
-        view: &WorldView,
+        views: [&WorldView; 2],
         light: ElementId,
         element: ElementId,
     ) -> bool {
-        let Some(lamp) = forest.light(light).and_then(|l| view.light(l)) else { return false };
-        let e = WorldElement::new(view, forest, element, false);
-        let place = LightPlace::new(lamp, &e, view.far_m());
+        let [_, new] = views;
+        let Some(lamp) = forest.light(light).and_then(|l| new.light(l)) else { return false };
+        let e = WorldElement::new(new, forest, element, false);
+        let place = LightPlace::new(lamp, &e, new.far_m());
         let patch = forest.patch(element).expect("elements have patches");
-        self.stands_in(forest, view, (&e, &place.stand_in), (patch, patch), None)
+        self.enter_any(forest, views, (&e, &place.stand_in), (patch, patch))
     }
 
-    fn stands_in(
+    /// Whether a mover stood or stands between two ends that are at rest.
+    fn enter_any(
         &self,
         forest: &Forest,
-        view: &WorldView,
+        views: [&WorldView; 2],
         (a, b): (&WorldElement, &WorldElement),
         patches: (PatchId, PatchId),
-        rides: Option<BodyId>,
     ) -> bool {
-        let shaft = Shaft { forest, view, a, b, own: None, patches };
-        match rides {
-            Some(_) => shaft.is_entered_by(Forest::ROOT, rides),
-            None => self.movers.iter().any(|&m| shaft.is_entered_by(forest.body_root(m), None)),
-        }
+        views.iter().any(|view| {
+            let shaft = Shaft { forest, view, a, b, own: None, patches };
+            self.movers.iter().any(|&m| shaft.is_entered_by(forest.body_root(m), None))
+        })
     }
 }

@@ -102,10 +102,22 @@ impl Gradients {
     /// The value of one of them, per radius.
     #[inline]
     pub fn value(step: i8) -> f32 {
-        let s = f32::from(step);
-        s * s.abs() * (Gradients::MAX / (127.0 * 127.0))
+        VALUES[usize::from(step as u8)]
     }
 }
+
+/// Values of all steps, by their bits: square, so that they are finer near 0.
+static VALUES: [f32; 256] = {
+    let mut values = [0.0; 256];
+    let mut k = 0;
+    while k < 256 {
+        let s = (k as u8 as i8) as f32;
+        let size = if s < 0.0 { -s } else { s };
+        values[k] = s * size * (Gradients::MAX / (127.0 * 127.0));
+        k += 1;
+    }
+    values
+};
 
 /// What a link carries.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

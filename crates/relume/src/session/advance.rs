@@ -64,8 +64,8 @@ impl Session {
 
         let lit = LitForest::new(&self.scene, &solved.forest).present_in(&solved.view);
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
-        let share = |share: f64| self.options.tolerance * share;
-        let stop = Stop::Residual { all: share(RESIDUAL_SHARE), part: share(FOLLOWED_SHARE) };
+        let share = if cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE };
+        let stop = Stop::Residual(self.options.tolerance * share);
         let lamps = (0..self.scene.lights.len()).any(|k| solved.view.light(k).is_some());
         if lit.is_dark() && !lamps {
             // What is left of earlier light would fade for ever.

@@ -79,11 +79,11 @@ struct Solved {
 /// a receiver's links add up. Measured; see docs/tolerance.md.
 const LINK_SHARE: f64 = 0.25;
 
-/// Residual of the solver relative to the tolerance.
+/// Residual of the solver after a cold build, relative to the tolerance.
 const RESIDUAL_SHARE: f64 = 0.005;
 
-/// Changes of radiosity that are followed where a part of the scene is solved anew, relative to the
-/// tolerance.
+/// The same after an update: a small body that moves changes nearly everything a little, and that
+/// little need not be followed.
 const FOLLOWED_SHARE: f64 = 0.05;
 
 impl Session {

@@ -27,14 +27,6 @@ impl Link {
     pub fn source_gradient(&self) -> [f32; 2] {
         self.over_source.map(Gradients::value)
     }
-
-    /// Both gradients, the receiver's first: in one vector register.
-    #[inline]
-    pub(super) fn both_gradients(&self) -> [f32; 4] {
-        let [ru, rv] = self.over_receiver;
-        let [su, sv] = self.over_source;
-        [ru, rv, su, sv].map(Gradients::value)
-    }
 }
 
 /// Links of one receiver in the pool, with room for the next multiple of four.

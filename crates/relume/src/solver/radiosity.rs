@@ -2,9 +2,11 @@
 
 use std::ops::Range;
 
+use fearless_simd::{Simd, dispatch, f32x4, prelude::*};
 use rayon::prelude::*;
 
 use crate::element::ElementId;
+use crate::transport;
 
 use super::links::{Link, Links};
 
@@ -58,13 +60,7 @@ pub enum Stop {
     /// After exactly this many sweeps.
     Sweeps(u32),
     /// When no element's radiosity would change by more than this, relative to the mean radiosity.
-    Residual {
-        /// In sweeps over everything.
-        all: f64,
-        /// Where only a part is solved anew: a small body that moves changes nearly everything a
-        /// little, and that little need not be followed.
-        part: f64,
-    },
+    Residual(f64),
 }
 
 /// Which receivers to gather anew to begin with.
@@ -97,7 +93,7 @@ struct Field(Vec<f32>);
 /// Numbers of one element.
 const NINE: usize = 9;
 
-/// Numbers beyond the last element that [`Field::lanes`] may read.
+/// Numbers beyond the last element that [`Field::with_next`] may read.
 const BEYOND: usize = 1;
 
 impl Default for Field {
@@ -134,13 +130,10 @@ impl Field {
         self.0[at..at + NINE].copy_from_slice(&[r, g, b, ur, ug, ub, vr, vg, vb]);
     }
 
-    /// Mean and both gradients, each with the number that follows it.
-    #[inline]
-    fn lanes(&self, id: u32) -> [[f32; 4]; 3] {
-        let at = id as usize * NINE;
-        let all = self.0[at..].first_chunk::<10>().expect("an element");
-        let four = |k: usize| [all[k], all[k + 1], all[k + 2], all[k + 3]];
-        [four(0), four(3), four(6)]
+    /// The nine numbers of an element, and the one after them.
+    #[inline(always)]
+    fn with_next(&self, id: u32) -> &[f32; NINE + BEYOND] {
+        self.0[id as usize * NINE..].first_chunk().expect("an element")
     }
 
     fn bytes(&self) -> u64 {
@@ -282,12 +275,12 @@ impl Radiosity {
             let mean = self.mean(surfaces);
             let limit = match stop {
                 Stop::Sweeps(_) => 0.0,
-                Stop::Residual { all, part } => ((if work.all { all } else { part }) * mean) as f32,
+                Stop::Residual(limit) => (limit * mean) as f32,
             };
             if work.all {
                 jump.before(&self.radiosity);
             }
-            if !work.all && self.held > HELD_MAX * limit && matches!(stop, Stop::Residual { .. }) {
+            if !work.all && self.held > HELD_MAX * limit && matches!(stop, Stop::Residual(_)) {
                 // What was little beside a brighter scene is too much beside this one.
                 work.start_all(surfaces);
                 continue;
@@ -303,12 +296,12 @@ impl Radiosity {
             self.sweeps += 1;
             let done = match stop {
                 Stop::Sweeps(count) => self.sweeps >= count,
-                Stop::Residual { .. } => !work.is_left(surfaces, links, limit, &mut self.pending),
+                Stop::Residual(_) => !work.is_left(surfaces, links, limit, &mut self.pending),
             };
             if done || self.sweeps >= SWEEPS_MAX {
                 return;
             }
-            if work.all && matches!(stop, Stop::Residual { .. }) {
+            if work.all && matches!(stop, Stop::Residual(_)) {
                 jump.after(&mut self.radiosity);
             }
         }
@@ -375,19 +368,17 @@ impl Radiosity {
         self.gathers += receivers.len() as u64;
         receivers.iter().for_each(|&id| self.pending[id as usize] = 0.0);
         let Radiosity { radiosity, gathered, .. } = self;
-        let one = |id: u32| match links.of(id) {
-            [] => Linear::default(),
-            list => gather_one(radiosity, list, 1.0 / surfaces.place(id).radius),
+        found.resize(found.len().max(receivers.len()), Linear::default());
+        let level = transport::Simd::detect().level();
+        let gather = |ids: &[u32], out: &mut [Linear]| {
+            dispatch!(level, simd => gather_some(simd, (radiosity, links), surfaces, ids, out));
         };
         if receivers.len() <= CHUNK {
-            receivers.iter().for_each(|&id| gathered.set(id, &one(id)));
-            return;
+            gather(receivers, found);
+        } else {
+            let chunks = receivers.par_chunks(CHUNK).zip(found.par_chunks_mut(CHUNK));
+            chunks.for_each(|(ids, out)| gather(ids, out));
         }
-        found.resize(found.len().max(receivers.len()), Linear::default());
-        let chunks = receivers.par_chunks(CHUNK).zip(found.par_chunks_mut(CHUNK));
-        chunks.for_each(|(ids, out)| {
-            ids.iter().zip(out).for_each(|(&id, h)| *h = one(id));
-        });
         for (&id, h) in receivers.iter().zip(found.iter()) {
             gathered.set(id, h);
         }
@@ -866,23 +857,46 @@ impl Fit {
     }
 }
 
-/// Everything one receiver gathers; in the order of its links.
+/// Everything some receivers gather; each in the order of its links.
+#[inline(always)]
+fn gather_some<S: Simd>(
+    simd: S,
+    (radiosity, links): (&Field, &Links),
+    surfaces: &impl Surfaces,
+    receivers: &[u32],
+    out: &mut [Linear],
+) {
+    for (&id, h) in receivers.iter().zip(out) {
+        *h = match links.of(id) {
+            [] => Linear::default(),
+            list => gather_one(simd, radiosity, list, 1.0 / surfaces.place(id).radius),
+        };
+    }
+}
+
+/// Everything one receiver gathers.
 ///
 /// Four lanes at a time: red, green, blue and one of no meaning, the number next in memory.
-#[inline]
-fn gather_one(radiosity: &Field, list: &[Link], per_radius: f32) -> Linear {
-    let [mut mean, mut gx, mut gy] = [[0.0_f32; 4]; 3];
+#[inline(always)]
+fn gather_one<S: Simd>(simd: S, radiosity: &Field, list: &[Link], per_radius: f32) -> Linear {
+    let zero = f32x4::splat(simd, 0.0);
+    let (mut mean, mut gx, mut gy) = (zero, zero, zero);
     for link in list {
-        let [m, u, v] = radiosity.lanes(link.source);
-        let [ru, rv, su, sv] = link.both_gradients().map(|g| g * link.coupling);
-        let (su, sv) = (su * SOURCE_MOMENT, sv * SOURCE_MOMENT);
-        for c in 0..4 {
-            mean[c] += link.coupling * m[c] + (su * u[c] + sv * v[c]);
-            gx[c] += ru * m[c];
-            gy[c] += rv * m[c];
-        }
+        let near = radiosity.with_next(link.source);
+        let lanes = |at: usize| f32x4::from_slice(simd, &near[at..at + 4]);
+        let arriving = lanes(0) * link.coupling;
+        let [su, sv] = link.source_gradient();
+        let uneven = lanes(3) * su + lanes(6) * sv;
+        mean += arriving + uneven * (link.coupling * SOURCE_MOMENT);
+        let [ru, rv] = link.receiver_gradient();
+        gx += arriving * ru;
+        gy += arriving * rv;
     }
-    let three = |lanes: [f32; 4], scale: f32| [0, 1, 2].map(|c| lanes[c] * scale);
+    let three = |lanes: f32x4<S>, scale: f32| {
+        let mut all = [0.0; 4];
+        (lanes * scale).store_slice(&mut all);
+        [all[0], all[1], all[2]]
+    };
     Linear { mean: three(mean, 1.0), gradient: [three(gx, per_radius), three(gy, per_radius)] }
 }
 
@@ -924,7 +938,7 @@ mod tests {
         }
     }
 
-    const STOP: Stop = Stop::Residual { all: 1e-7, part: 1e-7 };
+    const STOP: Stop = Stop::Residual(1e-7);
 
     fn plates() -> (Plates, Links) {
         let lit = Lit { reflectance: [0.5, 0.8, 0.0], exitance: [1.0, 2.0, 3.0] };

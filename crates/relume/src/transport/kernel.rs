@@ -21,7 +21,7 @@ impl Simd {
 
     /// The level, for `dispatch!`.
     #[inline]
-    pub(super) fn level(self) -> Level {
+    pub(crate) fn level(self) -> Level {
         self.0
     }
 }

@@ -6,6 +6,8 @@ use glam::{DQuat, DVec3};
 use relume::scene::{MaterialId, NodeId, SceneBuilder};
 use relume::session::Oracle;
 
+pub(crate) mod cells;
+
 /// The paper's oracle.
 pub(crate) fn form_factor(epsilon: f64, min_area_m2: f64) -> Oracle {
     Oracle::FormFactor { epsilon, min_area_m2 }

@@ -9,12 +9,15 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::{DQuat, DVec3};
-use relume::scene::{MaterialId, NodeId, Scene, SceneBuilder};
+use relume::scene::Scene;
 use relume::session::{FrameReport, Options, Oracle, Session};
 
+mod common;
+
+use common::{form_factor, furnished_room, pool};
+
 fn main() {
-    let scene = Arc::new(furnished_room());
+    let scene = Arc::new(furnished_room().build().expect("a valid scene"));
     println!(
         "furnished room: {} patches, {:.1} m2, times of the best of three",
         scene.patches.len(),
@@ -48,12 +51,8 @@ fn main() {
     }
 }
 
-fn form_factor(epsilon: f64, min_area_m2: f64) -> Oracle {
-    Oracle::FormFactor { epsilon, min_area_m2 }
-}
-
 fn run(name: &str, scene: &Arc<Scene>, options: &Options, threads: usize) {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+    let pool = pool(threads);
     let mut best: Option<(f64, FrameReport, u64)> = None;
     for _ in 0..3 {
         let mut session = Session::new(Arc::clone(scene), options.clone()).expect("options");
@@ -77,43 +76,4 @@ fn run(name: &str, scene: &Arc<Scene>, options: &Options, threads: usize) {
         share(r.seconds.solve),
         bytes as f64 / r.links as f64,
     );
-}
-
-/// A room of 5 x 4 x 2.7 m with four tables of five boxes each, two cabinets and two lamps.
-fn furnished_room() -> Scene {
-    let mut b = SceneBuilder::new("furnished room");
-    let wall = b.material("wall", [0.7; 3], [0.0; 3]);
-    let wood = b.material("wood", [0.5, 0.35, 0.2], [0.0; 3]);
-    let paint = b.material("paint", [0.3, 0.4, 0.6], [0.0; 3]);
-    let lamp = b.material("lamp", [0.0; 3], [60.0; 3]);
-    let room = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
-    b.cuboid_inward(room, "room", wall, DVec3::ZERO, DVec3::new(5.0, 2.7, 4.0));
-    for k in 0..4 {
-        let at = DVec3::new(1.3 + 2.4 * f64::from(k % 2), 0.0, 1.0 + 1.9 * f64::from(k / 2));
-        let turn = DQuat::from_rotation_y(0.15 * f64::from(k));
-        let node = b.node(&format!("table {k}"), None, at, turn);
-        table(&mut b, node, wood);
-    }
-    for k in 0..2 {
-        let at = DVec3::new(0.35 + 4.3 * f64::from(k), 0.0, 2.0);
-        let node = b.node(&format!("cabinet {k}"), None, at, DQuat::IDENTITY);
-        let (lo, hi) = (DVec3::new(-0.25, 0.01, -0.5), DVec3::new(0.25, 1.8, 0.5));
-        b.cuboid(node, "cabinet", paint, lo, hi);
-        let at = DVec3::new(1.5 + 2.0 * f64::from(k), 2.6, 2.0);
-        let node = b.node(&format!("lamp {k}"), None, at, DQuat::IDENTITY);
-        let c = |x: f64, z: f64| DVec3::new(x, 0.0, z);
-        let corners = [c(-0.3, -0.3), c(0.3, -0.3), c(0.3, 0.3), c(-0.3, 0.3)];
-        b.polygon(node, "lamp", lamp, &corners);
-    }
-    b.build().expect("a valid scene")
-}
-
-fn table(b: &mut SceneBuilder, node: NodeId, wood: MaterialId) {
-    let (lo, hi) = (DVec3::new(-0.7, 0.72, -0.4), DVec3::new(0.7, 0.76, 0.4));
-    b.cuboid(node, "top", wood, lo, hi);
-    for (x, z) in [(-0.65, -0.35), (0.65, -0.35), (0.65, 0.35), (-0.65, 0.35)] {
-        let half = DVec3::new(0.03, 0.0, 0.03);
-        let foot = DVec3::new(x, 0.01, z);
-        b.cuboid(node, "leg", wood, foot - half, DVec3::new(x, 0.72, z) + half);
-    }
 }

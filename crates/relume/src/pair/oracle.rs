@@ -70,7 +70,7 @@ const EDGE_EMITTED: f64 = 0.1;
 
 /// The same for reflected light: where something nearly touches a receiver, it hides many sources
 /// along the same edge, and their errors have one sign.
-const EDGE_REFLECTED: f64 = 0.4;
+const EDGE_REFLECTED: f64 = 2.0;
 
 /// Weight of the sampling error of V: it is independent from link to link and averages out.
 const NOISE: f64 = 0.2;

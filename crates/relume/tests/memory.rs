@@ -56,12 +56,12 @@ fn check(what: &str, scene: Scene, options: Options, frames: usize) {
 
 #[test]
 fn furnished_room_by_the_error_oracle() {
-    check("furnished, error", furnished_room(), at_tolerance(0.1), 40);
+    check("furnished, error", furnished_room(), at_tolerance(0.1), 12);
 }
 
 #[test]
 fn furnished_room_by_form_factors() {
-    check("furnished, form factors", furnished_room(), form_factor_oracle(0.05, 4e-3), 40);
+    check("furnished, form factors", furnished_room(), form_factor_oracle(0.05, 4e-3), 12);
 }
 
 #[test]

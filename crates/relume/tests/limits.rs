@@ -85,7 +85,7 @@ fn tight(scene: &Arc<Scene>) -> Options {
         s.memory_bytes()
     };
     let (few, many) = (held(0.0), held(1.0));
-    assert!(many > 3 * few, "{few} {many}");
+    assert!(2 * many > 5 * few, "{few} {many}");
     Options { max_memory_bytes: Some(2 * few), ..at_tolerance(0.2) }
 }
 

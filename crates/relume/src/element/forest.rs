@@ -1,6 +1,7 @@
 //! The forest itself: a pool of nodes, the fixed part (down to facets) first.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
@@ -37,24 +38,67 @@ pub struct ElementKey {
     pub path: u32,
 }
 
-/// 44 bytes.
+/// What differs between siblings: 20 bytes.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     /// Where an element lies within its facet.
     place: Place,
-    parent: u32,
-    first_child: u32,
-    facet: u32,
-    path: u32,
-    coarse: u32,
-    /// Pairs that are refined on this element.
-    users: u32,
+    fan: Fan,
     area_m2: f32,
-    child_count: u16,
-    kind: Kind,
+}
+
+/// What two siblings have in common; a node of the fixed part has one of its own. 20 bytes.
+#[derive(Clone, Copy, Debug)]
+struct Twins {
+    parent: u32,
+    facet: u32,
+    /// Path of the first of them; that of the other is one more.
+    path: u32,
+    /// Coarse element that they are a part of.
+    coarse: u32,
+    /// Pairs that are refined on the parent; kept where its first two children are.
+    users: u32,
+}
+
+/// The children of a node in 32 bits: the first one's id, and their number in the two highest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Fan(u32);
+
+impl Fan {
+    const SHIFT: u32 = 30;
+    const LEAF: Fan = Fan(0);
+    /// In the fixed part: as many children as [`Fixed::child_counts`] says. Beyond it: no node.
+    const OTHER: Fan = Fan(3 << Fan::SHIFT);
+
+    /// Two or four children.
+    fn new(first: u32, count: usize) -> Fan {
+        debug_assert!(first >> Fan::SHIFT == 0, "more than 2^30 elements");
+        Fan(first | (count as u32 / 2) << Fan::SHIFT)
+    }
+
+    fn other(first: u32) -> Fan {
+        Fan(first | Fan::OTHER.0)
+    }
+
+    fn is_other(self) -> bool {
+        self.0 >= Fan::OTHER.0
+    }
+
+    fn first(self) -> u32 {
+        self.0 & !Fan::OTHER.0
+    }
+
+    /// The children of anything but [`Fan::other`].
+    fn range(self) -> Range<u32> {
+        let count = (self.0 >> Fan::SHIFT) * 2;
+        self.first()..self.first() + count
+    }
 }
 
 const NONE: u32 = u32::MAX;
+
+/// Vectors of the forest are given room for this share more than they need.
+const SLACK: usize = 32;
 
 /// Levels that a path has room for.
 const LEVELS_MAX: u32 = 15;
@@ -67,16 +111,13 @@ const LEVELS_MAX: u32 = 15;
 #[derive(Clone, Debug)]
 pub struct Forest {
     nodes: Vec<Node>,
+    /// One for each node of the fixed part, then one for every two.
+    twins: Vec<Twins>,
     fixed_len: u32,
     /// Elements with ids below this are never reaped.
     kept_len: u32,
-    /// Patch, light or body of each node of the fixed part; `NONE` for groups of bodies.
-    subjects: Vec<u32>,
-    /// Geometry of each facet, by id; of no meaning for the rest of the fixed part.
-    charts: Vec<Chart>,
-    patch_roots: Vec<ElementId>,
-    body_roots: Vec<ElementId>,
-    facets: Vec<ElementId>,
+    /// What no split and no motion changes: one copy for all clones.
+    fixed: Arc<Fixed>,
     /// First ids of vacant groups of two and of four.
     vacant: [Vec<u32>; 2],
     /// Elements that lost their last user.
@@ -84,6 +125,42 @@ pub struct Forest {
     /// Elements whose children came or went since [`Forest::take_changed`].
     changed: Vec<ElementId>,
     counts: Counts,
+}
+
+/// What is known of the fixed part alone, by id.
+#[derive(Clone, Debug, Default)]
+struct Fixed {
+    kinds: Vec<Kind>,
+    child_counts: Vec<u16>,
+    /// Patch, light or body of each node; `NONE` for groups of bodies.
+    subjects: Vec<u32>,
+    /// Geometry of each facet; of no meaning for other nodes.
+    charts: Vec<Chart>,
+    /// Numbers of the coarse elements, by id; empty if they have not been numbered.
+    coarse: Vec<u32>,
+    patch_roots: Vec<ElementId>,
+    body_roots: Vec<ElementId>,
+    facets: Vec<ElementId>,
+}
+
+/// Where elements went when the forest was put together: those that stayed keep their order.
+#[derive(Clone, Debug)]
+pub struct Renumbering {
+    new_of: Vec<u32>,
+    old_of: Vec<u32>,
+}
+
+impl Renumbering {
+    /// New id of an element that is still there.
+    #[inline]
+    pub fn new_of(&self, old: u32) -> u32 {
+        self.new_of[old as usize]
+    }
+
+    /// Old ids, by new one.
+    pub fn old_of(&self) -> &[u32] {
+        &self.old_of
+    }
 }
 
 /// How many elements there are.
@@ -100,13 +177,15 @@ impl Forest {
     pub fn new(scene: &Scene) -> Forest {
         let mut forest = Forest {
             nodes: Vec::new(),
-            fixed_len: 0,
-            kept_len: 0,
-            subjects: Vec::new(),
-            charts: Vec::new(),
-            patch_roots: vec![ElementId(NONE); scene.patches.len()],
-            body_roots: vec![ElementId(NONE); scene.bodies.len()],
-            facets: Vec::new(),
+            twins: Vec::new(),
+            // All that is planted here.
+            fixed_len: u32::MAX,
+            kept_len: u32::MAX,
+            fixed: Arc::new(Fixed {
+                patch_roots: vec![ElementId(NONE); scene.patches.len()],
+                body_roots: vec![ElementId(NONE); scene.bodies.len()],
+                ..Fixed::default()
+            }),
             vacant: [Vec::new(), Vec::new()],
             loose: Vec::new(),
             changed: Vec::new(),
@@ -116,18 +195,19 @@ impl Forest {
         let lights = scene.lights.len() as u32;
         let children = u32::from(!scene.patches.is_empty()) + lights;
         forest.push_fixed(Kind::Light, 0, children);
-        forest.nodes[0].first_child = 1;
-        forest.nodes[0].child_count = u16::try_from(children).expect("fewer than 65,536 lights");
+        forest.nodes[0].fan = Fan::other(1);
+        forest.fixed_mut().child_counts[0] =
+            u16::try_from(children).expect("fewer than 65,536 lights");
         let first_light = 1 + children - lights;
         for (light, id) in (first_light..=children).enumerate() {
-            forest.subjects[id as usize] = light as u32;
-            let node = &mut forest.nodes[id as usize];
-            (node.facet, node.path) = (id, 1);
+            forest.fixed_mut().subjects[id as usize] = light as u32;
+            let twins = &mut forest.twins[id as usize];
+            (twins.facet, twins.path) = (id, 1);
         }
         if !scene.patches.is_empty() {
             forest.plant_bodies(scene, 1);
         }
-        forest.facets.sort_unstable();
+        forest.fixed_mut().facets.sort_unstable();
         forest.fixed_len = forest.nodes.len() as u32;
         forest.kept_len = forest.fixed_len;
         forest.sum_areas();
@@ -137,10 +217,18 @@ impl Forest {
     fn push_fixed(&mut self, kind: Kind, parent: u32, count: u32) -> u32 {
         let first = self.nodes.len() as u32;
         let len = self.nodes.len() + count as usize;
-        self.nodes.resize(len, blank(kind, parent));
-        self.subjects.resize(len, NONE);
-        self.charts.resize(len, Chart::of(&Shape { corners: [DVec2::ZERO; 4], len: 4 }));
+        self.nodes.resize(len, Node { fan: Fan::LEAF, ..Node::VACANT });
+        self.twins.resize(len, Twins { parent, ..Twins::VACANT });
+        let fixed = self.fixed_mut();
+        fixed.kinds.resize(len, kind);
+        fixed.child_counts.resize(len, 0);
+        fixed.subjects.resize(len, NONE);
+        fixed.charts.resize(len, Chart::of(&Shape { corners: [DVec2::ZERO; 4], len: 4 }));
         first
+    }
+
+    fn fixed_mut(&mut self) -> &mut Fixed {
+        Arc::make_mut(&mut self.fixed)
     }
 
     fn plant_bodies(&mut self, scene: &Scene, at: u32) {
@@ -155,7 +243,7 @@ impl Forest {
     }
 
     fn plant_body(&mut self, scene: &Scene, body: u32, at: u32) {
-        self.body_roots[body as usize] = ElementId(at);
+        self.fixed_mut().body_roots[body as usize] = ElementId(at);
         let range = scene.bodies[body as usize].patches.clone();
         let boxes: Vec<Aabb> =
             range.clone().map(|p| Aabb::of(scene.patches[p as usize].corners_in_body())).collect();
@@ -164,7 +252,7 @@ impl Forest {
         let child = self.add_children(at, 1);
         self.plant(&tree, 0, child, body, &mut |forest, leaf, id| {
             let patch = range.start + leaf;
-            forest.patch_roots[patch as usize] = ElementId(id);
+            forest.fixed_mut().patch_roots[patch as usize] = ElementId(id);
             forest.plant_polygon(patch, &scene.patches[patch as usize].corners, id);
         });
     }
@@ -192,11 +280,12 @@ impl Forest {
         if corners.len() <= 4 {
             self.set(at, Kind::Element, patch);
             let shape = Shape::new(corners);
-            self.charts[at as usize] = Chart::of(&shape);
-            let node = &mut self.nodes[at as usize];
-            (node.facet, node.path, node.place) = (at, 1, Place::whole(shape.len));
-            node.area_m2 = shape.area() as f32;
-            self.facets.push(ElementId(at));
+            let fixed = self.fixed_mut();
+            fixed.charts[at as usize] = Chart::of(&shape);
+            fixed.facets.push(ElementId(at));
+            self.nodes[at as usize].place = Place::whole(shape.len);
+            let twins = &mut self.twins[at as usize];
+            (twins.facet, twins.path) = (at, 1);
             self.counts.elements += 1;
             self.counts.leaves += 1;
             return;
@@ -209,27 +298,27 @@ impl Forest {
     }
 
     fn set(&mut self, at: u32, kind: Kind, subject: u32) {
-        self.nodes[at as usize].kind = kind;
-        self.subjects[at as usize] = subject;
+        let fixed = self.fixed_mut();
+        fixed.kinds[at as usize] = kind;
+        fixed.subjects[at as usize] = subject;
     }
 
     fn add_children(&mut self, at: u32, count: u16) -> u32 {
         let first = self.push_fixed(Kind::Cluster, at, u32::from(count));
-        let node = &mut self.nodes[at as usize];
-        node.first_child = first;
-        node.child_count = count;
+        self.nodes[at as usize].fan = Fan::other(first);
+        self.fixed_mut().child_counts[at as usize] = count;
         first
     }
 
     fn sum_areas(&mut self) {
         let mut sums = vec![0.0_f64; self.nodes.len()];
         for id in (0..self.nodes.len()).rev() {
-            let node = &self.nodes[id];
-            if node.kind == Kind::Element {
-                sums[id] = self.shape(ElementId(id as u32)).area();
+            let id = ElementId(id as u32);
+            if self.kind(id) == Kind::Element {
+                sums[id.0 as usize] = self.shape(id).area();
             }
-            if node.parent != NONE {
-                sums[node.parent as usize] += sums[id];
+            if let Some(parent) = self.parent(id) {
+                sums[parent.0 as usize] += sums[id.0 as usize];
             }
         }
         for (node, sum) in self.nodes.iter_mut().zip(sums) {
@@ -267,37 +356,76 @@ impl Forest {
 
     /// The quadtree roots, ascending.
     pub fn facets(&self) -> &[ElementId] {
-        &self.facets
+        &self.fixed.facets
     }
 
-    /// Bytes held.
+    /// Bytes held by what clones of this forest do not share.
     pub fn memory_bytes(&self) -> u64 {
-        let fixed = self.charts.capacity() * size_of::<Chart>() + self.subjects.capacity() * 4;
-        let lists = self.vacant.iter().map(Vec::capacity).sum::<usize>() + self.loose.capacity();
-        (self.nodes.capacity() * size_of::<Node>() + fixed + lists * 4) as u64
+        let lists = self.vacant.iter().map(Vec::capacity).sum::<usize>()
+            + self.loose.capacity()
+            + self.changed.capacity();
+        let nodes = self.nodes.capacity() * size_of::<Node>();
+        let twins = self.twins.capacity() * size_of::<Twins>();
+        (nodes + twins + lists * 4) as u64
+    }
+
+    /// Bytes held once by all clones of this forest: none of them grows when elements are split.
+    pub fn shared_bytes(&self) -> u64 {
+        let f = &self.fixed;
+        let ids = f.subjects.capacity()
+            + f.coarse.capacity()
+            + f.patch_roots.capacity()
+            + f.body_roots.capacity()
+            + f.facets.capacity();
+        let kinds = f.kinds.capacity() * size_of::<Kind>() + f.child_counts.capacity() * 2;
+        (f.charts.capacity() * size_of::<Chart>() + ids * 4 + kinds) as u64
+    }
+
+    /// Room that no element has.
+    pub fn vacant_len(&self) -> usize {
+        2 * self.vacant[0].len() + 4 * self.vacant[1].len()
+    }
+
+    /// Index of what a node has in common with its twin.
+    #[inline]
+    fn twins_of(&self, id: u32) -> usize {
+        match id.checked_sub(self.fixed_len) {
+            None => id as usize,
+            Some(beyond) => self.fixed_len as usize + beyond as usize / 2,
+        }
+    }
+
+    #[inline]
+    fn twins(&self, id: ElementId) -> &Twins {
+        &self.twins[self.twins_of(id.0)]
     }
 
     /// What the node is.
     #[inline]
     pub fn kind(&self, id: ElementId) -> Kind {
-        self.nodes[id.0 as usize].kind
+        if id.0 < self.fixed_len {
+            return self.fixed.kinds[id.0 as usize];
+        }
+        if self.nodes[id.0 as usize].fan.is_other() { Kind::Vacant } else { Kind::Element }
     }
 
     /// The node's parent; `None` for the root.
     #[inline]
     pub fn parent(&self, id: ElementId) -> Option<ElementId> {
-        let parent = self.nodes[id.0 as usize].parent;
+        let parent = self.twins(id).parent;
         (parent != NONE).then_some(ElementId(parent))
     }
 
     /// Ids of the node's children; empty for a leaf.
     #[inline]
     pub fn children(&self, id: ElementId) -> Range<u32> {
-        let node = &self.nodes[id.0 as usize];
-        match node.child_count {
-            0 => 0..0,
-            n => node.first_child..node.first_child + u32::from(n),
+        let fan = self.nodes[id.0 as usize].fan;
+        if !fan.is_other() {
+            return fan.range();
         }
+        // Vacant room has none.
+        let count = self.fixed.child_counts.get(id.0 as usize).map_or(0, |n| u32::from(*n));
+        fan.first()..fan.first() + count
     }
 
     /// Area, m2; 0 for a light. Exact up to single precision.
@@ -309,10 +437,10 @@ impl Forest {
     /// The patch an element or polygon belongs to.
     #[inline]
     pub fn patch(&self, id: ElementId) -> Option<PatchId> {
-        let node = &self.nodes[id.0 as usize];
-        match node.kind {
-            Kind::Element => Some(PatchId(self.subjects[node.facet as usize])),
-            Kind::Polygon => Some(PatchId(self.subjects[id.0 as usize])),
+        let subjects = &self.fixed.subjects;
+        match self.kind(id) {
+            Kind::Element => Some(PatchId(subjects[self.twins(id).facet as usize])),
+            Kind::Polygon => Some(PatchId(subjects[id.0 as usize])),
             _ => None,
         }
     }
@@ -320,86 +448,98 @@ impl Forest {
     /// The node of the fixed part that an element is in; the node itself for any other.
     #[inline]
     pub fn fixed(&self, id: ElementId) -> ElementId {
-        if id.0 < self.fixed_len { id } else { ElementId(self.nodes[id.0 as usize].facet) }
+        if id.0 < self.fixed_len { id } else { ElementId(self.twins(id).facet) }
     }
 
     /// Index of a light in the scene.
     #[inline]
     pub fn light(&self, id: ElementId) -> Option<usize> {
-        let is_light = self.nodes[id.0 as usize].kind == Kind::Light;
-        is_light.then(|| self.subjects[id.0 as usize] as usize)
+        let is_light = self.kind(id) == Kind::Light;
+        is_light.then(|| self.fixed.subjects[id.0 as usize] as usize)
     }
 
     /// The body of a cluster; `None` for groups of bodies and for what is no cluster.
     #[inline]
     pub fn cluster_body(&self, id: ElementId) -> Option<BodyId> {
-        let node = &self.nodes[id.0 as usize];
-        let subject = *self.subjects.get(id.0 as usize)?;
-        (node.kind == Kind::Cluster && subject != NONE).then_some(BodyId(subject))
+        let subject = *self.fixed.subjects.get(id.0 as usize)?;
+        (self.kind(id) == Kind::Cluster && subject != NONE).then_some(BodyId(subject))
     }
 
     /// The name of an element or light that does not depend on history.
     #[inline]
     pub fn key(&self, id: ElementId) -> ElementKey {
-        let node = &self.nodes[id.0 as usize];
-        ElementKey { facet: node.facet, path: node.path }
+        let twins = self.twins(id);
+        // Beyond the fixed part twins are an even number of ids from its end.
+        let second = if id.0 < self.fixed_len { 0 } else { (id.0 - self.fixed_len) & 1 };
+        ElementKey { facet: twins.facet, path: twins.path + second }
     }
 
     /// Corners of an element in its patch's frame.
     #[inline]
     pub fn shape(&self, id: ElementId) -> Shape {
-        let node = &self.nodes[id.0 as usize];
-        self.charts[node.facet as usize].shape(&node.place)
+        self.chart(id).shape(&self.nodes[id.0 as usize].place)
     }
 
     /// Where an element lies in its patch's frame, and how far it reaches.
     #[inline]
     pub fn extent(&self, id: ElementId) -> Extent {
-        let node = &self.nodes[id.0 as usize];
-        self.charts[node.facet as usize].extent(&node.place)
+        self.chart(id).extent(&self.nodes[id.0 as usize].place)
+    }
+
+    #[inline]
+    fn chart(&self, id: ElementId) -> &Chart {
+        &self.fixed.charts[self.twins(id).facet as usize]
     }
 
     /// Index of the coarse element that holds this one, if coarse elements have been numbered.
     #[inline]
     pub fn coarse(&self, id: ElementId) -> Option<usize> {
-        let coarse = self.nodes[id.0 as usize].coarse;
+        let coarse = match self.fixed.coarse.get(id.0 as usize) {
+            Some(number) => *number,
+            None => self.twins(id).coarse,
+        };
         (coarse != NONE).then_some(coarse as usize)
     }
 
     /// Whether this is one of the coarse elements itself, not a part of one.
     #[inline]
     pub fn is_coarse_root(&self, id: ElementId) -> bool {
-        let node = &self.nodes[id.0 as usize];
-        node.coarse != NONE
-            && (node.parent == NONE || self.nodes[node.parent as usize].coarse == NONE)
+        self.coarse(id).is_some() && self.parent(id).is_none_or(|p| self.coarse(p).is_none())
     }
 
-    /// Makes `id` the coarse element number `index`; elements made below it later inherit it.
+    /// Makes `id` the coarse element number `index`; elements made later, once all that exist are
+    /// kept, inherit it if they are below.
     pub fn set_coarse(&mut self, id: ElementId, index: usize) {
-        self.nodes[id.0 as usize].coarse = index as u32;
+        let len = self.nodes.len();
+        let coarse = &mut self.fixed_mut().coarse;
+        coarse.resize(len, NONE);
+        coarse[id.0 as usize] = index as u32;
     }
 
     /// The root node of a patch.
     pub fn patch_root(&self, patch: PatchId) -> ElementId {
-        self.patch_roots[patch.0 as usize]
+        self.fixed.patch_roots[patch.0 as usize]
     }
 
     /// The cluster of a body.
     pub fn body_root(&self, body: BodyId) -> ElementId {
-        self.body_roots[body.0 as usize]
+        self.fixed.body_roots[body.0 as usize]
     }
 
     /// Whether the element may be split once more: paths have room for 15 levels.
     #[inline]
     pub fn can_split(&self, id: ElementId) -> bool {
-        let path = self.nodes[id.0 as usize].path;
-        self.nodes[id.0 as usize].child_count > 0 || path.leading_zeros() > 31 - 2 * LEVELS_MAX + 1
+        let path = self.key(id).path;
+        !self.children(id).is_empty() || path.leading_zeros() > 31 - 2 * LEVELS_MAX + 1
     }
 
     /// Everything that exists now stays for good.
     pub fn keep_all(&mut self) {
         self.kept_len = self.nodes.len() as u32;
-        self.changed.clear();
+        self.changed = Vec::new();
+        self.nodes.shrink_to_fit();
+        self.twins.shrink_to_fit();
+        self.fixed_mut().coarse.shrink_to_fit();
     }
 
     /// The children of an element, made if it is a leaf, with one more user. Areas of the children
@@ -408,27 +548,27 @@ impl Forest {
     /// # Panics
     /// If `id` is no element or has no room below it.
     pub fn split(&mut self, id: ElementId) -> (Range<u32>, bool) {
-        self.nodes[id.0 as usize].users += 1;
-        let node = self.nodes[id.0 as usize];
-        if node.child_count > 0 {
-            return (self.children(id), false);
+        let children = self.children(id);
+        if !children.is_empty() {
+            *self.users(children.start) += 1;
+            return (children, false);
         }
-        assert!(node.kind == Kind::Element && self.can_split(id), "{id:?} cannot be split");
-        let chart = self.charts[node.facet as usize];
-        let (places, count) = node.place.children(chart.len, chart.shape(&node.place).cut());
+        assert!(self.kind(id) == Kind::Element && self.can_split(id), "{id:?} cannot be split");
+        let (key, place, chart) = (self.key(id), self.nodes[id.0 as usize].place, *self.chart(id));
+        let coarse = self.coarse(id).map_or(NONE, |number| number as u32);
+        let (places, count) = place.children(chart.len, chart.shape(&place).cut());
         let first = self.room_for(count);
         for (k, place) in places[..count].iter().enumerate() {
-            let mut child = blank(Kind::Element, id.0);
-            child.facet = node.facet;
-            child.path = node.path << 2 | k as u32;
-            child.coarse = node.coarse;
-            child.place = *place;
-            child.area_m2 = chart.shape(place).area() as f32;
-            self.nodes[first as usize + k] = child;
+            let area_m2 = chart.shape(place).area() as f32;
+            self.nodes[first as usize + k] = Node { place: *place, fan: Fan::LEAF, area_m2 };
         }
-        let parent = &mut self.nodes[id.0 as usize];
-        parent.first_child = first;
-        parent.child_count = count as u16;
+        for k in (0..count as u32).step_by(2) {
+            let twins = self.twins_of(first + k);
+            let path = key.path << 2 | k;
+            self.twins[twins] = Twins { parent: id.0, facet: key.facet, path, coarse, users: 0 };
+        }
+        *self.users(first) = 1;
+        self.nodes[id.0 as usize].fan = Fan::new(first, count);
         self.counts.elements += count as u64;
         self.counts.leaves += count as u64 - 1;
         self.changed.push(id);
@@ -438,9 +578,17 @@ impl Forest {
     fn room_for(&mut self, count: usize) -> u32 {
         self.vacant[count / 4].pop().unwrap_or_else(|| {
             let first = self.nodes.len();
-            self.nodes.resize(first + count, blank(Kind::Vacant, NONE));
+            self.nodes.resize(first + count, Node::VACANT);
+            let twins = self.twins_of((first + count) as u32);
+            self.twins.resize(twins, Twins::VACANT);
             first as u32
         })
+    }
+
+    /// Users of the element whose first child this is.
+    fn users(&mut self, first_child: u32) -> &mut u32 {
+        let twins = self.twins_of(first_child);
+        &mut self.twins[twins].users
     }
 
     /// Takes back one use of an element's children; [`Forest::reap`] removes what has none left.
@@ -448,7 +596,7 @@ impl Forest {
     /// # Panics
     /// If there is no user.
     pub fn release(&mut self, id: ElementId) {
-        let users = &mut self.nodes[id.0 as usize].users;
+        let users = self.users(self.nodes[id.0 as usize].fan.first());
         *users = users.checked_sub(1).expect("released more often than split");
         if *users == 0 {
             self.loose.push(id.0);
@@ -459,8 +607,8 @@ impl Forest {
     pub fn reap(&mut self) -> u64 {
         let mut reaped = 0;
         for id in std::mem::take(&mut self.loose) {
-            let node = &self.nodes[id as usize];
-            if node.users == 0 && node.kind == Kind::Element {
+            let children = self.children(ElementId(id));
+            if !children.is_empty() && *self.users(children.start) == 0 {
                 reaped += self.remove_children(ElementId(id));
             }
         }
@@ -476,15 +624,20 @@ impl Forest {
         self.counts.elements -= count;
         self.counts.leaves -= count - 1;
         for child in children.clone() {
-            debug_assert_eq!(
-                self.nodes[child as usize].users, 0,
+            let below = self.nodes[child as usize].fan.range();
+            debug_assert!(
+                below.is_empty() || *self.users(below.start) == 0,
                 "a child outlives its parent's pair"
             );
             count += self.remove_children(ElementId(child));
-            self.nodes[child as usize] = blank(Kind::Vacant, NONE);
+            self.nodes[child as usize] = Node::VACANT;
+        }
+        for first in children.clone().step_by(2) {
+            let twins = self.twins_of(first);
+            self.twins[twins] = Twins::VACANT;
         }
         self.vacant[children.len() / 4].push(children.start);
-        self.nodes[id.0 as usize].child_count = 0;
+        self.nodes[id.0 as usize].fan = Fan::LEAF;
         self.changed.push(id);
         count
     }
@@ -494,21 +647,56 @@ impl Forest {
     pub fn take_changed(&mut self) -> Vec<ElementId> {
         std::mem::take(&mut self.changed)
     }
+
+    /// Puts all elements together so that no room is vacant: parents before children, level by level
+    /// above those that are kept, which stay where they are.
+    pub fn compact(&mut self) -> Renumbering {
+        let kept = self.kept_len as usize;
+        let alive = self.nodes.len() - self.vacant_len();
+        let twins = self.twins_of(alive as u32);
+        let (old, old_twins) = (std::mem::take(&mut self.nodes), std::mem::take(&mut self.twins));
+        self.nodes.reserve_exact(alive);
+        self.twins.reserve_exact(twins);
+        self.nodes.extend_from_slice(&old[..kept]);
+        self.twins.extend_from_slice(&old_twins[..self.twins_of(self.kept_len)]);
+        let mut old_of: Vec<u32> = (0..self.kept_len).collect();
+        let mut at = 0;
+        while at < self.nodes.len() {
+            let fan = self.nodes[at].fan;
+            if !fan.is_other() && fan.first() >= self.kept_len {
+                let first = self.nodes.len() as u32;
+                let children = fan.range();
+                self.nodes[at].fan = Fan::new(first, children.len());
+                self.nodes.extend_from_slice(&old[children.start as usize..children.end as usize]);
+                old_of.extend(children.clone());
+                for child in children.step_by(2) {
+                    let twins = old_twins[self.twins_of(child)];
+                    self.twins.push(Twins { parent: at as u32, ..twins });
+                }
+            }
+            at += 1;
+        }
+        debug_assert_eq!(self.nodes.len(), alive);
+        self.vacant = [Vec::new(), Vec::new()];
+        let mut new_of = vec![NONE; old.len()];
+        old_of.iter().enumerate().for_each(|(new, &old)| new_of[old as usize] = new as u32);
+        Renumbering { new_of, old_of }
+    }
+
+    /// Gives back room beyond a small reserve.
+    pub fn trim(&mut self) {
+        self.nodes.shrink_to(self.nodes.len() + self.nodes.len() / SLACK);
+        self.twins.shrink_to(self.twins.len() + self.twins.len() / SLACK);
+        self.vacant.iter_mut().for_each(|list| list.shrink_to(2 * list.len()));
+    }
 }
 
-fn blank(kind: Kind, parent: u32) -> Node {
-    Node {
-        place: Place::whole(4),
-        parent,
-        first_child: NONE,
-        facet: NONE,
-        path: 0,
-        coarse: NONE,
-        users: 0,
-        area_m2: 0.0,
-        child_count: 0,
-        kind,
-    }
+impl Node {
+    const VACANT: Node = Node { place: Place::WHOLE, fan: Fan::OTHER, area_m2: 0.0 };
+}
+
+impl Twins {
+    const VACANT: Twins = Twins { parent: NONE, facet: NONE, path: 0, coarse: NONE, users: 0 };
 }
 
 /// Box of a body where it is at time 0, or in its own frame if it is absent then.

@@ -8,6 +8,6 @@ mod forest;
 mod split;
 mod world;
 
-pub use forest::{Counts, ElementId, ElementKey, Forest, Kind};
+pub use forest::{Counts, ElementId, ElementKey, Forest, Kind, Renumbering};
 pub use split::{Extent, Shape, bilinear, bilinear_area};
 pub use world::{OccluderPolygon, WorldElement, WorldLight, WorldPatch, WorldView};

@@ -121,13 +121,12 @@ pub(super) struct Place([u16; 6]);
 const ONE: u16 = 1 << 15;
 
 impl Place {
+    /// The whole of a quadrilateral.
+    pub(super) const WHOLE: Place = Place([0, 0, ONE, ONE, 0, 0]);
+
     /// The whole facet.
     pub(super) fn whole(corner_count: usize) -> Place {
-        if corner_count == 3 {
-            Place([0, 0, ONE, 0, 0, ONE])
-        } else {
-            Place([0, 0, ONE, ONE, 0, 0])
-        }
+        if corner_count == 3 { Place([0, 0, ONE, 0, 0, ONE]) } else { Place::WHOLE }
     }
 
     /// Parameters of the corners; a triangle repeats its last.

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use crate::element::ElementId;
+use crate::element::{ElementId, Renumbering};
 
 use super::margin::Margin;
 use super::oracle::Side;
@@ -177,6 +177,9 @@ struct Node {
     payload: [u32; 3],
 }
 
+/// Room is given back beyond this share of what is needed.
+const SLACK: usize = 32;
+
 /// Bits of an element's id.
 const ID_BITS: u32 = 30;
 const ID_MASK: u32 = (1 << ID_BITS) - 1;
@@ -270,6 +273,45 @@ impl PairTree {
         let lists: usize =
             self.vacant.iter().map(|l| l.capacity() * 4 + size_of::<Vec<u32>>()).sum();
         (self.nodes.capacity() * size_of::<Node>() + lists) as u64
+    }
+
+    /// Room that no pair has.
+    pub fn vacant_len(&self) -> usize {
+        self.nodes.len() - self.len()
+    }
+
+    /// Follows elements to their new ids.
+    pub fn renumber(&mut self, to: &Renumbering) {
+        for node in &mut self.nodes {
+            if node.state() != State::Vacant {
+                let end = |packed: u32| packed & !ID_MASK | to.new_of(packed & ID_MASK);
+                (node.a, node.b) = (end(node.a), end(node.b));
+            }
+        }
+    }
+
+    /// Puts all pairs together so that no room is vacant: parents before children, level by level.
+    pub fn compact(&mut self) {
+        let old = std::mem::take(&mut self.nodes);
+        self.nodes.reserve_exact(self.len());
+        self.nodes.push(old[0]);
+        let mut at = 0;
+        while at < self.nodes.len() {
+            if self.nodes[at].state().is_refined() {
+                let children = self.children(PairId(at as u32));
+                self.nodes[at].payload[0] = self.nodes.len() as u32;
+                self.nodes.extend_from_slice(&old[children.start as usize..children.end as usize]);
+            }
+            at += 1;
+        }
+        debug_assert_eq!(self.nodes.len(), self.len());
+        self.vacant = Vec::new();
+    }
+
+    /// Gives back room beyond a small reserve.
+    pub fn trim(&mut self) {
+        self.nodes.shrink_to(self.nodes.len() + self.nodes.len() / SLACK);
+        self.vacant.iter_mut().for_each(|list| list.shrink_to(2 * list.len()));
     }
 
     /// Both ends of a pair.

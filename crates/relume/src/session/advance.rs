@@ -74,6 +74,7 @@ impl Session {
             solved.radiosity.solve(&lit, &solved.links, dirty, stop);
         }
         report.seconds.solve = clock.lap();
+        solved.compact();
 
         solved.time_s = time_s;
         report.count(&work);
@@ -232,7 +233,7 @@ impl Session {
 const PAIR_LINKS_BYTES: u64 = 20;
 
 /// An element with its radiosity, bytes.
-const ELEMENT_BYTES: u64 = 128;
+const ELEMENT_BYTES: u64 = 118;
 
 #[derive(Clone, Copy)]
 enum Level {

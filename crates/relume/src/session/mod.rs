@@ -11,6 +11,7 @@ use crate::transport::Simd;
 
 mod advance;
 mod coarse;
+mod compact;
 mod compare;
 mod gather;
 mod options;
@@ -192,7 +193,8 @@ impl Session {
 
     /// Bytes that the engine's structures hold now.
     pub fn memory(&self) -> Memory {
-        let mut memory = Memory { fixed: self.seed.memory_bytes(), ..Memory::default() };
+        let fixed = self.seed.memory_bytes() + self.seed.shared_bytes();
+        let mut memory = Memory { fixed, ..Memory::default() };
         if let Some(s) = &self.solved {
             memory.pairs = s.tree.memory_bytes() + s.links.pool_bytes();
             memory.elements =
@@ -216,7 +218,8 @@ pub struct Memory {
     pub pairs: u64,
     /// Element forest, radiosities, and where each element's links are.
     pub elements: u64,
-    /// What does not grow with the tolerance: the fixed part of the forest, the coarse solution.
+    /// What is as large at every tolerance: the forest that builds start from, what is known of
+    /// facets and clusters alone (one copy for all), the coarse solution.
     pub fixed: u64,
 }
 

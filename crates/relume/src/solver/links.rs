@@ -1,5 +1,6 @@
 //! For each receiver the sources it gathers from.
 
+use crate::element::Renumbering;
 use crate::pair::Gradients;
 
 /// One source of a receiver: 12 bytes.
@@ -38,6 +39,9 @@ struct Span {
 
 /// Links are kept in blocks with room for a multiple of so many.
 const ROOM: u32 = 4;
+
+/// Vectors are given room for this share more than they need.
+const SLACK: usize = 32;
 
 fn room(len: u32) -> u32 {
     len.next_multiple_of(ROOM)
@@ -105,6 +109,9 @@ impl Links {
 
     /// Makes room for receivers with higher ids; they have no links yet.
     pub fn extend(&mut self, elements: usize) {
+        if elements > self.spans.capacity() {
+            self.spans.reserve_exact(elements + elements / SLACK - self.spans.len());
+        }
         if elements > self.spans.len() {
             self.spans.resize(elements, Span::default());
         }
@@ -153,7 +160,7 @@ impl Links {
         let (from, to) = (start as usize, self.pool.len());
         let wanted = to + (len + ROOM) as usize;
         if wanted > self.pool.capacity() {
-            self.pool.reserve_exact(wanted / 16 + (len + ROOM) as usize);
+            self.pool.reserve_exact(wanted / SLACK + (len + ROOM) as usize);
         }
         self.pool.extend_from_within(from..from + len as usize);
         self.pool.resize(wanted, Link::default());
@@ -161,9 +168,9 @@ impl Links {
         self.spans[receiver as usize].start = to as u32;
     }
 
-    /// Moves everything together where more than an eighth of the pool is lost.
+    /// Moves everything together where more than a sixteenth of the pool is lost.
     pub fn tidy(&mut self) {
-        if self.lost * 8 <= self.pool.len() {
+        if self.lost * 16 <= self.pool.len() {
             return;
         }
         let total: u32 = self.spans.iter().map(|s| room(s.len)).sum();
@@ -175,6 +182,26 @@ impl Links {
             pool.resize((span.start + room(span.len)) as usize, Link::default());
         }
         *self = Links { spans: std::mem::take(&mut self.spans), pool, lost: 0 };
+    }
+
+    /// Follows elements to their new ids. The links of a receiver keep their order.
+    pub fn renumber(&mut self, to: &Renumbering) {
+        let spans: Vec<Span> = to.old_of().iter().map(|&old| self.spans[old as usize]).collect();
+        for &Span { start, len } in &spans {
+            for link in &mut self.pool[start as usize..(start + len) as usize] {
+                link.source = to.new_of(link.source);
+            }
+        }
+        self.spans = spans;
+        self.lost =
+            self.pool.len() - self.spans.iter().map(|s| room(s.len) as usize).sum::<usize>();
+        self.tidy();
+    }
+
+    /// Gives back room beyond a small reserve.
+    pub fn trim(&mut self) {
+        self.spans.shrink_to(self.spans.len() + self.spans.len() / SLACK);
+        self.pool.shrink_to(self.pool.len() + self.pool.len() / SLACK);
     }
 
     /// Bytes held by the links.

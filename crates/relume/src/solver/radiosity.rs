@@ -5,7 +5,7 @@ use std::ops::Range;
 use fearless_simd::{Simd, dispatch, f32x4, prelude::*};
 use rayon::prelude::*;
 
-use crate::element::ElementId;
+use crate::element::{ElementId, Renumbering};
 use crate::transport;
 
 use super::links::{Link, Links};
@@ -103,15 +103,21 @@ impl Default for Field {
 }
 
 impl Field {
-    fn len(&self) -> usize {
-        self.0.len() / NINE
+    fn extend(&mut self, len: usize) {
+        let wanted = len * NINE + BEYOND;
+        if wanted > self.0.len() {
+            grow(&mut self.0, wanted);
+        }
     }
 
-    fn extend(&mut self, len: usize) {
-        if len > self.len() {
-            self.0.reserve_exact(len * NINE + BEYOND - self.0.len());
-            self.0.resize(len * NINE + BEYOND, 0.0);
+    fn renumber(&mut self, to: &Renumbering) {
+        let mut out = Vec::with_capacity(to.old_of().len() * NINE + BEYOND);
+        for &old in to.old_of() {
+            let at = old as usize * NINE;
+            out.extend_from_slice(&self.0[at..at + NINE]);
         }
+        out.resize(out.len() + BEYOND, 0.0);
+        self.0 = out;
     }
 
     #[inline]
@@ -139,6 +145,18 @@ impl Field {
     fn bytes(&self) -> u64 {
         (self.0.capacity() * size_of::<f32>()) as u64
     }
+}
+
+/// Vectors that grow are given room for this share more than they need.
+const SLACK: usize = 32;
+
+/// Appends zeros, in the room that there is or else in a little more than is needed.
+fn grow(values: &mut Vec<f32>, len: usize) {
+    if len > values.capacity() {
+        let slack = if values.is_empty() { 0 } else { len / SLACK };
+        values.reserve_exact(len + slack - values.len());
+    }
+    values.resize(len, 0.0);
 }
 
 /// The solution: 76 bytes an element.
@@ -235,8 +253,21 @@ impl Radiosity {
         self.radiosity.extend(len);
         self.gathered.extend(len);
         if len > self.pending.len() {
-            self.pending.reserve_exact(len - self.pending.len());
-            self.pending.resize(len, 0.0);
+            grow(&mut self.pending, len);
+        }
+    }
+
+    /// Follows elements to their new ids.
+    pub fn renumber(&mut self, to: &Renumbering) {
+        self.radiosity.renumber(to);
+        self.gathered.renumber(to);
+        self.pending = to.old_of().iter().map(|&old| self.pending[old as usize]).collect();
+    }
+
+    /// Gives back room beyond a small reserve.
+    pub fn trim(&mut self) {
+        for values in [&mut self.radiosity.0, &mut self.gathered.0, &mut self.pending] {
+            values.shrink_to(values.len() + values.len() / SLACK);
         }
     }
 

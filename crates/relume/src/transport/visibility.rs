@@ -1,11 +1,11 @@
 //! Partial visibility of a pair: which bodies stand in its shaft, and which of its fixed
 //! segments they block.
 
-use crate::element::{ElementId, Forest, Kind, WorldElement, WorldView};
-use crate::geometry::{Aabb, Pose, shaft_meets_box};
+use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldView};
+use crate::geometry::{Aabb, Plane, Pose, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
-use super::clip::clipped_visibility;
+use super::clip::{Polygons, clipped_visibility};
 use super::kernel::Simd;
 use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use glam::{DVec2, DVec3};
@@ -70,6 +70,40 @@ enum Test {
     Wide,
 }
 
+/// Distance from an end's plane, in slacks, within which a polygon lies on it.
+const COVER: f64 = 0.5;
+
+/// How far a polygon that lies on an end is lifted off it, in slacks: more than anything that is
+/// disregarded because it is close to an end.
+const LIFT: f64 = 8.0;
+
+/// Whether a polygon lies on an end and faces it: a box on a floor hides what it stands on.
+/// Of two coincident surfaces that face the same way neither hides the other.
+fn covers(polygon: &OccluderPolygon<'_>, e: &WorldElement, within_m: f64) -> bool {
+    polygon.plane.normal.dot(e.plane.normal) < -0.5
+        && polygon.corners.iter().all(|&c| e.plane.distance(c).abs() <= within_m)
+}
+
+/// A polygon, moved.
+struct Lifted<'a> {
+    polygon: OccluderPolygon<'a>,
+    by: DVec3,
+}
+
+impl<'a> Lifted<'a> {
+    fn corners(&self) -> impl Iterator<Item = DVec3> + use<'a> {
+        let by = self.by;
+        self.polygon.corners.iter().map(move |&c| c + by)
+    }
+
+    /// For tests that use the planes; a move along the normal leaves those of the edges as they are.
+    fn polygon(&self) -> OccluderPolygon<'a> {
+        let plane = self.polygon.plane;
+        let offset = plane.offset + plane.normal.dot(self.by);
+        OccluderPolygon { plane: Plane { offset, ..plane }, ..self.polygon }
+    }
+}
+
 impl<'a> Shaft<'a> {
     fn slack(&self) -> f64 {
         self.a.rounding_m + self.b.rounding_m
@@ -96,21 +130,39 @@ impl<'a> Shaft<'a> {
         } else {
             (self.view.occluder(patch), self.view.fixed_box(root))
         };
+        // The margin: what covers an end may lie a little behind it.
         let (slack, margin) = match test {
-            Test::Exact => (self.slack(), 0.0),
-            Test::Wide => (0.5 * self.slack(), 0.5 * self.slack()),
+            Test::Exact => (self.slack(), COVER * self.slack()),
+            Test::Wide => (0.5 * self.slack(), 1.5 * COVER * self.slack()),
         };
         if !shaft_meets_box(&a.bounds, &b.bounds, &bounds.grown(margin)) {
             return false;
+        }
+        let behind =
+            |e: &WorldElement| occluder.corners.iter().all(|&c| e.plane.distance(c) <= slack);
+        if covers(&occluder, a, margin) {
+            return !behind(b);
+        }
+        if covers(&occluder, b, margin) {
+            return !behind(a);
         }
         let (a_lo, a_hi) = a.span(&occluder.plane);
         let (b_lo, b_hi) = b.span(&occluder.plane);
         if a_lo.min(b_lo) >= -slack || a_hi.max(b_hi) <= slack {
             return false;
         }
-        let behind =
-            |e: &WorldElement| occluder.corners.iter().all(|&c| e.plane.distance(c) <= slack);
         !behind(a) && !behind(b)
+    }
+
+    /// A blocker where it blocks, and whether that is in the frame of the pair's own body: polygons
+    /// that cover an end are lifted clear of it.
+    fn lifted(&self, patch: PatchId) -> (bool, Lifted<'a>) {
+        let (own, a, b) = self.seen_by(Some(self.view.patch(patch).body));
+        let polygon =
+            if own { self.view.occluder_in_body(patch) } else { self.view.occluder(patch) };
+        let covered = [a, b].into_iter().find(|e| covers(&polygon, e, COVER * self.slack()));
+        let by = covered.map_or(DVec3::ZERO, |e| e.plane.normal * (LIFT * self.slack()));
+        (own, Lifted { polygon, by })
     }
 
     /// Which of `parents` (candidates of a pair above) remain candidates here, appended to `out`;
@@ -202,13 +254,9 @@ impl<'a> Shaft<'a> {
             if mask == u16::MAX {
                 break;
             }
-            let rides = self.own.filter(|o| o.0 == self.view.patch(patch).body);
-            mask |= match (rides, own) {
-                (Some(_), Some(own)) => {
-                    own.blocked_by(simd, &self.view.occluder_in_body(patch), slack)
-                }
-                _ => world.blocked_by(simd, &self.view.occluder(patch), slack),
-            };
+            let (rides, lifted) = self.lifted(patch);
+            let bundle = own.filter(|_| rides).unwrap_or(world);
+            mask |= bundle.blocked_by(simd, &lifted.polygon(), slack);
         }
         mask
     }
@@ -244,7 +292,12 @@ pub const CLIPPED_MAX: usize = 12;
 /// Visibility of a pair by clipping, exact from 2 x 2 points in each of `cells` x `cells` parts of
 /// its smaller end (each counts as a segment), if at most twelve polygons stand in its shaft;
 /// `None` if there are more.
-pub fn exact_visibility(shaft: &Shaft<'_>, blockers: &[PatchId], cells: u32) -> Option<Visibility> {
+pub fn exact_visibility(
+    simd: Simd,
+    shaft: &Shaft<'_>,
+    blockers: &[PatchId],
+    cells: u32,
+) -> Option<Visibility> {
     if blockers.is_empty() {
         return Some(Visibility::CLEAR);
     }
@@ -252,21 +305,20 @@ pub fn exact_visibility(shaft: &Shaft<'_>, blockers: &[PatchId], cells: u32) -> 
         return None;
     }
     let (a, b) = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
-    let place = |&patch: &PatchId| {
+    let mut occluders = Polygons::default();
+    for &patch in blockers {
         // Everything in one frame: that of the pair's body if it has one of its own.
-        let body = shaft.view.patch(patch).body;
+        let (rides, lifted) = shaft.lifted(patch);
+        let corners = lifted.corners();
         match shaft.own {
-            Some((own, _, _)) if own == body => shaft.view.occluder_in_body(patch).corners.to_vec(),
-            Some((own, _, _)) => {
+            Some((own, _, _)) if !rides => {
                 let pose = shaft.view.poses()[own.0 as usize].unwrap_or(Pose::IDENTITY);
-                let corners = shaft.view.occluder(patch).corners;
-                corners.iter().map(|&c| pose.inverse_point(c)).collect()
+                occluders.push(corners.map(|c| pose.inverse_point(c)));
             }
-            None => shaft.view.occluder(patch).corners.to_vec(),
+            _ => occluders.push(corners),
         }
-    };
-    let occluders: Vec<Vec<DVec3>> = blockers.iter().map(place).collect();
-    Some(clipped_visibility(a, b, &occluders, cells))
+    }
+    Some(clipped_visibility(simd, a, b, &occluders, cells))
 }
 
 /// Visibility of a punctual light (the second end of the shaft) from an element; `segments` come

@@ -390,6 +390,36 @@ impl Line {
     }
 }
 
+/// A polygon to look at, with its bounds.
+struct Target<'a> {
+    corners: &'a [DVec2],
+    middle: DVec2,
+    half: DVec2,
+    /// Distance below which a corner counts as on a line.
+    on_line: f64,
+}
+
+impl Target<'_> {
+    fn new(corners: &[DVec2]) -> Target<'_> {
+        let lo = corners.iter().copied().fold(corners[0], DVec2::min);
+        let hi = corners.iter().copied().fold(corners[0], DVec2::max);
+        let (middle, half) = ((lo + hi) * 0.5, (hi - lo) * 0.5);
+        Target { corners, middle, half, on_line: ON_LINE * half.max_element() }
+    }
+
+    /// Smallest and largest signed distance from a line, or of the bounds where these do not meet it.
+    #[inline]
+    fn span(&self, line: &Line) -> (f64, f64) {
+        let at = line.a * self.middle.x + line.b * self.middle.y + line.c;
+        let reach = line.a.abs() * self.half.x + line.b.abs() * self.half.y;
+        if at.abs() >= reach {
+            return (at - reach, at + reach);
+        }
+        let sides = self.corners.iter().map(|&t| line.side(t));
+        sides.fold((0.0, 0.0), |(low, high), d| (d.min(low), d.max(high)))
+    }
+}
+
 /// Cuts shadows out of a polygon; its buffers serve many points.
 #[derive(Default)]
 struct Cutter {
@@ -411,13 +441,13 @@ impl Cutter {
         self.left.truncate(0);
         self.left.push(target);
         self.is_clear = true;
-        let size = target.iter().fold(0.0_f64, |s, c| s.max(c.x.abs()).max(c.y.abs()));
+        let target = &Target::new(target);
         for occluder in &occluders.list {
             if self.left.len() == 0 || self.left.len() > FRAGMENTS_MAX {
                 return;
             }
             let corners = &occluders.corners[occluder.range.clone()];
-            if !self.cast(point, corners, occluder.area, target, ON_LINE * size) {
+            if !self.cast(point, corners, occluder.area, target) {
                 continue;
             }
             if self.lines.is_empty() {
@@ -431,14 +461,7 @@ impl Cutter {
 
     /// Finds the edges of an occluder's shadow that cross the target; false where it falls beside
     /// the target or the occluder is seen edge on.
-    fn cast(
-        &mut self,
-        point: DVec3,
-        corners: &[DVec3],
-        area: DVec3,
-        target: &[DVec2],
-        on_line: f64,
-    ) -> bool {
+    fn cast(&mut self, point: DVec3, corners: &[DVec3], area: DVec3, target: &Target<'_>) -> bool {
         let facing = area.dot(corners[0] - point);
         if facing == 0.0 {
             return false;
@@ -450,13 +473,9 @@ impl Cutter {
             let q = corner - point;
             // The plane through the point and the edge; only signs and ratios are used.
             let n = p.cross(q) * sign;
-            let slack = on_line * (n.x.abs() + n.y.abs());
+            let slack = target.on_line * (n.x.abs() + n.y.abs());
             let line = Line { a: n.x, b: n.y, c: -n.dot(point), slack };
-            let (mut low, mut high) = (0.0_f64, 0.0_f64);
-            for &t in target {
-                let d = line.side(t);
-                (low, high) = (low.min(d), high.max(d));
-            }
+            let (low, high) = target.span(&line);
             if high <= 0.0 {
                 return false;
             }

@@ -134,7 +134,6 @@ fn row_sums_of_a_plain_room_keep_every_tolerance() {
 }
 
 #[test]
-#[ignore = "engine: a polygon in the plane of another does not hide it"]
 fn what_touches_is_not_seen_through() {
     // The inside of a box that stands on a floor: closed, so its rows sum to one.
     let mut b = SceneBuilder::new("contact");

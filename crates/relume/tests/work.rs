@@ -138,7 +138,6 @@ fn changed_elsewhere(session: &Session, body: &str, [one, two]: [&Table; 2]) -> 
 type Table = BTreeMap<Name, Is>;
 
 #[test]
-#[ignore = "engine: V of some partly hidden pairs depends on what is hidden within an occluder"]
 fn a_box_within_a_pillar_changes_nothing_but_its_own_pairs() {
     // No lamp: with it more than twelve polygons would stand in some shafts, and their V would come
     // from segments, with noise.

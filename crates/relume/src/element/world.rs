@@ -19,6 +19,8 @@ pub struct WorldPatch {
     pub world: Frame,
     /// The body it rides on.
     pub body: BodyId,
+    /// The other side of the same polygon.
+    pub twin: Option<PatchId>,
     /// How far a corner of this patch may be off its exact place, metres.
     pub rounding_m: f64,
 }
@@ -218,6 +220,7 @@ fn world_patch(patch: &crate::scene::Patch, poses: &[Option<Pose>]) -> WorldPatc
             normal: pose.direction(f.normal),
         },
         body: patch.body,
+        twin: patch.twin,
         rounding_m: reach * ROUNDING,
     }
 }

@@ -279,7 +279,7 @@ impl Placed<'_> {
             }
         }
         let blockers = shaft.blockers(candidates);
-        let v = exact_visibility(shaft, &blockers, 1)
+        let v = exact_visibility(self.simd, shaft, &blockers, 1)
             .unwrap_or_else(|| visibility(self.simd, shaft, &blockers, key, 4));
         let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
         else {
@@ -331,7 +331,7 @@ impl Placed<'_> {
                 s if s <= 16.0 * CLOSER => 4,
                 _ => 8,
             };
-            exact_visibility(shaft, blockers, cells).unwrap_or(v)
+            exact_visibility(self.simd, shaft, blockers, cells).unwrap_or(v)
         };
         Visibility { segments: v.segments + again.segments, ..again }
     }
@@ -518,7 +518,8 @@ impl<'a> BoxShaft<'a> {
         let (a, b) = (forest.fixed(a), forest.fixed(b));
         let own = body.map(|body| (body, view.box_in_body(a), view.box_in_body(b)));
         let world = (view.fixed_box(a), view.fixed_box(b));
-        BoxShaft { view, forest, world, own, margin_m: 1e-9 * view.far_m() }
+        // More than the slack of any pair: what lies on an end may hide it.
+        BoxShaft { view, forest, world, own, margin_m: 5e-7 * view.far_m() }
     }
 
     fn meets(&self, id: ElementId) -> bool {

@@ -108,6 +108,67 @@ fn bundle_sums(points: &PointBundle, normal: DVec3, corners: &[DVec3]) -> [f64; 
     sums.map(|s| s.abs() / (2.0 * PI))
 }
 
+/// Edges of many polygons, each as seen from its own point, evaluated sixteen at a time.
+#[derive(Default)]
+pub(super) struct EdgeBundles {
+    bundles: Vec<EdgeBundle>,
+    len: usize,
+}
+
+/// Sixteen edges by coordinate: from `p` to `q`.
+#[derive(Clone, Copy, Default)]
+struct EdgeBundle {
+    p: [[f64; LANES]; 3],
+    q: [[f64; LANES]; 3],
+    share: [f64; LANES],
+}
+
+impl EdgeBundles {
+    pub(super) fn len(&self) -> usize {
+        self.len
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.bundles.clear();
+        self.len = 0;
+    }
+
+    /// Adds an edge from `p` to `q`, seen from the origin.
+    pub(super) fn push(&mut self, p: DVec3, q: DVec3) {
+        let lane = self.len % LANES;
+        if lane == 0 {
+            self.bundles.push(EdgeBundle::default());
+        }
+        let bundle = &mut self.bundles[self.len / LANES];
+        for k in 0..3 {
+            (bundle.p[k][lane], bundle.q[k][lane]) = (p[k], q[k]);
+        }
+        self.len += 1;
+    }
+
+    /// Each edge's share of Lambert's sum over a plane with unit `normal`.
+    pub(super) fn shares(&mut self, simd: Simd, normal: DVec3) -> &Self {
+        dispatch!(simd.level(), _simd => fill_shares(&mut self.bundles, normal.to_array()));
+        self
+    }
+
+    /// The form factor of the polygon with the given edges, whose shares are known.
+    pub(super) fn form_factor(&self, edges: std::ops::Range<usize>) -> f64 {
+        let share = |k: usize| self.bundles[k / LANES].share[k % LANES];
+        edges.map(share).sum::<f64>().abs() / (2.0 * PI)
+    }
+}
+
+#[inline(always)]
+fn fill_shares(bundles: &mut [EdgeBundle], n: [f64; 3]) {
+    for bundle in bundles {
+        for k in 0..LANES {
+            let at = |c: &[[f64; LANES]; 3]| [c[0][k], c[1][k], c[2][k]];
+            bundle.share[k] = edge(at(&bundle.p), at(&bundle.q), n);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -20,8 +20,8 @@ const CORRIDOR_FRAMES: u32 = 109;
 /// Frames of the room, as in the paper's table.
 const ROOM_FRAMES: u32 = 20;
 /// Tolerances at which the paper's 5,000 to 6,000 elements are drawn in a frame.
-const CORRIDOR_TOLERANCE: f64 = 0.027;
-const ROOM_TOLERANCE: f64 = 0.035;
+const CORRIDOR_TOLERANCE: f64 = 0.028;
+const ROOM_TOLERANCE: f64 = 0.036;
 
 const CORRIDOR_WIDTH_M: f64 = 4.0;
 const CORRIDOR_LENGTH_M: f64 = 8.0;

@@ -32,8 +32,8 @@ fn main() {
     let parts: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     let asked = |part: &str| parts.is_empty() || parts.iter().any(|p| p == part);
     if asked("lights") {
-        let room = Sequence { name: "room", tolerance: 0.035, frames: 20, sampled: 5 };
-        let corridor = Sequence { name: "corridor", tolerance: 0.027, frames: 30, sampled: 8 };
+        let room = Sequence { name: "room", tolerance: 0.036, frames: 20, sampled: 5 };
+        let corridor = Sequence { name: "corridor", tolerance: 0.028, frames: 30, sampled: 8 };
         for sequence in [room, corridor] {
             moving_lamp(&sequence);
         }

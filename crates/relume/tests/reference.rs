@@ -81,7 +81,7 @@ impl Misses {
                 continue;
             }
             self.open.push(off);
-            self.z.push((got - s.e[c]) / s.se[c].hypot(0.01 * s.e[c]));
+            self.z.push((got - s.e[c]) / (s.se[c].powi(2) + (0.01 * s.e[c]).powi(2)).sqrt());
             if off.abs() > self.worst.0.abs() {
                 self.worst = (off, s.number);
             }

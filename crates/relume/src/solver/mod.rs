@@ -2,8 +2,19 @@
 //!
 //! The solver knows no time, no shafts and no geometry: links come as numbers.
 
+mod field;
+mod gather;
+mod jump;
 mod links;
+mod push;
 mod radiosity;
+mod settle;
+mod surfaces;
+mod work;
 
+pub use field::Linear;
 pub use links::{Link, Links, LinksBuilder};
-pub use radiosity::{Dirty, Linear, Lit, Place, Radiosity, Stop, Surfaces, row_sums};
+pub use push::row_sums;
+pub use radiosity::{Radiosity, Stop};
+pub use surfaces::{Lit, Place, Surfaces};
+pub use work::Dirty;

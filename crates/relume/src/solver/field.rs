@@ -1,0 +1,124 @@
+//! Quantities that vary linearly over elements, and tables of them.
+
+use crate::element::Renumbering;
+
+use super::surfaces::Place;
+
+/// A quantity that varies linearly over an element, red, green and blue.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Linear {
+    /// Mean over the element.
+    pub mean: [f32; 3],
+    /// Gradient in the patch's frame, per metre (of radiosities: per radius).
+    pub gradient: [[f32; 3]; 2],
+}
+
+impl Linear {
+    /// Value at an offset from the centroid (in the unit of the gradient), unclamped.
+    #[inline]
+    pub fn at(&self, x: f32, y: f32) -> [f32; 3] {
+        let mut out = self.mean;
+        for (c, value) in out.iter_mut().enumerate() {
+            *value += self.gradient[0][c] * x + self.gradient[1][c] * y;
+        }
+        out
+    }
+
+    /// The same about another centroid, per metre.
+    pub(super) fn about(&self, own: &Place, other: &Place) -> Linear {
+        let [dx, dy] = [0, 1].map(|k| other.centroid[k] - own.centroid[k]);
+        Linear { mean: self.at(dx, dy), ..*self }
+    }
+
+    pub(super) fn plus(mut self, other: &Linear) -> Linear {
+        for c in 0..3 {
+            self.mean[c] += other.mean[c];
+            self.gradient[0][c] += other.gradient[0][c];
+            self.gradient[1][c] += other.gradient[1][c];
+        }
+        self
+    }
+
+    pub(super) fn difference(&self, other: &Linear) -> f32 {
+        let mut out = 0.0_f32;
+        for c in 0..3 {
+            out = out.max((self.mean[c] - other.mean[c]).abs());
+            out = out.max((self.gradient[0][c] - other.gradient[0][c]).abs());
+            out = out.max((self.gradient[1][c] - other.gradient[1][c]).abs());
+        }
+        out
+    }
+}
+
+/// A [`Linear`] for each element: nine numbers each, one after the other.
+#[derive(Clone, Debug)]
+pub(super) struct Field(pub(super) Vec<f32>);
+
+/// Numbers of one element.
+pub(super) const NINE: usize = 9;
+
+/// Numbers beyond the last element that [`Field::with_next`] may read.
+pub(super) const BEYOND: usize = 1;
+
+impl Default for Field {
+    fn default() -> Field {
+        Field(vec![0.0; BEYOND])
+    }
+}
+
+impl Field {
+    pub(super) fn extend(&mut self, len: usize) {
+        let wanted = len * NINE + BEYOND;
+        if wanted > self.0.len() {
+            grow(&mut self.0, wanted);
+        }
+    }
+
+    pub(super) fn renumber(&mut self, to: &Renumbering) {
+        let mut out = Vec::with_capacity(to.old_of().len() * NINE + BEYOND);
+        for &old in to.old_of() {
+            let at = old as usize * NINE;
+            out.extend_from_slice(&self.0[at..at + NINE]);
+        }
+        out.resize(out.len() + BEYOND, 0.0);
+        self.0 = out;
+    }
+
+    #[inline]
+    pub(super) fn get(&self, id: u32) -> Linear {
+        let at = id as usize * NINE;
+        let [r, g, b, ur, ug, ub, vr, vg, vb] =
+            *self.0[at..].first_chunk::<NINE>().expect("an element");
+        Linear { mean: [r, g, b], gradient: [[ur, ug, ub], [vr, vg, vb]] }
+    }
+
+    #[inline]
+    pub(super) fn set(&mut self, id: u32, value: &Linear) {
+        let at = id as usize * NINE;
+        let [[ur, ug, ub], [vr, vg, vb]] = value.gradient;
+        let [r, g, b] = value.mean;
+        self.0[at..at + NINE].copy_from_slice(&[r, g, b, ur, ug, ub, vr, vg, vb]);
+    }
+
+    /// The nine numbers of an element, and the one after them.
+    #[inline(always)]
+    pub(super) fn with_next(&self, id: u32) -> &[f32; NINE + BEYOND] {
+        self.0[id as usize * NINE..].first_chunk().expect("an element")
+    }
+
+    pub(super) fn bytes(&self) -> u64 {
+        (self.0.capacity() * size_of::<f32>()) as u64
+    }
+}
+
+/// Vectors that grow are given room for this share more than they need.
+pub(super) const SLACK: usize = 32;
+
+/// Appends zeros, in the room that there is or else in a little more than is needed.
+pub(super) fn grow(values: &mut Vec<f32>, len: usize) {
+    if len > values.capacity() {
+        let slack = if values.is_empty() { 0 } else { len / SLACK };
+        values.reserve_exact(len + slack - values.len());
+    }
+    values.resize(len, 0.0);
+}

@@ -1,0 +1,53 @@
+//! The sum over the links of a receiver, in vector registers.
+
+use fearless_simd::{Simd, f32x4, prelude::*};
+
+use super::field::{Field, Linear};
+use super::links::{Link, Links};
+use super::surfaces::Surfaces;
+
+/// Everything some receivers gather; each in the order of its links.
+#[inline(always)]
+pub(super) fn gather_some<S: Simd>(
+    simd: S,
+    (radiosity, links): (&Field, &Links),
+    surfaces: &impl Surfaces,
+    receivers: &[u32],
+    out: &mut [Linear],
+) {
+    for (&id, h) in receivers.iter().zip(out) {
+        *h = match links.of(id) {
+            [] => Linear::default(),
+            list => gather_one(simd, radiosity, list, 1.0 / surfaces.place(id).radius),
+        };
+    }
+}
+
+/// Everything one receiver gathers.
+///
+/// Four lanes at a time: red, green, blue and one of no meaning, the number next in memory.
+#[inline(always)]
+fn gather_one<S: Simd>(simd: S, radiosity: &Field, list: &[Link], per_radius: f32) -> Linear {
+    let zero = f32x4::splat(simd, 0.0);
+    let (mut mean, mut gx, mut gy) = (zero, zero, zero);
+    for link in list {
+        let near = radiosity.with_next(link.source);
+        let lanes = |at: usize| f32x4::from_slice(simd, &near[at..at + 4]);
+        let arriving = lanes(0) * link.coupling;
+        let [su, sv] = link.source_gradient();
+        let uneven = lanes(3) * su + lanes(6) * sv;
+        mean += arriving + uneven * (link.coupling * SOURCE_MOMENT);
+        let [ru, rv] = link.receiver_gradient();
+        gx += arriving * ru;
+        gy += arriving * rv;
+    }
+    let three = |lanes: f32x4<S>, scale: f32| {
+        let mut all = [0.0; 4];
+        (lanes * scale).store_slice(&mut all);
+        [all[0], all[1], all[2]]
+    };
+    Linear { mean: three(mean, 1.0), gradient: [three(gx, per_radius), three(gy, per_radius)] }
+}
+
+/// Mean of x^2 / radius^2 over an element, for the product of two gradients: 1/6 for a square.
+const SOURCE_MOMENT: f32 = 1.0 / 6.0;

@@ -1,0 +1,54 @@
+//! Irradiance pushed from the roots of quadtrees down to their leaves; row sums in the same way.
+
+use super::field::Linear;
+use super::links::Links;
+use super::surfaces::{Place, Surfaces};
+
+/// Calls `visit` with the sum of the form factors from each leaf of a facet, over its and its
+/// ancestors' links.
+pub fn row_sums(
+    surfaces: &impl Surfaces,
+    links: &Links,
+    counts: &dyn Fn(u32) -> bool,
+    facet: u32,
+    visit: &mut dyn FnMut(u32, f32),
+) {
+    let own = |id: u32| {
+        let mut sum = Linear::default();
+        let list = links.of(id);
+        for link in list.iter().filter(|l| counts(l.source)) {
+            sum.mean[0] += link.coupling;
+            let [u, v] = link.receiver_gradient();
+            sum.gradient[0][0] += u * link.coupling;
+            sum.gradient[1][0] += v * link.coupling;
+        }
+        if !list.is_empty() {
+            let per_radius = 1.0 / surfaces.place(id).radius;
+            sum.gradient.iter_mut().for_each(|g| g[0] *= per_radius);
+        }
+        sum
+    };
+    let place = surfaces.place(facet);
+    push(surfaces, (facet, &place), &Linear::default(), &own, &mut |id, sum| {
+        visit(id, sum.mean[0]);
+    });
+}
+
+/// Adds `own` up from the root of a quadtree down to its leaves.
+pub(super) fn push(
+    surfaces: &impl Surfaces,
+    (id, place): (u32, &Place),
+    inherited: &Linear,
+    own: &dyn Fn(u32) -> Linear,
+    visit: &mut dyn FnMut(u32, &Linear),
+) {
+    let whole = own(id).plus(inherited);
+    let children = surfaces.children(id);
+    if children.is_empty() {
+        return visit(id, &whole);
+    }
+    for child in children {
+        let at = surfaces.place(child);
+        push(surfaces, (child, &at), &whole.about(place, &at), own, visit);
+    }
+}

@@ -1,0 +1,56 @@
+//! What the solver asks of the hierarchy: quadtrees over facets.
+
+use std::ops::Range;
+
+use crate::element::ElementId;
+
+/// Reflectance and exitance of one material, linear RGB.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lit {
+    /// Reflectance rho.
+    pub reflectance: [f32; 3],
+    /// Exitance M, W/m2.
+    pub exitance: [f32; 3],
+}
+
+/// Where an element lies in its patch's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Centroid, metres.
+    pub centroid: [f32; 2],
+    /// Largest distance of a corner from the centroid, metres.
+    pub radius: f32,
+    /// Mean of (x x, x y, y y) about the centroid, m2.
+    pub moment: [f32; 3],
+}
+
+/// The hierarchy as the solver sees it: quadtrees over facets.
+pub trait Surfaces: Sync {
+    /// Room for elements: ids are below this.
+    fn len(&self) -> usize;
+    /// Whether there are none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+    /// The roots of the quadtrees.
+    fn facets(&self) -> &[ElementId];
+    /// Root of the quadtree that an element is in.
+    fn facet_of(&self, id: u32) -> u32;
+    /// Parent of an element within its quadtree; `None` for a facet.
+    fn parent(&self, id: u32) -> Option<u32>;
+    /// Children of an element within its quadtree.
+    fn children(&self, id: u32) -> Range<u32>;
+    /// Area, m2.
+    fn area_m2(&self, id: u32) -> f64;
+    /// Where an element lies.
+    fn place(&self, id: u32) -> Place;
+    /// What a facet is made of.
+    fn lit(&self, facet: u32) -> &Lit;
+}
+
+pub(super) fn for_each_below(surfaces: &impl Surfaces, id: u32, visit: &mut dyn FnMut(u32)) {
+    visit(id);
+    for child in surfaces.children(id) {
+        for_each_below(surfaces, child, visit);
+    }
+}

@@ -30,6 +30,12 @@ impl Linear {
         Linear { mean: self.at(dx, dy), ..*self }
     }
 
+    /// With gradients per radius instead of per metre.
+    pub(super) fn per_radius(mut self, radius: f32) -> Linear {
+        self.gradient.iter_mut().flatten().for_each(|g| *g *= radius);
+        self
+    }
+
     pub(super) fn plus(mut self, other: &Linear) -> Linear {
         for c in 0..3 {
             self.mean[c] += other.mean[c];

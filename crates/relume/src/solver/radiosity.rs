@@ -51,6 +51,13 @@ const SWEEPS_MAX: u32 = 10_000;
 /// Receivers gathered by one task.
 const CHUNK: usize = 256;
 
+/// Share of the residual below which a change of what a receiver gathers is not taken over: so little
+/// that as many levels as there are add up to less than the residual.
+const GATHERED_SHARE: f32 = 1.0 / 16.0;
+
+/// Levels at which a leaf may have links.
+const LEVELS: f32 = 16.0;
+
 /// What may be left undone, relative to what may be left undone now.
 const HELD_MAX: f32 = 2.0;
 
@@ -141,7 +148,8 @@ impl Radiosity {
             } else {
                 self.held = self.held.max(limit);
             }
-            let left = self.passed_over + self.held * (1.0 + PENDING_SHARE);
+            let left =
+                self.passed_over + self.held * (1.0 + PENDING_SHARE + LEVELS * GATHERED_SHARE);
             self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
             self.sweeps += 1;
             let done = match stop {
@@ -170,7 +178,8 @@ impl Radiosity {
         let mut scratch = std::mem::take(&mut work.scratch);
         for batch in 0..work.batches.len() {
             let mut now = work.take(surfaces, batch);
-            self.gather(surfaces, links, &now.receivers, &mut scratch.gathered);
+            let least = if work.all { 0.0 } else { limit * GATHERED_SHARE };
+            self.gather((surfaces, links), &mut now.receivers, least, &mut scratch.gathered);
             let way = if work.all { None } else { Some(work.way.mark(surfaces, &now)) };
             self.settle(surfaces, &now.facets, (limit, way), &mut scratch.settled);
             for settled in &scratch.settled[..now.facets.len()] {
@@ -208,11 +217,13 @@ impl Radiosity {
         if area > 0.0 { flux / area } else { 0.0 }
     }
 
+    /// Gathers some receivers anew. Those for which that makes less than a `least` difference keep what
+    /// they had, and are left out of `receivers` where all of it is not to be done again.
     fn gather(
         &mut self,
-        surfaces: &impl Surfaces,
-        links: &Links,
-        receivers: &[u32],
+        (surfaces, links): (&impl Surfaces, &Links),
+        receivers: &mut Vec<u32>,
+        least: f32,
         found: &mut Vec<Linear>,
     ) {
         self.gathers += receivers.len() as u64;
@@ -229,9 +240,17 @@ impl Radiosity {
             let chunks = receivers.par_chunks(CHUNK).zip(found.par_chunks_mut(CHUNK));
             chunks.for_each(|(ids, out)| gather(ids, out));
         }
-        for (&id, h) in receivers.iter().zip(found.iter()) {
-            gathered.set(id, h);
-        }
+        let mut next = found.iter();
+        receivers.retain(|&id| {
+            let h = next.next().expect("one for each receiver");
+            let before = gathered.get(id).per_radius(surfaces.place(id).radius);
+            let keep =
+                least > 0.0 && h.per_radius(surfaces.place(id).radius).difference(&before) <= least;
+            if !keep {
+                gathered.set(id, h);
+            }
+            !keep
+        });
     }
 
     /// New radiosities of all elements of some facets, as far as they differ.

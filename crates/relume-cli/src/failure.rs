@@ -40,7 +40,7 @@ impl Failure {
                 io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
                     "free some space, then run again with --resume"
                 }
-                _ => "choose another place with -o, or check its permissions",
+                _ => "choose another place, or check its permissions",
             },
         )
     }

@@ -172,11 +172,12 @@ struct File<'a> {
 /// A counter of a frame's report.
 type Read = fn(&FrameReport) -> u64;
 
-const COUNTERS: [(&str, Read); 17] = [
+const COUNTERS: [(&str, Read); 18] = [
     ("links", |r| r.links),
     ("dynamic_links", |r| r.dynamic_links),
     ("visited", |r| r.visited),
     ("examined", |r| r.examined),
+    ("coarse_examined", |r| r.coarse_examined),
     ("reevaluated", |r| r.reevaluated),
     ("visibility_only", |r| r.visibility_only),
     ("brightness_only", |r| r.brightness_only),

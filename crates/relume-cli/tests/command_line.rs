@@ -155,6 +155,7 @@ fn solve_prints_a_summary_and_writes_a_report() {
         "pairs",
         "visited",
         "examined",
+        "coarse_examined",
         "reevaluated",
         "visibility_only",
         "brightness_only",

@@ -112,6 +112,8 @@ pub struct Work {
     pub visited: u64,
     /// Pairs judged.
     pub examined: u64,
+    /// Pairs judged for the coarse solution, before; each is met again.
+    pub coarse_examined: u64,
     /// Pairs judged because an end moved, or for the first time.
     pub reevaluated: u64,
     /// Pairs judged because something moved between their ends.
@@ -134,13 +136,17 @@ pub struct Work {
     pub elements_made: u64,
 }
 
-impl std::ops::AddAssign for Work {
-    fn add_assign(&mut self, other: Work) {
-        self.visited += other.visited;
-        self.examined += other.examined;
-        self.reevaluated += other.reevaluated;
-        self.visibility_only += other.visibility_only;
-        self.brightness_only += other.brightness_only;
+impl Work {
+    /// Adds an update with the oracle to one down to the coarse level. What was visited and judged is
+    /// that of the second, which comes by every pair of the first again; what was done is that of
+    /// both.
+    pub fn add_after_coarse(&mut self, other: Work) {
+        self.coarse_examined = self.examined;
+        self.visited = other.visited;
+        self.examined = other.examined;
+        self.reevaluated = other.reevaluated;
+        self.visibility_only = other.visibility_only;
+        self.brightness_only = other.brightness_only;
         self.changed += other.changed;
         self.promoted += other.promoted;
         self.demoted += other.demoted;

@@ -51,7 +51,7 @@ impl Session {
             self.follow_coarse(&mut solved, &changes, since.as_mut());
         }
         let fine = bring(&mut solved, since.as_ref(), Level::Fine, &changes.refined)?;
-        changes.work += fine.work;
+        changes.work.add_after_coarse(fine.work);
         changes.edits.extend(fine.edits);
         let work = changes.work;
         report.seconds.evaluate = clock.lap();

@@ -26,8 +26,10 @@ pub struct FrameReport {
     /// Pairs met on the walk through the pair tree: those examined, and those next to them that
     /// turned out to be unaffected.
     pub visited: u64,
-    /// Pairs judged.
+    /// Pairs judged, each counted once.
     pub examined: u64,
+    /// Pairs judged for the coarse solution, beforehand: all of them are visited again.
+    pub coarse_examined: u64,
     /// Of these, pairs judged because an end moved against the other, or for the first time.
     pub reevaluated: u64,
     /// Of these, pairs of which only the visibility may have changed.
@@ -120,6 +122,7 @@ impl FrameReport {
     pub(super) fn count(&mut self, work: &Work) {
         self.visited = work.visited;
         self.examined = work.examined;
+        self.coarse_examined = work.coarse_examined;
         self.reevaluated = work.reevaluated;
         self.visibility_only = work.visibility_only;
         self.brightness_only = work.brightness_only;

@@ -128,38 +128,45 @@ impl Radiosity {
         let mut work = Work::new(surfaces, dirty);
         let mut jump = Jump::default();
         (self.sweeps, self.gathers) = (0, 0);
+        let limit_of = |mean: f64| match stop {
+            Stop::Sweeps(_) => 0.0,
+            Stop::Residual(limit) => (limit * mean) as f32,
+        };
+        let mut limit = limit_of(self.mean(surfaces));
         loop {
-            let mean = self.mean(surfaces);
-            let limit = match stop {
-                Stop::Sweeps(_) => 0.0,
-                Stop::Residual(limit) => (limit * mean) as f32,
-            };
-            if work.all {
-                jump.before(&self.radiosity);
-            }
-            if !work.all && self.held > HELD_MAX * limit && matches!(stop, Stop::Residual(_)) {
+            if self.held > HELD_MAX * limit && !work.all && matches!(stop, Stop::Residual(_)) {
                 // What was little beside a brighter scene is too much beside this one.
                 work.start_all(surfaces);
-                continue;
+            }
+            let all = work.all;
+            if all {
+                jump.before(&self.radiosity);
             }
             let small = self.sweep(surfaces, links, &mut work, limit);
-            if work.all {
+            self.sweeps += 1;
+            if all {
                 (self.passed_over, self.held) = (small, 0.0);
             } else {
                 self.held = self.held.max(limit);
             }
             let left =
                 self.passed_over + self.held * (1.0 + PENDING_SHARE + LEVELS * GATHERED_SHARE);
+            let (mean, before) = (self.mean(surfaces), limit);
+            limit = limit_of(mean);
             self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
-            self.sweeps += 1;
             let done = match stop {
                 Stop::Sweeps(count) => self.sweeps >= count,
+                // Where the sweep itself made the scene much darker, what it left is no longer little.
+                Stop::Residual(_) if before > HELD_MAX * limit => {
+                    work.start_all(surfaces);
+                    false
+                }
                 Stop::Residual(_) => !work.is_left(surfaces, links, limit, &mut self.pending),
             };
             if done || self.sweeps >= SWEEPS_MAX {
                 return;
             }
-            if work.all && matches!(stop, Stop::Residual(_)) {
+            if all && work.all && matches!(stop, Stop::Residual(_)) {
                 jump.after(&mut self.radiosity);
             }
         }

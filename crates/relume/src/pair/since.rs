@@ -72,11 +72,6 @@ impl<'a> Since<'a> {
         Since { old, motion, movers, dimmed: Vec::new(), dimmed_below: Vec::new() }
     }
 
-    /// Whether nothing moved at all.
-    pub fn is_still(&self) -> bool {
-        self.motion[Forest::ROOT.0 as usize] == Motion::Still
-    }
-
     /// Adds how coarse elements (by number) changed their brightness.
     pub fn dim(&mut self, forest: &Forest, coarse: &[u32], dimmed: Vec<Option<Shift>>) {
         self.dimmed_below = vec![false; forest.kept_len() as usize];

@@ -205,8 +205,8 @@ const BLOCK: usize = 1 << 15;
 /// Brings `tree`, with the hash over its links, up to date.
 ///
 /// Edits are recorded if `record` says so. `fresh` are pairs (ascending) that an update with the same
-/// [`Judge::stale`] has refined already: all of their children are looked at. `may_go_on` is asked after each block with the tree, the
-/// number of elements and the scratch memory in bytes.
+/// [`Judge::stale`] has refined already: all of their children are looked at. `may_go_on` is asked
+/// after each block with the tree, the number of elements and the scratch memory in bytes.
 ///
 /// # Errors
 /// [`OutOfMemory`] as soon as `may_go_on` says no; the tree is of no use then.
@@ -306,7 +306,6 @@ fn judge_block<'a, J: Judge>(
         let mut narrowed = Vec::new();
         let look = |item: &Item| {
             let (a, b) = tree.ends(item.pair);
-
             let stale = match tree.state(item.pair) {
                 State::New => Stale::New,
                 _ if fresh.binary_search(&item.pair).is_ok() => Stale::New,

@@ -250,9 +250,12 @@ impl Radiosity {
         let mut next = found.iter();
         receivers.retain(|&id| {
             let h = next.next().expect("one for each receiver");
-            let before = gathered.get(id).per_radius(surfaces.place(id).radius);
-            let keep =
-                least > 0.0 && h.per_radius(surfaces.place(id).radius).difference(&before) <= least;
+            let is_little = || {
+                let radius = surfaces.place(id).radius;
+                let before = gathered.get(id).per_radius(radius);
+                h.per_radius(radius).difference(&before) <= least
+            };
+            let keep = least > 0.0 && is_little();
             if !keep {
                 gathered.set(id, h);
             }
@@ -291,12 +294,6 @@ impl Radiosity {
         }
     }
 
-    /// Radiosity of an element: mean, and gradient per radius, W/m2.
-    #[inline]
-    pub fn linear_radiosity(&self, id: u32) -> Linear {
-        self.radiosity.get(id)
-    }
-
     /// Radiosity of an element, W/m2.
     #[inline]
     pub fn radiosity(&self, id: u32) -> [f32; 3] {
@@ -331,12 +328,12 @@ mod tests {
 
     use super::*;
 
-    /// Two plates, the second split in two, with given couplings.
+    /// Two plates, the second split in two, and a lamp without area; with given couplings.
     struct Plates(Lit, [ElementId; 2]);
 
     impl Surfaces for Plates {
         fn len(&self) -> usize {
-            4
+            5
         }
         fn facets(&self) -> &[ElementId] {
             &self.1
@@ -351,7 +348,7 @@ mod tests {
             if id == 1 { 2..4 } else { 0..0 }
         }
         fn area_m2(&self, id: u32) -> f64 {
-            if id >= 2 { 0.5 } else { 1.0 }
+            [1.0, 1.0, 0.5, 0.5, 0.0][id as usize]
         }
         fn place(&self, id: u32) -> Place {
             let x = [0.0, 0.0, -0.25, 0.25][id as usize];
@@ -384,6 +381,27 @@ mod tests {
                 assert!((value - want).abs() < 1e-4, "{id} {value} {want}");
             }
         }
+    }
+
+    #[test]
+    fn a_lamp_that_goes_out_leaves_no_glow_where_it_was_little() {
+        let (plates, _) = plates();
+        let mut links = Links::default();
+        links.extend(5);
+        for (receiver, source, coupling) in [(0, 4, 1.0), (2, 0, 1e-5), (3, 0, 1e-5)] {
+            links.set(receiver, Link { source, coupling, ..Link::default() });
+        }
+        let mut b = Radiosity::new(&plates);
+        b.set(4, [1e6; 3]);
+        b.solve(&plates, &links, Dirty::All, Stop::Residual(1e-3));
+        assert!(b.radiosity(2)[0] > 3.0);
+        links.remove(0, 4);
+        let dirty = Dirty::Some { receivers: vec![0], parents: vec![] };
+        b.solve(&plates, &links, dirty, Stop::Residual(1e-3));
+        for id in 0..4 {
+            assert!((b.radiosity(id)[0] - 1.0).abs() < 0.01, "{id}: {:?}", b.radiosity(id));
+        }
+        assert!(b.residual <= 3e-3, "{}", b.residual);
     }
 
     #[test]

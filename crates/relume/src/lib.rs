@@ -9,6 +9,7 @@
 //! | [`scene`] | glTF in; bodies, patches, materials, motion: validated, then immutable |
 //! | [`element`] | the element forest: clusters, patches and their quadtrees |
 //! | [`transport`] | exchange area and visibility of two elements: pure queries |
+//! | [`event`] | what the known motion allows within the coming time, and until when |
 //! | [`pair`] | the pair tree, oracles and verdicts |
 //! | [`solver`] | gather, push, pull, residual |
 //! | [`session`] | owns all state; runs the phases of a frame; snapshots out |
@@ -17,6 +18,7 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods, clippy::disallowed_types))]
 
 pub mod element;
+pub mod event;
 pub mod geometry;
 pub mod pair;
 pub mod scene;

@@ -5,6 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::element::{ElementId, ElementKey, Forest, Kind, WorldElement, WorldLight, WorldView};
+use crate::event::{Foresight, Tick};
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
 use crate::scene::{BodyId, LightKind, PatchId};
 use crate::transport::{
@@ -13,6 +14,7 @@ use crate::transport::{
 };
 
 use super::brightness::Brightness;
+use super::certificate::{Finding, Outlook};
 use super::hash::pair_key;
 use super::margin::Margin;
 use super::oracle::{End, Oracle, Side, estimate};
@@ -43,6 +45,8 @@ pub struct Placed<'a> {
     pub simd: Simd,
     /// What happened since the last update; `None` where there was none.
     pub since: Option<&'a Since<'a>>,
+    /// What the known motion allows next; `None` where certificates are not asked for.
+    pub ahead: Option<&'a Foresight>,
 }
 
 impl Hierarchy for Placed<'_> {
@@ -103,16 +107,54 @@ impl Judge for Placed<'_> {
         Some(Margin { error, side: Margin::less(margin.side, most - least)? })
     }
 
-    fn stale(&self, a: ElementId, b: ElementId) -> Stale {
+    fn stale(&self, a: ElementId, b: ElementId, certified: bool) -> Stale {
         let Some(since) = self.since else { return Stale::Moved };
         let brightness = match self.stage {
             Stage::Fine(_) => since.brightness(self.forest, a, b),
             Stage::Coarse => Stale::Nothing,
         };
-        match since.geometry(self.forest, self.view, a, b) {
-            Stale::Nothing => brightness,
-            moved => moved,
+        let geometry = match certified {
+            true if since.moved(self.forest, self.view, a, b) => Stale::Followed,
+            true => Stale::Nothing,
+            false => since.geometry(self.forest, self.view, a, b),
+        };
+        if geometry == Stale::Nothing { brightness } else { geometry }
+    }
+
+    fn narrow(
+        &self,
+        a: ElementId,
+        b: ElementId,
+        candidates: &[u32],
+        narrowed: &mut Vec<u32>,
+    ) -> bool {
+        match (self.forest.kind(a), self.forest.kind(b)) {
+            (Kind::Element, Kind::Element) => {
+                let by_area = matches!(self.oracle, Oracle::FormFactor { .. });
+                if !by_area && !self.is_above_coarse(a, b) {
+                    return false;
+                }
+                let places = Places::new(self, (a, b), !candidates.is_empty());
+                places.shaft(self).narrow(candidates, narrowed);
+            }
+            (Kind::Light, _) | (_, Kind::Light) => return false,
+            _ if a == b => narrowed.extend_from_slice(candidates),
+            _ => {
+                let body = self.body_of(a).filter(|&body| self.body_of(b) == Some(body));
+                let shaft = BoxShaft::new(self.view, self.forest, (a, b), body);
+                shaft.narrow(candidates, narrowed);
+            }
         }
+        true
+    }
+
+    fn certified(&self, due: Tick) -> bool {
+        self.ahead.is_some_and(|ahead| ahead.holds(due))
+    }
+
+    fn foresee(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick {
+        let Some(ahead) = self.ahead else { return 0 };
+        Outlook { forest: self.forest, view: self.view, ahead }.until(a, b, finding)
     }
 
     fn holds(&self, a: ElementId, b: ElementId) -> bool {
@@ -216,28 +258,19 @@ impl Placed<'_> {
         if !self.view.is_present(bodies.0) || !self.view.is_present(bodies.1) {
             return culled(CullReason::Absent);
         }
-        let one_body = bodies.0 == bodies.1;
-        let place = |id, in_body| WorldElement::new(self.view, self.forest, id, in_body);
-        // Light between two elements of one body must not depend on where the body is.
-        let (own_a, own_b) = (place(a, one_body), place(b, one_body));
-        let met = meeting(&own_a, &own_b);
+        let places = Places::new(self, (a, b), !candidates.is_empty());
+        let met = meeting(&places.own.0, &places.own.1);
         if met == Meeting::Away {
             return culled(CullReason::FacingAway);
         }
-        let (world_a, world_b);
-        let shaft = if one_body && !candidates.is_empty() {
-            (world_a, world_b) = (place(a, false), place(b, false));
-            self.shaft((&world_a, &world_b), Some((bodies.0, &own_a, &own_b)), patches)
-        } else {
-            self.shaft((&own_a, &own_b), None, patches)
-        };
+        let shaft = places.shaft(self);
         let start = narrowed.len();
         shaft.narrow(candidates, narrowed);
         let candidates = &narrowed[start..];
         if self.is_above_coarse(a, b) {
             return passing(Verdict::Refine(self.larger_above_coarse(a, b)), 0);
         }
-        self.decide((a, b), (&own_a, &own_b), met, &shaft, candidates)
+        self.decide((a, b), (&places.own.0, &places.own.1), met, &shaft, candidates)
     }
 
     fn shaft<'a>(
@@ -439,6 +472,37 @@ impl Placed<'_> {
 
     fn refine_if(&self, wanted: bool, side: Side) -> Verdict {
         if wanted { Verdict::Refine(side) } else { Verdict::Link }
+    }
+}
+
+/// Where the two elements of a pair are.
+struct Places {
+    /// In the frame that their light must not depend on: their body's if they have one in common.
+    own: (WorldElement, WorldElement),
+    /// In the world, where that differs and is asked for.
+    world: Option<(BodyId, WorldElement, WorldElement)>,
+    patches: (PatchId, PatchId),
+}
+
+impl Places {
+    fn new(at: &Placed<'_>, (a, b): (ElementId, ElementId), world: bool) -> Places {
+        let patches = (at.patch_of(a), at.patch_of(b));
+        let body = at.view.patch(patches.0).body;
+        let one_body = at.view.patch(patches.1).body == body;
+        let place = |id, in_body| WorldElement::new(at.view, at.forest, id, in_body);
+        Places {
+            own: (place(a, one_body), place(b, one_body)),
+            world: (one_body && world).then(|| (body, place(a, false), place(b, false))),
+            patches,
+        }
+    }
+
+    fn shaft<'a>(&'a self, at: &'a Placed<'_>) -> Shaft<'a> {
+        let (own_a, own_b) = (&self.own.0, &self.own.1);
+        match &self.world {
+            Some((body, a, b)) => at.shaft((a, b), Some((*body, own_a, own_b)), self.patches),
+            None => at.shaft((own_a, own_b), None, self.patches),
+        }
     }
 }
 

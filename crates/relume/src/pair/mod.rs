@@ -4,6 +4,7 @@
 //! this room knows no history, and no radiosity beyond the [`Brightness`] it is handed.
 
 mod brightness;
+mod certificate;
 mod hash;
 mod judge;
 mod margin;
@@ -13,6 +14,7 @@ mod tree;
 mod update;
 
 pub use brightness::{Brightness, Light};
+pub use certificate::Finding;
 pub use hash::{PairHash, pair_key};
 pub use judge::{Placed, Stage};
 pub use margin::{Margin, Shift};

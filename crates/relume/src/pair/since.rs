@@ -113,6 +113,20 @@ impl<'a> Since<'a> {
         Shift::of_pair(&shift(a), &shift(b))
     }
 
+    /// Whether the ends of a pair moved against each other.
+    pub(super) fn moved(
+        &self,
+        forest: &Forest,
+        new: &WorldView,
+        a: ElementId,
+        b: ElementId,
+    ) -> bool {
+        let moved = |id| self.motion[forest.fixed(id).0 as usize] != Motion::Still;
+        let body = body_of(forest, new, a);
+        let one_body = body.is_some() && body_of(forest, new, b) == body;
+        !one_body && (moved(a) || moved(b))
+    }
+
     /// What the motion means to a pair.
     pub(super) fn geometry(
         &self,
@@ -121,11 +135,11 @@ impl<'a> Since<'a> {
         a: ElementId,
         b: ElementId,
     ) -> Stale {
-        let motion = |id| self.motion[forest.fixed(id).0 as usize];
-        let body = body_of(forest, new, a).filter(|&body| body_of(forest, new, b) == Some(body));
-        if body.is_none() && (motion(a) != Motion::Still || motion(b) != Motion::Still) {
+        if self.moved(forest, new, a, b) {
             return Stale::Moved;
         }
+        let motion = |id| self.motion[forest.fixed(id).0 as usize];
+        let body = body_of(forest, new, a).filter(|&body| body_of(forest, new, b) == Some(body));
         if self.movers.is_empty() {
             return Stale::Nothing;
         }

@@ -3,6 +3,7 @@
 use glam::DVec2;
 
 use crate::element::{ElementId, Renumbering};
+use crate::event::Tick;
 
 use super::margin::Margin;
 use super::oracle::Side;
@@ -242,6 +243,8 @@ pub struct PairTree {
     /// First ids of vacant groups of siblings, by their number.
     vacant: Vec<Vec<u32>>,
     counts: StateCounts,
+    /// Until when each pair's certificate stands; empty where none was issued.
+    due: Vec<Tick>,
 }
 
 impl PairTree {
@@ -272,7 +275,8 @@ impl PairTree {
     pub fn memory_bytes(&self) -> u64 {
         let lists: usize =
             self.vacant.iter().map(|l| l.capacity() * 4 + size_of::<Vec<u32>>()).sum();
-        (self.nodes.capacity() * size_of::<Node>() + lists) as u64
+        let due = self.due.capacity() * size_of::<Tick>();
+        (self.nodes.capacity() * size_of::<Node>() + due + lists) as u64
     }
 
     /// Room that no pair has.
@@ -293,24 +297,33 @@ impl PairTree {
     /// Puts all pairs together so that no room is vacant: parents before children, level by level.
     pub fn compact(&mut self) {
         let old = std::mem::take(&mut self.nodes);
+        let due = std::mem::take(&mut self.due);
+        let old_due = |k: usize| due.get(k).copied().unwrap_or(0);
         self.nodes.reserve_exact(self.len());
         self.nodes.push(old[0]);
+        self.due.push(old_due(0));
         let mut at = 0;
         while at < self.nodes.len() {
             if self.nodes[at].state().is_refined() {
                 let children = self.children(PairId(at as u32));
                 self.nodes[at].payload[0] = self.nodes.len() as u32;
-                self.nodes.extend_from_slice(&old[children.start as usize..children.end as usize]);
+                let children = children.start as usize..children.end as usize;
+                self.nodes.extend_from_slice(&old[children.clone()]);
+                self.due.extend(children.map(old_due));
             }
             at += 1;
         }
         debug_assert_eq!(self.nodes.len(), self.len());
+        if due.is_empty() {
+            self.due = Vec::new();
+        }
         self.vacant = Vec::new();
     }
 
     /// Gives back room beyond a small reserve.
     pub fn trim(&mut self) {
         self.nodes.shrink_to(self.nodes.len() + self.nodes.len() / SLACK);
+        self.due.shrink_to(self.due.len() + self.due.len() / SLACK);
         self.vacant.iter_mut().for_each(|list| list.shrink_to(2 * list.len()));
     }
 
@@ -388,6 +401,29 @@ impl PairTree {
         }
     }
 
+    /// Until when a pair's certificate stands; 0 without one.
+    #[inline]
+    pub(super) fn due(&self, id: PairId) -> Tick {
+        self.due.get(id.0 as usize).copied().unwrap_or(0)
+    }
+
+    pub(super) fn set_due(&mut self, id: PairId, due: Tick) {
+        let at = id.0 as usize;
+        if at >= self.due.len() {
+            if due == 0 {
+                return;
+            }
+            self.due.reserve_exact(self.nodes.len() - self.due.len());
+            self.due.resize(self.nodes.len(), 0);
+        }
+        self.due[at] = due;
+    }
+
+    /// Takes back all certificates.
+    pub fn void(&mut self) {
+        self.due = Vec::new();
+    }
+
     fn count(&mut self, state: State, by: i64) {
         let slot = match state {
             State::Active => &mut self.counts.active,
@@ -414,6 +450,7 @@ impl PairTree {
             for (node, (a, b)) in self.nodes[first as usize..].iter_mut().zip(ends) {
                 *node = Node::new(a, b, State::New);
             }
+            (first..first + count as u32).for_each(|id| self.set_due(PairId(id), 0));
         }
         self.set_state(parent, state);
         self.nodes[parent.0 as usize].payload = [first, count as u32, 0];

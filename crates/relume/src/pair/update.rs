@@ -9,7 +9,9 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::element::{ElementId, ElementKey};
+use crate::event::Tick;
 
+use super::certificate::Finding;
 use super::hash::{PairHash, pair_key};
 use super::margin::Margin;
 use super::oracle::Side;
@@ -54,6 +56,8 @@ pub enum Stale {
     Brightness,
     /// What stands between its ends.
     Occlusion,
+    /// Where its ends are; by certificate nothing stands between them.
+    Followed,
     /// Where its ends are.
     Moved,
     /// Everything: it has not been judged yet.
@@ -98,8 +102,25 @@ pub trait Judge: Hierarchy + Sync {
         margin: Margin,
     ) -> Option<Margin>;
 
-    /// What may have changed of a pair since the last update.
-    fn stale(&self, a: ElementId, b: ElementId) -> Stale;
+    /// What may have changed of a pair since the last update. Of a pair that is `certified` (and not
+    /// culled) nothing stands between its ends, or what does is as it was.
+    fn stale(&self, a: ElementId, b: ElementId, certified: bool) -> Stale;
+
+    /// Does the part of [`Judge::judge`] that a change of occlusion asks for, for a refined pair with
+    /// ends at rest, if its verdict does not depend on occlusion. Whether that is so.
+    fn narrow(
+        &self,
+        a: ElementId,
+        b: ElementId,
+        candidates: &[u32],
+        narrowed: &mut Vec<u32>,
+    ) -> bool;
+
+    /// Whether a certificate stands at this instant.
+    fn certified(&self, due: Tick) -> bool;
+
+    /// The last tick until which the known motion cannot change what was found of a pair; 0 if none.
+    fn foresee(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick;
 
     /// Whether this pair is one of those that are held when it is not culled.
     fn holds(&self, a: ElementId, b: ElementId) -> bool;
@@ -112,6 +133,11 @@ pub struct Work {
     pub visited: u64,
     /// Pairs judged.
     pub examined: u64,
+    /// Pairs whose exchange area alone followed the motion of their ends: by certificate nothing
+    /// stands between them.
+    pub followed: u64,
+    /// Pairs passed over, with all below them, because their certificate stands.
+    pub certified: u64,
     /// Pairs judged for the coarse solution, before; each is met again.
     pub coarse_examined: u64,
     /// Pairs judged because an end moved, or for the first time.
@@ -144,6 +170,8 @@ impl Work {
         self.coarse_examined = self.examined;
         self.visited = other.visited;
         self.examined = other.examined;
+        self.followed = other.followed;
+        self.certified = other.certified;
         self.reevaluated = other.reevaluated;
         self.visibility_only = other.visibility_only;
         self.brightness_only = other.brightness_only;
@@ -253,7 +281,7 @@ struct Item {
 }
 
 /// Some candidates of a wave.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct List {
     start: u32,
     len: u32,
@@ -272,8 +300,18 @@ impl Wave {
 }
 
 impl List {
+    /// No candidates, by the certificate of a pair above.
+    const CLEAR: List = List { start: u32::MAX, len: 0 };
+
+    fn since(start: usize, candidates: &[u32]) -> List {
+        List { start: start as u32, len: (candidates.len() - start) as u32 }
+    }
+
     fn of(self, candidates: &[u32]) -> &[u32] {
-        &candidates[self.start as usize..(self.start + self.len) as usize]
+        match self.len {
+            0 => &[],
+            len => &candidates[self.start as usize..(self.start + len) as usize],
+        }
     }
 }
 
@@ -285,14 +323,18 @@ struct Chunk<'a> {
 
 /// What a look at a pair found.
 enum Look {
-    /// Nothing can have changed here or below.
-    Unaffected,
+    /// Nothing can have changed here or below, by certificate.
+    Certified,
+    /// Nothing has changed here or below, nor can it until then.
+    Unaffected(Tick),
     /// Look at the children.
     Descend,
+    /// Look at the children, with these candidates.
+    Narrowed(List),
     /// The light changed, the verdict did not; look at the children.
     Withstands(Margin),
-    /// Judged, with the candidates of its children.
-    Judged(Judgement, Stale, List),
+    /// Judged, with the candidates of its children and a certificate, unless the one it has stays.
+    Judged(Judgement, Stale, List, Option<Tick>),
 }
 
 fn judge_block<'a, J: Judge>(
@@ -304,37 +346,70 @@ fn judge_block<'a, J: Judge>(
 ) -> Vec<Chunk<'a>> {
     let judge_chunk = |items: &'a [Item]| {
         let mut narrowed = Vec::new();
-        let look = |item: &Item| {
-            let (a, b) = tree.ends(item.pair);
-            let stale = match tree.state(item.pair) {
-                State::New => Stale::New,
-                _ if fresh.binary_search(&item.pair).is_ok() => Stale::New,
-                _ => judge.stale(a, b),
-            };
-            if stale == Stale::Brightness {
-                let is_link = tree.state(item.pair) == State::Active;
-                if let Some(left) = judge.withstands(a, b, is_link, tree.margin(item.pair)) {
-                    return Look::Withstands(left);
-                }
-            }
-            match stale {
-                Stale::Nothing => Look::Unaffected,
-                Stale::Below => Look::Descend,
-                Stale::Brightness | Stale::Occlusion | Stale::Moved | Stale::New => {
-                    let start = narrowed.len();
-                    let found = judge.judge(a, b, item.list.of(candidates), &mut narrowed);
-                    if !matches!(found.verdict, Verdict::Refine(_) | Verdict::RefineSelf) {
-                        narrowed.truncate(start);
-                    }
-                    let len = (narrowed.len() - start) as u32;
-                    Look::Judged(found, stale, List { start: start as u32, len })
-                }
-            }
-        };
-        let looks = items.iter().map(look).collect();
+        let looks = items
+            .iter()
+            .map(|item| look_at(tree, judge, item, (candidates, &mut narrowed), fresh))
+            .collect();
         Chunk { items, looks, candidates: narrowed }
     };
     items.par_chunks(CHUNK).map(judge_chunk).collect()
+}
+
+fn look_at<J: Judge>(
+    tree: &PairTree,
+    judge: &J,
+    item: &Item,
+    (candidates, narrowed): (&[u32], &mut Vec<u32>),
+    fresh: &[PairId],
+) -> Look {
+    let (a, b) = tree.ends(item.pair);
+    let state = tree.state(item.pair);
+    let new = state == State::New || fresh.binary_search(&item.pair).is_ok();
+    let certified = !new && judge.certified(tree.due(item.pair));
+    if certified && matches!(state, State::Culled(_)) {
+        return Look::Certified;
+    }
+    let stale = match new {
+        true => Stale::New,
+        false => judge.stale(a, b, certified || item.list == List::CLEAR),
+    };
+    if stale == Stale::Brightness {
+        let is_link = state == State::Active;
+        if let Some(left) = judge.withstands(a, b, is_link, tree.margin(item.pair)) {
+            return Look::Withstands(left);
+        }
+    }
+    let start = narrowed.len();
+    match stale {
+        Stale::Nothing if certified => return Look::Certified,
+        Stale::Nothing => return Look::Unaffected(judge.foresee(a, b, Finding::Unaffected)),
+        Stale::Below => return Look::Descend,
+        Stale::Occlusion if state.is_refined() => {
+            if judge.narrow(a, b, item.list.of(candidates), narrowed) {
+                return Look::Narrowed(List::since(start, narrowed));
+            }
+        }
+        _ => {}
+    }
+    let candidates = if stale == Stale::Followed { &[] } else { item.list.of(candidates) };
+    let found = judge.judge(a, b, candidates, narrowed);
+    let refined = matches!(found.verdict, Verdict::Refine(_) | Verdict::RefineSelf);
+    let clear = narrowed.len() == start || (!refined && found.segments == 0);
+    if !refined {
+        narrowed.truncate(start);
+    }
+    let due = match (found.verdict, stale) {
+        (Verdict::Cull(_), _) => Some(judge.foresee(a, b, Finding::Culled)),
+        (_, Stale::Followed) => None,
+        // It is met again, perhaps still in the state that it had.
+        (Verdict::Hold, _) => Some(0),
+        (_, Stale::Moved) if clear && !candidates.is_empty() => {
+            Some(judge.foresee(a, b, Finding::Clear))
+        }
+        _ => Some(0),
+    };
+    let list = if stale == Stale::Followed { List::CLEAR } else { List::since(start, narrowed) };
+    Look::Judged(found, stale, list, due)
 }
 
 /// The one writer of a tree.
@@ -352,20 +427,28 @@ impl<J: Judge> Editor<'_, J> {
         for (item, look) in chunk.items.iter().zip(&chunk.looks) {
             self.changes.work.visited += 1;
             match look {
-                Look::Unaffected => {}
+                Look::Certified => self.changes.work.certified += 1,
+                Look::Unaffected(due) => self.tree.set_due(item.pair, *due),
                 Look::Descend => {
                     let children = self.tree.children(item.pair);
-                    self.look_at(children, item.list.of(&wave.candidates));
+                    self.look_at(children, item.list, &wave.candidates);
+                }
+                Look::Narrowed(list) => {
+                    let children = self.tree.children(item.pair);
+                    self.look_at(children, *list, &chunk.candidates);
                 }
                 Look::Withstands(margin) => {
                     self.tree.set_margin(item.pair, *margin);
                     let children = self.tree.children(item.pair);
-                    self.look_at(children, item.list.of(&wave.candidates));
+                    self.look_at(children, item.list, &wave.candidates);
                 }
-                Look::Judged(found, stale, list) => {
+                Look::Judged(found, stale, list, due) => {
                     self.count(found, *stale);
                     let children = self.apply(item.pair, found, *stale);
-                    self.look_at(children, list.of(&chunk.candidates));
+                    if let Some(due) = due {
+                        self.tree.set_due(item.pair, *due);
+                    }
+                    self.look_at(children, *list, &chunk.candidates);
                 }
             }
         }
@@ -373,18 +456,25 @@ impl<J: Judge> Editor<'_, J> {
 
     fn count(&mut self, found: &Judgement, stale: Stale) {
         let work = &mut self.changes.work;
-        work.examined += 1;
         work.segments += u64::from(found.segments);
+        if stale == Stale::Followed {
+            work.followed += 1;
+            return;
+        }
+        work.examined += 1;
         match stale {
             Stale::Occlusion => work.visibility_only += 1,
             Stale::Brightness => work.brightness_only += 1,
-            Stale::Moved | Stale::New | Stale::Below | Stale::Nothing => work.reevaluated += 1,
+            _ => work.reevaluated += 1,
         }
     }
 
-    fn look_at(&mut self, pairs: Range<u32>, candidates: &[u32]) {
+    fn look_at(&mut self, pairs: Range<u32>, list: List, candidates: &[u32]) {
         if !pairs.is_empty() {
-            let list = self.next.push_candidates(candidates);
+            let list = match list {
+                List::CLEAR => list,
+                _ => self.next.push_candidates(list.of(candidates)),
+            };
             self.next.items.extend(pairs.map(|id| Item { pair: PairId(id), list }));
         }
     }
@@ -404,8 +494,8 @@ impl<J: Judge> Editor<'_, J> {
             Verdict::Cull(reason) => State::Culled(reason),
         };
         let moved = match stale {
-            Stale::New => wanted == State::Active && self.judge.stale(a, b) == Stale::Moved,
-            stale => wanted == State::Active && stale == Stale::Moved,
+            Stale::New => wanted == State::Active && self.judge.stale(a, b, false) == Stale::Moved,
+            stale => wanted == State::Active && matches!(stale, Stale::Moved | Stale::Followed),
         };
         let work = &mut self.changes.work;
         work.dynamic_links += u64::from(moved);

@@ -12,6 +12,7 @@ mod assemble;
 mod builder;
 mod check;
 mod draft;
+mod drift;
 mod error;
 mod flatten;
 mod import;
@@ -22,6 +23,7 @@ mod rigid;
 
 pub use builder::SceneBuilder;
 pub use check::check;
+pub use drift::Drift;
 pub use error::SceneError;
 pub use import::{ImportOptions, import};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};

@@ -3,6 +3,7 @@
 //! Without a state to start from, the same edits build it: a cold build is the update of nothing.
 
 use crate::element::{ElementId, Forest, Kind, WorldView};
+use crate::event::{Foresight, Ticks};
 use crate::pair::{Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Since, Stage, update};
 use crate::scene::BodyId;
 use crate::solver::{Dirty, Links, Radiosity, Stop};
@@ -10,7 +11,7 @@ use crate::solver::{Dirty, Links, Radiosity, Stop};
 use super::coarse::{self, Coarse};
 use super::report::FrameReport;
 use super::surfaces::{LitForest, apply_edits, links_of};
-use super::{Clock, FOLLOWED_SHARE, RESIDUAL_SHARE, Session, SessionError, Solved, tally};
+use super::{Clock, FOLLOWED_SHARE, RESIDUAL_SHARE, Session, SessionError, Solved, Update, tally};
 
 impl Session {
     /// Whether nothing at all differs between the last state and this time.
@@ -40,10 +41,12 @@ impl Session {
         let mut since =
             (!cold).then(|| Since::new(&self.scene, &solved.forest, &old, &solved.view));
         report.seconds.moving = clock.lap();
+        let ahead = if cold { None } else { self.look_ahead(&mut solved, &old, time_s) };
+        report.seconds.predict = clock.lap();
 
         let mut changes = Changes::default();
         let bring = |solved: &mut Solved, since: Option<&Since<'_>>, level, fresh: &[PairId]| {
-            let found = self.update(solved, since, level, (!cold, fresh));
+            let found = self.update(solved, (since, ahead.as_ref()), level, (!cold, fresh));
             found.map_err(|OutOfMemory| self.too_large(solved, frame))
         };
         if !self.coarse_ids.is_empty() {
@@ -90,12 +93,25 @@ impl Session {
         Ok(solved)
     }
 
+    /// What certificates rest on, from this time on; those that no longer hold are taken back.
+    fn look_ahead(&self, solved: &mut Solved, old: &WorldView, time_s: f64) -> Option<Foresight> {
+        if self.options.update != Update::Certificate {
+            return None;
+        }
+        let void = solved.ticks.go(solved.time_s, time_s);
+        if void || old.far_m() != solved.view.far_m() {
+            solved.tree.void();
+        }
+        Some(Foresight::new(&self.scene, &solved.ticks, time_s))
+    }
+
     /// Nothing but the seed and an unjudged root.
     fn blank(&self, time_s: f64) -> Solved {
         Solved {
             time_s,
             forest: self.seed.clone(),
             view: WorldView::new(&self.scene, &self.seed, time_s),
+            ticks: Ticks::default(),
             tree: PairTree::new(Forest::ROOT),
             hash: PairHash::default(),
             links: Links::default(),
@@ -108,7 +124,7 @@ impl Session {
     fn update(
         &self,
         solved: &mut Solved,
-        since: Option<&Since<'_>>,
+        (since, ahead): (Option<&Since<'_>>, Option<&Foresight>),
         level: Level,
         record_and_fresh: (bool, &[PairId]),
     ) -> Result<Changes, OutOfMemory> {
@@ -129,6 +145,7 @@ impl Session {
             oracle: self.options.pair_oracle(),
             simd: self.simd,
             since,
+            ahead,
         };
         let tree = (&mut solved.tree, &mut solved.hash);
         update(tree, &mut placed, &[Forest::ROOT.0], record_and_fresh, &may_go_on)

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::element::{ElementId, Forest, WorldView};
+use crate::event::Ticks;
 use crate::pair::{PairHash, PairTree};
 use crate::scene::{BodyId, Scene};
 use crate::solver::{Links, Radiosity};
@@ -68,6 +69,8 @@ struct Solved {
     time_s: f64,
     forest: Forest,
     view: WorldView,
+    /// By which certificates expire.
+    ticks: Ticks,
     tree: PairTree,
     hash: PairHash,
     links: Links,

@@ -20,7 +20,7 @@ impl Default for Options {
         Options {
             tolerance: 0.02,
             oracle: Oracle::Error,
-            update: Update::Reinspect,
+            update: Update::Certificate,
             balance: true,
             max_memory_bytes: None,
         }
@@ -49,6 +49,9 @@ pub enum Update {
     Scratch,
     /// Look again at every pair that the motion since the last step may concern, and at no other.
     Reinspect,
+    /// The same, but pairs that the known motion cannot concern before some time are not looked at
+    /// until then. The links are the same, bit for bit.
+    Certificate,
 }
 
 impl Options {

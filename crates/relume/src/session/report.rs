@@ -28,6 +28,11 @@ pub struct FrameReport {
     pub visited: u64,
     /// Pairs judged, each counted once.
     pub examined: u64,
+    /// Pairs with moved ends of which the exchange area alone was evaluated: by certificate nothing
+    /// stands between their ends.
+    pub followed: u64,
+    /// Pairs passed over, with all below them, because their certificate stands.
+    pub certified: u64,
     /// Pairs judged for the coarse solution, beforehand: all of them are visited again.
     pub coarse_examined: u64,
     /// Of these, pairs judged because an end moved against the other, or for the first time.
@@ -122,6 +127,8 @@ impl FrameReport {
     pub(super) fn count(&mut self, work: &Work) {
         self.visited = work.visited;
         self.examined = work.examined;
+        self.followed = work.followed;
+        self.certified = work.certified;
         self.coarse_examined = work.coarse_examined;
         self.reevaluated = work.reevaluated;
         self.visibility_only = work.visibility_only;

@@ -20,6 +20,8 @@ pub(crate) struct Seen {
     pub(crate) occluded: u64,
     pub(crate) reaped: u64,
     pub(crate) still: u64,
+    pub(crate) certified: u64,
+    pub(crate) followed: u64,
     /// Largest difference of radiosities, as a share of what is allowed.
     pub(crate) drift: f64,
 }
@@ -32,6 +34,8 @@ impl std::ops::AddAssign for Seen {
         self.occluded += other.occluded;
         self.reaped += other.reaped;
         self.still += other.still;
+        self.certified += other.certified;
+        self.followed += other.followed;
         self.drift = self.drift.max(other.drift);
     }
 }
@@ -70,6 +74,8 @@ fn follow_unguarded(recipe: &Recipe) -> Result<Seen, String> {
                 occluded: one.occlusion_changed,
                 reaped: one.elements_reaped,
                 still: u64::from(one.visited == 0),
+                certified: one.certified,
+                followed: one.followed,
                 drift,
             };
         }

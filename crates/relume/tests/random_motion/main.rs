@@ -21,9 +21,19 @@ use relume::session::Session;
 const STEPS: usize = 16;
 
 fn check(flavour: Flavour, draws: Range<u64>) -> Seen {
+    check_recipes(flavour, draws, |seed| Recipe::draw(flavour, seed, STEPS))
+}
+
+fn check_steady(flavour: Flavour, draws: Range<u64>) {
+    let seen = check_recipes(flavour, draws, |seed| Recipe::steady(flavour, seed, STEPS));
+    // Pairs passed over by certificate, and pairs of which only X followed.
+    assert!(seen.certified > seen.motions && seen.followed > seen.motions);
+}
+
+fn check_recipes(flavour: Flavour, draws: Range<u64>, draw: impl Fn(u64) -> Recipe) -> Seen {
     let mut seen = Seen::default();
     for seed in draws.clone() {
-        let recipe = Recipe::draw(flavour, seed, STEPS);
+        let recipe = draw(seed);
         match follow(&recipe) {
             Ok(found) => seen += found,
             Err(why) => {
@@ -63,6 +73,14 @@ fn lights_that_move() {
 #[test]
 fn bodies_that_ride_on_others() {
     check(Flavour::Families, 0..16);
+}
+
+#[test]
+fn steady_motion() {
+    use Flavour::{Contact, Families, Free, Jumps, Lights};
+    for flavour in [Free, Contact, Jumps, Lights, Families] {
+        check_steady(flavour, 0..8);
+    }
 }
 
 #[test]
@@ -131,6 +149,7 @@ fn ten_thousand_frames_leave_no_trace() {
 fn many_more_of_each() {
     use Flavour::{Contact, Families, Free, Jumps, Lights};
     for flavour in [Lights, Families, Jumps, Contact, Free] {
+        check_steady(flavour, 8..160);
         check(flavour, 16..160);
     }
 }

@@ -118,6 +118,27 @@ impl Recipe {
         Recipe { place, things, dark: r.unit() < 0.1, solve, times_s }
     }
 
+    /// The same scene, at times that go steadily on, with a pause, an odd step or a step back now and
+    /// then: what certificates are for.
+    pub(crate) fn steady(flavour: Flavour, seed: u64, steps: usize) -> Recipe {
+        let mut r = Random(seed.wrapping_mul(0x7654_3211).wrapping_add(flavour as u64));
+        let pace = *pick(&mut r, &[0.001, 0.01, 0.04, 0.2]);
+        let mut times_s = vec![r.between(0.0, KEYS as f64 - 1.5)];
+        while times_s.len() <= steps {
+            let last = *times_s.last().expect("not empty");
+            let step = match whole(&mut r, 40) {
+                0 => -3.0,
+                1 => 0.0,
+                2 => 20.0,
+                3 | 4 => 0.5,
+                5 | 6 => 2.7,
+                _ => 1.0,
+            };
+            times_s.push(last + step * pace);
+        }
+        Recipe { times_s, ..Recipe::draw(flavour, seed, 1) }
+    }
+
     pub(crate) fn options(&self) -> Options {
         match self.solve {
             Ok(tolerance) => at_tolerance(tolerance),

@@ -1,0 +1,96 @@
+//! How far each body can get until each of a few coming ticks.
+
+use super::ticks::{Tick, Ticks};
+use crate::geometry::Aabb;
+use crate::scene::{BodyId, Drift, Scene};
+
+/// Ticks ahead that are looked at.
+const AHEAD: [Tick; 7] = [1, 2, 4, 8, 16, 32, 64];
+
+/// How far the bodies of a scene can get until some coming ticks, the *horizons*, counted from the
+/// nearest. No body and no light appears or vanishes before any of them.
+#[derive(Clone, Debug, Default)]
+pub struct Foresight {
+    now: Tick,
+    horizons: Vec<Horizon>,
+    /// Row of each body; the rows are those of bodies that are animated at all.
+    rows: Vec<Option<u32>>,
+    bodies: Vec<BodyId>,
+}
+
+#[derive(Clone, Debug)]
+struct Horizon {
+    until: Tick,
+    drifts: Vec<Drift>,
+    lights: Vec<Drift>,
+    widest: Aabb,
+}
+
+impl Foresight {
+    /// What the animation of `scene` holds from `time_s` on, the present of `ticks`. Cost:
+    /// proportional to the bodies and their keys within the horizons.
+    pub fn new(scene: &Scene, ticks: &Ticks, time_s: f64) -> Foresight {
+        let all = (0..scene.bodies.len() as u32).map(BodyId);
+        let bodies: Vec<BodyId> = all.clone().filter(|&b| scene.moves(b)).collect();
+        let mut out = Foresight { now: ticks.now(), bodies, ..Foresight::default() };
+        out.rows = vec![None; scene.bodies.len()];
+        for (row, body) in out.bodies.iter().enumerate() {
+            out.rows[body.0 as usize] = Some(row as u32);
+        }
+        let change_s = scene.next_presence_change_s(time_s);
+        for ahead in AHEAD {
+            let until = ticks.now() + ahead;
+            let span = [time_s, ticks.time_s(until)];
+            if !ticks.runs() || span[1] >= change_s {
+                break;
+            }
+            let drifts: Vec<Drift> = out.bodies.iter().map(|&b| scene.drift(b, span)).collect();
+            let light = |l: &crate::scene::Light| scene.motion.drift(l.node, 0.0, span);
+            let lights = scene.lights.iter().map(light).collect();
+            let widest = drifts.iter().fold(Drift::Rests.reach(), |b, d| b.union(d.reach()));
+            out.horizons.push(Horizon { until, drifts, lights, widest });
+        }
+        out
+    }
+
+    /// Whether what holds until `due` holds now.
+    #[inline]
+    pub fn holds(&self, due: Tick) -> bool {
+        due >= self.now
+    }
+
+    /// The horizons, from the nearest.
+    pub fn horizons(&self) -> std::ops::Range<usize> {
+        0..self.horizons.len()
+    }
+
+    /// The tick of a horizon.
+    pub fn until(&self, horizon: usize) -> Tick {
+        self.horizons[horizon].until
+    }
+
+    /// How far a body can get.
+    #[inline]
+    pub fn drift(&self, horizon: usize, body: BodyId) -> Drift {
+        match self.rows[body.0 as usize] {
+            Some(row) => self.horizons[horizon].drifts[row as usize],
+            None => Drift::Rests,
+        }
+    }
+
+    /// Whether a punctual light stays as it is.
+    pub fn light_rests(&self, horizon: usize, light: usize) -> bool {
+        self.horizons[horizon].lights[light] == Drift::Rests
+    }
+
+    /// Displacements of all bodies together.
+    pub fn widest(&self, horizon: usize) -> Aabb {
+        self.horizons[horizon].widest
+    }
+
+    /// The bodies that do not rest up to a horizon.
+    pub fn movers(&self, horizon: usize) -> impl Iterator<Item = BodyId> + '_ {
+        let drifts = &self.horizons[horizon].drifts;
+        self.bodies.iter().zip(drifts).filter(|(_, d)| **d != Drift::Rests).map(|(b, _)| *b)
+    }
+}

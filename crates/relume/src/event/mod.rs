@@ -1,0 +1,10 @@
+//! Prediction: what the known motion allows within the coming time, and until when.
+//!
+//! This room knows no pairs and no light. Whoever has something that only a motion can change asks
+//! how far bodies can get before a tick, and waits until then.
+
+mod foresight;
+mod ticks;
+
+pub use foresight::Foresight;
+pub use ticks::{Tick, Ticks};

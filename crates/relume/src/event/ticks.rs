@@ -1,0 +1,98 @@
+//! A clock of even ticks by which certificates expire.
+
+/// Number of a tick; 0 is before all of them.
+pub type Tick = u16;
+
+/// Even ticks over the times that steps ask for.
+///
+/// What holds until tick k holds at every time up to [`Ticks::time_s`] of k, whether or not a step
+/// falls on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ticks {
+    start_s: f64,
+    length_s: f64,
+    now: Tick,
+}
+
+/// Steps this much longer or shorter than a tick start a new clock.
+const ODD: f64 = 4.0;
+
+impl Ticks {
+    /// Goes on from one time to another. Whether all certificates are void: time went back, jumped or
+    /// begins only now, and the numbers start anew.
+    pub fn go(&mut self, from_s: f64, to_s: f64) -> bool {
+        let step = to_s - from_s;
+        let odd = step > ODD * self.length_s || step * ODD < self.length_s;
+        let mut now = u32::from(self.now);
+        while !odd && self.at(now) < to_s {
+            now += 1;
+        }
+        if odd || step <= 0.0 || now > u32::from(Tick::MAX / 2) {
+            *self = Ticks { start_s: to_s, length_s: step.max(0.0), now: 0 };
+            // Ticks of length 0 lead nowhere: nothing is certified then.
+            self.start_s -= self.length_s;
+            self.now = 1;
+            return true;
+        }
+        self.now = now as Tick;
+        false
+    }
+
+    fn at(&self, tick: u32) -> f64 {
+        self.start_s + self.length_s * f64::from(tick)
+    }
+
+    /// The first tick at or after the present time.
+    pub fn now(&self) -> Tick {
+        self.now
+    }
+
+    /// Time of a tick, seconds.
+    pub fn time_s(&self, tick: Tick) -> f64 {
+        self.at(u32::from(tick))
+    }
+
+    /// Whether time goes on at all.
+    pub fn runs(&self) -> bool {
+        self.length_s > 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn even_steps_are_ticks() {
+        let mut ticks = Ticks::default();
+        assert!(ticks.go(0.0, 0.1) && ticks.runs());
+        let first = ticks.now();
+        for k in 1..1000 {
+            let t = 0.1 * f64::from(k + 1);
+            assert!(!ticks.go(0.1 * f64::from(k), t));
+            assert!(ticks.time_s(ticks.now()) >= t && ticks.time_s(ticks.now() - 1) < t);
+            assert!(ticks.now() - first <= k as Tick + 1);
+        }
+    }
+
+    #[test]
+    fn going_back_or_far_starts_anew() {
+        let mut ticks = Ticks::default();
+        ticks.go(0.0, 0.1);
+        assert!(!ticks.go(0.1, 0.2));
+        assert!(ticks.go(0.2, 0.1), "back");
+        assert!(!ticks.runs());
+        assert!(ticks.go(0.1, 0.2) && ticks.runs());
+        assert!(!ticks.go(0.2, 0.55));
+        assert!(ticks.go(0.55, 9.0), "far");
+        assert!(ticks.time_s(ticks.now()) >= 9.0);
+    }
+
+    #[test]
+    fn a_long_run_starts_anew_before_numbers_run_out() {
+        let mut ticks = Ticks::default();
+        ticks.go(0.0, 1.0);
+        let voids = (1..100_000).filter(|&k| ticks.go(f64::from(k), f64::from(k + 1))).count();
+        assert!((1..10).contains(&voids), "{voids}");
+    }
+}

@@ -1,0 +1,329 @@
+//! Certificates: until when the known motion cannot change what was found of a pair.
+//!
+//! All tests are conservative twice over: what can get anywhere is bounded by boxes, and where the
+//! exact test of a pair allows some slack, these allow half of it, so that rounding does not matter.
+
+use glam::DVec3;
+
+use crate::element::{ElementId, Forest, Kind, WorldElement, WorldPatch, WorldView};
+use crate::event::{Foresight, Tick};
+use crate::geometry::{Aabb, Plane, shaft_meets_box};
+use crate::scene::{BodyId, Drift, PatchId};
+
+use super::judge::{LightPlace, body_of};
+
+/// What was found of a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Finding {
+    /// Nothing that moved concerns it: it stays as it is, with all pairs below it, while its ends
+    /// rest against each other and no body that moves comes between them.
+    Unaffected,
+    /// Nothing stands between its ends: V is 1, of all pairs below it too.
+    Clear,
+    /// It is culled.
+    Culled,
+}
+
+/// A scene at one instant, with what comes.
+pub(super) struct Outlook<'a> {
+    pub(super) forest: &'a Forest,
+    pub(super) view: &'a WorldView,
+    pub(super) ahead: &'a Foresight,
+}
+
+/// Two ends of a pair as far as shafts are concerned.
+struct Ends<'a> {
+    bounds: (Aabb, Aabb),
+    bodies: (Option<BodyId>, Option<BodyId>),
+    /// Of elements.
+    places: Option<(&'a WorldElement, &'a WorldElement)>,
+    patches: (Option<PatchId>, Option<PatchId>),
+    /// More than the exact test of this pair, or of any below it, allows.
+    margin_m: f64,
+}
+
+/// What lies farther than this from an end's plane, in halves of the slack, does not cover it.
+const OFF: f64 = 8.0;
+
+/// The span of nothing.
+const NO_SPAN: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
+
+/// How far the least and the greatest displacement of a box go along a direction.
+fn along(by: &Aabb, n: DVec3) -> (f64, f64) {
+    let lo = DVec3::select(n.cmpge(DVec3::ZERO), by.lo, by.hi);
+    let hi = DVec3::select(n.cmpge(DVec3::ZERO), by.hi, by.lo);
+    (n.dot(lo), n.dot(hi))
+}
+
+fn swept(bounds: &Aabb, by: &Aabb) -> Aabb {
+    Aabb { lo: bounds.lo + by.lo, hi: bounds.hi + by.hi }
+}
+
+/// Displacements by `one` seen from what is displaced by `other`.
+fn against(one: &Aabb, other: &Aabb) -> Aabb {
+    Aabb { lo: one.lo - other.hi, hi: one.hi - other.lo }
+}
+
+impl Outlook<'_> {
+    /// The last of the coming ticks until which a finding stands; 0 if that is none.
+    pub(super) fn until(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick {
+        let stands = |&h: &usize| match finding {
+            Finding::Unaffected => self.rest(h, a, b) && !self.is_entered(h, a, b),
+            Finding::Clear => self.stays_clear(h, a, b),
+            Finding::Culled => self.rest(h, a, b) || self.stays_away(h, a, b),
+        };
+        let last = self.ahead.horizons().take_while(stands).last();
+        last.map_or(0, |h| self.ahead.until(h))
+    }
+
+    fn body(&self, id: ElementId) -> Option<BodyId> {
+        body_of(self.forest, self.view, id)
+    }
+
+    /// Whether two ends rest against each other.
+    fn rest(&self, h: usize, a: ElementId, b: ElementId) -> bool {
+        let same = self.body(a).is_some_and(|body| self.body(b) == Some(body));
+        same || (self.rests(h, a) && self.rests(h, b))
+    }
+
+    fn rests(&self, h: usize, id: ElementId) -> bool {
+        if let Some(light) = self.forest.light(id) {
+            return self.ahead.light_rests(h, light);
+        }
+        match self.body(id) {
+            Some(body) => self.ahead.drift(h, body) == Drift::Rests,
+            None => self.ahead.widest(h) == Drift::Rests.reach(),
+        }
+    }
+
+    /// Whether a body that moves against the ends, which rest against each other, may enter their
+    /// shaft.
+    fn is_entered(&self, h: usize, a: ElementId, b: ElementId) -> bool {
+        let own = self.body(a).filter(|&body| self.ahead.drift(h, body) != Drift::Rests);
+        self.with_ends(a, b, &mut |ends| match own {
+            // Seen from a moving body, everything else moves.
+            Some(own) => self.may_block(h, ends, Forest::ROOT, Some(own)),
+            None => {
+                let mut movers = self.ahead.movers(h);
+                movers.any(|m| self.may_block(h, ends, self.forest.body_root(m), None))
+            }
+        })
+    }
+
+    /// Whether nothing at all may get between the ends.
+    fn stays_clear(&self, h: usize, a: ElementId, b: ElementId) -> bool {
+        let lit = |id| self.forest.kind(id) == Kind::Light;
+        !lit(a)
+            && !lit(b)
+            && self.body(a).is_some()
+            && self.body(b).is_some()
+            && !self.with_ends(a, b, &mut |ends| self.may_block(h, ends, Forest::ROOT, None))
+    }
+
+    fn with_ends(
+        &self,
+        a: ElementId,
+        b: ElementId,
+        then: &mut dyn FnMut(&Ends<'_>) -> bool,
+    ) -> bool {
+        let bodies = (self.body(a), self.body(b));
+        let patches = (self.forest.patch(a), self.forest.patch(b));
+        let place = |id| WorldElement::new(self.view, self.forest, id, false);
+        match (self.forest.kind(a), self.forest.kind(b)) {
+            (Kind::Element, Kind::Element) => {
+                let (a, b) = (place(a), place(b));
+                then(&Ends {
+                    bounds: (a.bounds, b.bounds),
+                    bodies,
+                    patches,
+                    margin_m: 2.0 * (a.rounding_m + b.rounding_m),
+                    places: Some((&a, &b)),
+                })
+            }
+            (Kind::Light, Kind::Element) => self.with_ends(b, a, then),
+            (Kind::Element, Kind::Light) => {
+                let light = self.forest.light(b).and_then(|k| self.view.light(k));
+                let Some(light) = light else { return true };
+                let e = place(a);
+                let far = LightPlace::new(light, &e, self.view.far_m());
+                then(&Ends {
+                    bounds: (e.bounds, far.stand_in.bounds),
+                    bodies,
+                    patches,
+                    margin_m: 2.0 * e.rounding_m,
+                    places: None,
+                })
+            }
+            (Kind::Light, _) | (_, Kind::Light) => true,
+            _ => {
+                let (a, b) = (self.forest.fixed(a), self.forest.fixed(b));
+                then(&Ends {
+                    bounds: (*self.view.fixed_box(a), *self.view.fixed_box(b)),
+                    bodies,
+                    // A group may hold its own blockers.
+                    patches: (None, None),
+                    margin_m: 1e-6 * self.view.far_m(),
+                    places: None,
+                })
+            }
+        }
+    }
+
+    /// Whether anything at or below `id` may get into a shaft, what rides on `except` aside.
+    fn may_block(&self, h: usize, ends: &Ends<'_>, id: ElementId, except: Option<BodyId>) -> bool {
+        let bounds = self.view.fixed_box(id);
+        if bounds.is_empty() || self.forest.kind(id) == Kind::Light {
+            return false;
+        }
+        let body = self.body(id);
+        if body.is_some() && body == except {
+            return false;
+        }
+        let moves = self.moves(h, ends, body);
+        let (a, b) = (swept(&ends.bounds.0, &moves.a), swept(&ends.bounds.1, &moves.b));
+        if !shaft_meets_box(&a, &b, &swept(bounds, &moves.c).grown(ends.margin_m)) {
+            return false;
+        }
+        match self.forest.patch(id) {
+            Some(patch) => self.patch_may_block(ends, patch, &moves),
+            None => self
+                .forest
+                .children(id)
+                .any(|child| self.may_block(h, ends, ElementId(child), except)),
+        }
+    }
+
+    /// Displacements of both ends and of what may come between, all seen from something that does not
+    /// turn.
+    fn moves(&self, h: usize, ends: &Ends<'_>, body: Option<BodyId>) -> Moves {
+        let of = |body: Option<BodyId>| match body {
+            Some(body) => self.ahead.drift(h, body),
+            None => Drift::Rests,
+        };
+        let (a, b) = (of(ends.bodies.0), of(ends.bodies.1));
+        let c = match body {
+            Some(body) => self.ahead.drift(h, body),
+            None => Drift::Turns(self.ahead.widest(h)),
+        };
+        let turns = |d: Drift| matches!(d, Drift::Turns(_));
+        let turning = (turns(a), turns(b), turns(c));
+        let none = Drift::Rests.reach();
+        match c {
+            // Seen from the blocker.
+            Drift::Slides(by) => {
+                let seen = |end: Option<BodyId>, drift: Drift| {
+                    if end == body { none } else { against(&drift.reach(), &by) }
+                };
+                Moves { a: seen(ends.bodies.0, a), b: seen(ends.bodies.1, b), c: none, turning }
+            }
+            _ => Moves { a: a.reach(), b: b.reach(), c: c.reach(), turning },
+        }
+    }
+
+    fn patch_may_block(&self, ends: &Ends<'_>, patch: PatchId, moves: &Moves) -> bool {
+        if ends.patches.0 == Some(patch) || ends.patches.1 == Some(patch) {
+            return false;
+        }
+        if self.view.is_hidden_twin(patch) {
+            return false;
+        }
+        let Some((a, b)) = ends.places else { return true };
+        let half = 0.5 * (a.rounding_m + b.rounding_m);
+        let c = self.view.occluder(patch);
+        let WorldPatch { body, twin, .. } = *self.view.patch(patch);
+        let (turns_a, turns_b, turns_c) = moves.turning;
+        let at_end = |e: &WorldElement, end: (Option<BodyId>, Option<PatchId>), by, turns: bool| {
+            let corners = c.corners.iter().map(|&p| e.plane.distance(p));
+            let (lo, hi) = corners.fold(NO_SPAN, |(lo, hi), d| (f64::min(lo, d), f64::max(hi, d)));
+            // What rides with the end keeps its distances.
+            let rides = end.0 == Some(body);
+            let shift =
+                if rides { (0.0, 0.0) } else { along(&against(&moves.c, by), e.plane.normal) };
+            let known = rides || !(turns || turns_c);
+            let off = hi + shift.0 > OFF * half || lo + shift.1 < -OFF * half;
+            let faces = c.plane.normal.dot(e.plane.normal) < -0.5 + 1e-9;
+            let other_side = twin.is_some() && twin == end.1;
+            AtEnd {
+                behind: known && hi + shift.1 <= half,
+                may_cover: !other_side && !(known && (off || !faces)),
+            }
+        };
+        let at_a = at_end(a, (ends.bodies.0, ends.patches.0), &moves.a, turns_a);
+        let at_b = at_end(b, (ends.bodies.1, ends.patches.1), &moves.b, turns_b);
+        if at_a.may_cover || at_b.may_cover {
+            return true;
+        }
+        if at_a.behind || at_b.behind {
+            return false;
+        }
+        // Both ends on one side of the blocker's plane.
+        if turns_c {
+            return true;
+        }
+        let span = |e: &WorldElement, by: &Aabb| {
+            let (lo, hi) = e.span(&c.plane);
+            let shift = along(&against(by, &moves.c), c.plane.normal);
+            (lo + shift.0, hi + shift.1)
+        };
+        let ((a_lo, a_hi), (b_lo, b_hi)) = (span(a, &moves.a), span(b, &moves.b));
+        !(a_lo.min(b_lo) >= -half || a_hi.max(b_hi) <= half)
+    }
+
+    /// Whether one end stays behind the other, as it is now.
+    fn stays_away(&self, h: usize, a: ElementId, b: ElementId) -> bool {
+        let lit = |id| self.forest.kind(id) == Kind::Light;
+        if lit(a) && lit(b) {
+            return true;
+        }
+        // What is absent stays so up to every horizon.
+        let absent = |id| !lit(id) && self.view.fixed_box(self.forest.fixed(id)).is_empty();
+        if absent(a) || absent(b) {
+            return true;
+        }
+        if lit(a) || lit(b) {
+            return false;
+        }
+        self.is_behind(h, a, b) || self.is_behind(h, b, a)
+    }
+
+    /// Whether `b` stays wholly behind the plane of `a`.
+    fn is_behind(&self, h: usize, a: ElementId, b: ElementId) -> bool {
+        let (Some(patch), Some(body)) = (self.forest.patch(a), self.body(a)) else { return false };
+        let drift = self.ahead.drift(h, body);
+        if matches!(drift, Drift::Turns(_)) {
+            return false;
+        }
+        let patch = self.view.patch(patch);
+        let plane = Plane::through(patch.world.origin, patch.world.normal);
+        let by = match self.body(b) {
+            Some(body) => self.ahead.drift(h, body).reach(),
+            None => self.ahead.widest(h),
+        };
+        let shift = along(&against(&by, &drift.reach()), plane.normal).1;
+        let elements = [a, b].iter().all(|&id| self.forest.kind(id) == Kind::Element);
+        let (far, slack) = if elements {
+            let b = WorldElement::new(self.view, self.forest, b, false);
+            (b.span(&plane).1, b.rounding_m + patch.rounding_m)
+        } else {
+            let bounds = self.view.fixed_box(self.forest.fixed(b));
+            let n = plane.normal;
+            let corner = DVec3::select(n.cmpge(DVec3::ZERO), bounds.hi, bounds.lo);
+            (plane.distance(corner), patch.rounding_m)
+        };
+        far + shift <= 0.5 * slack
+    }
+}
+
+/// Displacements within one horizon.
+struct Moves {
+    a: Aabb,
+    b: Aabb,
+    c: Aabb,
+    turning: (bool, bool, bool),
+}
+
+/// How a blocker lies to an end at all times.
+struct AtEnd {
+    behind: bool,
+    may_cover: bool,
+}

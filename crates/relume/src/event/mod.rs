@@ -4,7 +4,9 @@
 //! how far bodies can get before a tick, and waits until then.
 
 mod foresight;
+mod history;
 mod ticks;
 
 pub use foresight::Foresight;
+pub use history::{History, Lookahead, Sample};
 pub use ticks::{Tick, Ticks};

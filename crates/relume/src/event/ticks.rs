@@ -52,6 +52,11 @@ impl Ticks {
         self.at(u32::from(tick))
     }
 
+    /// From tick to tick, seconds.
+    pub fn length_s(&self) -> f64 {
+        self.length_s
+    }
+
     /// Whether time goes on at all.
     pub fn runs(&self) -> bool {
         self.length_s > 0.0

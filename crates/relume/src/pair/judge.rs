@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::element::{ElementId, ElementKey, Forest, Kind, WorldElement, WorldLight, WorldView};
-use crate::event::{Foresight, Tick};
+use crate::event::{Foresight, Lookahead, Tick};
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
 use crate::scene::{BodyId, LightKind, PatchId};
 use crate::transport::{
@@ -47,6 +47,8 @@ pub struct Placed<'a> {
     pub since: Option<&'a Since<'a>>,
     /// What the known motion allows next; `None` where certificates are not asked for.
     pub ahead: Option<&'a Foresight>,
+    /// How far ahead pairs are extrapolated, if they are.
+    pub lookahead: Option<Lookahead>,
 }
 
 impl Hierarchy for Placed<'_> {
@@ -146,6 +148,19 @@ impl Judge for Placed<'_> {
             }
         }
         true
+    }
+
+    fn dimmed(&self, a: ElementId, b: ElementId) -> bool {
+        let dimmed = |since: &Since<'_>| since.brightness(self.forest, a, b) == Stale::Brightness;
+        self.since.is_some_and(dimmed)
+    }
+
+    fn lookahead(&self) -> Option<&Lookahead> {
+        match self.stage {
+            // Both stages meet the same pairs.
+            Stage::Coarse => None,
+            Stage::Fine(_) => self.lookahead.as_ref(),
+        }
     }
 
     fn certified(&self, due: Tick) -> bool {
@@ -301,14 +316,22 @@ impl Placed<'_> {
     ) -> Judgement {
         let key = pair_key(self.forest.key(a), self.forest.key(b));
         let x = exchange(self.simd, place_a, place_b, met);
+        let mut firm = Margin::FIRM;
         if let (Oracle::FormFactor { epsilon, min_area_m2 }, Stage::Fine(_)) =
             (self.oracle, self.stage)
         {
             let areas = (place_a.area, place_b.area);
-            if x.area_m2 / areas.0.min(areas.1) > epsilon
-                && let Some(side) = self.larger((a, b), areas, min_area_m2)
-            {
-                return passing(Verdict::Refine(side), 0);
+            let factor = x.area_m2 / areas.0.min(areas.1);
+            if let Some(side) = self.larger((a, b), areas, min_area_m2) {
+                // Only extrapolation asks how far the verdict is from changing.
+                let (wanted, asked) = (factor > epsilon, self.lookahead.is_some());
+                if asked {
+                    let (large, small) = if wanted { (factor, epsilon) } else { (epsilon, factor) };
+                    firm.error = Margin::between(large, small);
+                }
+                if wanted {
+                    return Judgement { margin: firm, ..passing(Verdict::Refine(side), 0) };
+                }
             }
         }
         let blockers = shaft.blockers(candidates);
@@ -320,17 +343,19 @@ impl Placed<'_> {
                 Stage::Coarse => Verdict::Hold,
                 Stage::Fine(_) => Verdict::Link,
             };
-            return carrying(verdict, &x, &v, (place_a, place_b));
+            let carrying = carrying(verdict, &x, &v, (place_a, place_b));
+            return Judgement { margin: firm, ..carrying };
         };
         let end = |id, area| End { area, light: brightness.of(self.forest, id) };
         let ends = (end(a, place_a.area), end(b, place_b.area));
         let e = estimate(&x, &v, (&ends.0, &ends.1), brightness.reference_area_m2());
         let stake = x.area_m2 / place_a.area.min(place_b.area) / threshold.max(FINEST);
         let mut margin = Margin::FIRM;
-        if let Some((side, firm)) = self.splittable((a, b), e.side(&ends.0, &ends.1)) {
+        let (better, ahead) = e.side(&ends.0, &ends.1);
+        if let Some((side, firm)) = self.splittable((a, b), better) {
             if e.error > threshold {
                 let error = Margin::between(e.error, threshold);
-                let side_margin = if firm { Margin::ENDLESS } else { e.side_margin() };
+                let side_margin = if firm { Margin::ENDLESS } else { ahead };
                 let margin = Margin { error, side: side_margin };
                 return Judgement { margin, ..passing(Verdict::Refine(side), v.segments) };
             }

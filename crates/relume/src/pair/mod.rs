@@ -22,5 +22,6 @@ pub use oracle::{Oracle, Side};
 pub use since::Since;
 pub use tree::{Carried, CullReason, Gradients, Link, PairId, PairTree, State, StateCounts};
 pub use update::{
-    Changes, Edit, Held, Hierarchy, Judge, Judgement, OutOfMemory, Stale, Verdict, Work, update,
+    Changes, Edit, EventKind, Held, Hierarchy, Judge, Judgement, LinkEvent, OutOfMemory, Record,
+    Stale, Verdict, Work, update,
 };

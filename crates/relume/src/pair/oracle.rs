@@ -52,17 +52,24 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
-    /// How far the better side is ahead.
-    pub(super) fn side_margin(&self) -> u16 {
+    /// The side to refine, and how far it is from being the other one.
+    ///
+    /// The larger, unless splitting the smaller mends far more: where both mend about as much the
+    /// smallest motion would make the other side the better one, and everything below anew.
+    pub(super) fn side(&self, a: &End, b: &End) -> (Side, u16) {
         let (one, two) = self.mends;
-        Margin::between(one.max(two), one.min(two))
-    }
-
-    pub(super) fn side(&self, a: &End, b: &End) -> Side {
-        let (one, two) = self.mends;
-        if one > two || (one == two && a.area >= b.area) { Side::A } else { Side::B }
+        let (large, small, by_large, by_small) = match a.area >= b.area {
+            true => (Side::A, Side::B, one, two),
+            false => (Side::B, Side::A, two, one),
+        };
+        let by_large = PREFERENCE * by_large;
+        let side = if by_small > by_large { small } else { large };
+        (side, Margin::between(by_large.max(by_small), by_large.min(by_small)))
     }
 }
+
+/// How many times as much the smaller side must mend to be refined in place of the larger.
+const PREFERENCE: f64 = 2.0;
 
 /// Weight of the variation of visibility over a receiver, for emitted light: few of a receiver's
 /// links have the edge of a lamp's shadow within it, while all have a bend.

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use crate::element::{ElementId, Renumbering};
-use crate::event::Tick;
+use crate::event::{History, Tick};
 
 use super::margin::Margin;
 use super::oracle::Side;
@@ -243,8 +243,51 @@ pub struct PairTree {
     /// First ids of vacant groups of siblings, by their number.
     vacant: Vec<Vec<u32>>,
     counts: StateCounts,
-    /// Until when each pair's certificate stands; empty where none was issued.
-    due: Vec<Tick>,
+    /// Until when each pair's certificate stands.
+    due: Beside<Tick>,
+    /// What extrapolation knows of each pair.
+    history: Beside<History>,
+}
+
+/// Something beside the nodes, by their ids: nothing at all where it is the default of all of them.
+#[derive(Clone, Debug, Default)]
+struct Beside<T> {
+    values: Vec<T>,
+}
+
+impl<T: Copy + Default + PartialEq> Beside<T> {
+    #[inline]
+    fn get(&self, id: PairId) -> T {
+        self.values.get(id.0 as usize).copied().unwrap_or_default()
+    }
+
+    /// Sets one of `len`.
+    fn set(&mut self, id: PairId, value: T, len: usize) {
+        let at = id.0 as usize;
+        if at >= self.values.len() {
+            if value == T::default() {
+                return;
+            }
+            self.values.reserve_exact(len - self.values.len());
+            self.values.resize(len, T::default());
+        }
+        self.values[at] = value;
+    }
+
+    /// What was at `order[k]` comes to k.
+    fn reorder(&mut self, order: &[u32]) {
+        if !self.values.is_empty() {
+            self.values = order.iter().map(|&from| self.get(PairId(from))).collect();
+        }
+    }
+
+    fn trim(&mut self) {
+        self.values.shrink_to(self.values.len() + self.values.len() / SLACK);
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        (self.values.capacity() * size_of::<T>()) as u64
+    }
 }
 
 impl PairTree {
@@ -275,8 +318,8 @@ impl PairTree {
     pub fn memory_bytes(&self) -> u64 {
         let lists: usize =
             self.vacant.iter().map(|l| l.capacity() * 4 + size_of::<Vec<u32>>()).sum();
-        let due = self.due.capacity() * size_of::<Tick>();
-        (self.nodes.capacity() * size_of::<Node>() + due + lists) as u64
+        let beside = self.due.memory_bytes() + self.history.memory_bytes();
+        (self.nodes.capacity() * size_of::<Node>() + lists) as u64 + beside
     }
 
     /// Room that no pair has.
@@ -297,33 +340,31 @@ impl PairTree {
     /// Puts all pairs together so that no room is vacant: parents before children, level by level.
     pub fn compact(&mut self) {
         let old = std::mem::take(&mut self.nodes);
-        let due = std::mem::take(&mut self.due);
-        let old_due = |k: usize| due.get(k).copied().unwrap_or(0);
+        let mut order = Vec::with_capacity(self.len());
         self.nodes.reserve_exact(self.len());
         self.nodes.push(old[0]);
-        self.due.push(old_due(0));
+        order.push(0);
         let mut at = 0;
         while at < self.nodes.len() {
             if self.nodes[at].state().is_refined() {
                 let children = self.children(PairId(at as u32));
                 self.nodes[at].payload[0] = self.nodes.len() as u32;
-                let children = children.start as usize..children.end as usize;
-                self.nodes.extend_from_slice(&old[children.clone()]);
-                self.due.extend(children.map(old_due));
+                self.nodes.extend_from_slice(&old[children.start as usize..children.end as usize]);
+                order.extend(children);
             }
             at += 1;
         }
         debug_assert_eq!(self.nodes.len(), self.len());
-        if due.is_empty() {
-            self.due = Vec::new();
-        }
+        self.due.reorder(&order);
+        self.history.reorder(&order);
         self.vacant = Vec::new();
     }
 
     /// Gives back room beyond a small reserve.
     pub fn trim(&mut self) {
         self.nodes.shrink_to(self.nodes.len() + self.nodes.len() / SLACK);
-        self.due.shrink_to(self.due.len() + self.due.len() / SLACK);
+        self.due.trim();
+        self.history.trim();
         self.vacant.iter_mut().for_each(|list| list.shrink_to(2 * list.len()));
     }
 
@@ -404,24 +445,27 @@ impl PairTree {
     /// Until when a pair's certificate stands; 0 without one.
     #[inline]
     pub(super) fn due(&self, id: PairId) -> Tick {
-        self.due.get(id.0 as usize).copied().unwrap_or(0)
+        self.due.get(id)
     }
 
     pub(super) fn set_due(&mut self, id: PairId, due: Tick) {
-        let at = id.0 as usize;
-        if at >= self.due.len() {
-            if due == 0 {
-                return;
-            }
-            self.due.reserve_exact(self.nodes.len() - self.due.len());
-            self.due.resize(self.nodes.len(), 0);
-        }
-        self.due[at] = due;
+        self.due.set(id, due, self.nodes.len());
     }
 
-    /// Takes back all certificates.
-    pub fn void(&mut self) {
-        self.due = Vec::new();
+    /// What extrapolation knows of a pair; empty where it is not asked for.
+    #[inline]
+    pub(super) fn history(&self, id: PairId) -> History {
+        self.history.get(id)
+    }
+
+    pub(super) fn set_history(&mut self, id: PairId, history: History) {
+        self.history.set(id, history, self.nodes.len());
+    }
+
+    /// Takes back all certificates and forgets all histories.
+    pub fn forget_predictions(&mut self) {
+        self.due = Beside::default();
+        self.history = Beside::default();
     }
 
     fn count(&mut self, state: State, by: i64) {
@@ -450,7 +494,10 @@ impl PairTree {
             for (node, (a, b)) in self.nodes[first as usize..].iter_mut().zip(ends) {
                 *node = Node::new(a, b, State::New);
             }
-            (first..first + count as u32).for_each(|id| self.set_due(PairId(id), 0));
+            for id in (first..first + count as u32).map(PairId) {
+                self.set_due(id, 0);
+                self.set_history(id, History::default());
+            }
         }
         self.set_state(parent, state);
         self.nodes[parent.0 as usize].payload = [first, count as u32, 0];

@@ -4,12 +4,13 @@
 //! are applied in order. The tree is the same for any number of threads. A cold build is the update
 //! of a tree that holds nothing but its root.
 
+use std::cmp::Ordering;
 use std::ops::Range;
 
 use rayon::prelude::*;
 
 use crate::element::{ElementId, ElementKey};
-use crate::event::Tick;
+use crate::event::{History, Lookahead, Sample, Tick};
 
 use super::certificate::Finding;
 use super::hash::{PairHash, pair_key};
@@ -58,6 +59,8 @@ pub enum Stale {
     Occlusion,
     /// Where its ends are; by certificate nothing stands between them.
     Followed,
+    /// What was extrapolated of it is to be evaluated.
+    Due,
     /// Where its ends are.
     Moved,
     /// Everything: it has not been judged yet.
@@ -116,8 +119,14 @@ pub trait Judge: Hierarchy + Sync {
         narrowed: &mut Vec<u32>,
     ) -> bool;
 
+    /// Whether the light on one of the ends changed, at a pair whose verdict depends on it.
+    fn dimmed(&self, a: ElementId, b: ElementId) -> bool;
+
     /// Whether a certificate stands at this instant.
     fn certified(&self, due: Tick) -> bool;
+
+    /// How far ahead pairs are extrapolated, if they are.
+    fn lookahead(&self) -> Option<&Lookahead>;
 
     /// The last tick until which the known motion cannot change what was found of a pair; 0 if none.
     fn foresee(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick;
@@ -136,6 +145,8 @@ pub struct Work {
     /// Pairs whose exchange area alone followed the motion of their ends: by certificate nothing
     /// stands between them.
     pub followed: u64,
+    /// Links of which X and V were extrapolated.
+    pub extrapolated: u64,
     /// Pairs passed over, with all below them, because their certificate stands.
     pub certified: u64,
     /// Pairs judged for the coarse solution, before; each is met again.
@@ -172,6 +183,7 @@ impl Work {
         self.examined = other.examined;
         self.followed = other.followed;
         self.certified = other.certified;
+        self.extrapolated = other.extrapolated;
         self.reevaluated = other.reevaluated;
         self.visibility_only = other.visibility_only;
         self.brightness_only = other.brightness_only;
@@ -194,6 +206,45 @@ pub enum Edit {
     Removed(ElementId, ElementId),
 }
 
+/// What happened to a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventKind {
+    /// Links below a refined pair became one link.
+    Promoted,
+    /// A link became refined.
+    Demoted,
+    /// More stands between its ends.
+    Occluded,
+    /// Less stands between its ends.
+    Revealed,
+    /// Its ends no longer face each other, or one vanished.
+    Culled,
+    /// Its ends came to face each other.
+    Woken,
+}
+
+/// An event of a link, by the names of its ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinkEvent {
+    /// What happened.
+    pub kind: EventKind,
+    /// Both ends.
+    pub ends: (ElementKey, ElementKey),
+    /// What it carried; `None` where it was no link.
+    pub before: Option<Carried>,
+    /// What it carries; `None` where it is no link.
+    pub after: Option<Carried>,
+}
+
+/// What an update writes down.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Record {
+    /// Edits to the links.
+    pub edits: bool,
+    /// Events of the links.
+    pub events: bool,
+}
+
 /// A pair that was held, with what it would carry.
 #[derive(Clone, Copy, Debug)]
 pub struct Held {
@@ -212,6 +263,9 @@ pub struct Changes {
     pub work: Work,
     /// Edits to the links, in order; empty where they are not recorded.
     pub edits: Vec<Edit>,
+    /// Events of links that were there before or are there now, in order; empty where they are not
+    /// recorded. What is made or removed below a refined pair is not among them.
+    pub events: Vec<LinkEvent>,
     /// Pairs that were refined anew, ascending; empty where edits are not recorded.
     pub refined: Vec<PairId>,
     /// Pairs held.
@@ -232,7 +286,7 @@ const BLOCK: usize = 1 << 15;
 
 /// Brings `tree`, with the hash over its links, up to date.
 ///
-/// Edits are recorded if `record` says so. `fresh` are pairs (ascending) that an update with the same
+/// Edits and events are recorded if `record` says so. `fresh` are pairs (ascending) that an update with the same
 /// [`Judge::stale`] has refined already: all of their children are looked at. `may_go_on` is asked
 /// after each block with the tree, the number of elements and the scratch memory in bytes.
 ///
@@ -242,7 +296,7 @@ pub fn update<J: Judge>(
     (tree, hash): (&mut PairTree, &mut PairHash),
     judge: &mut J,
     root_candidates: &[u32],
-    (record, fresh): (bool, &[PairId]),
+    (record, fresh): (Record, &[PairId]),
     may_go_on: &dyn Fn(&PairTree, usize, u64) -> bool,
 ) -> Result<Changes, OutOfMemory> {
     let mut editor =
@@ -333,6 +387,8 @@ enum Look {
     Narrowed(List),
     /// The light changed, the verdict did not; look at the children.
     Withstands(Margin),
+    /// A link, extrapolated.
+    Extrapolated(Carried, Option<Margin>),
     /// Judged, with the candidates of its children and a certificate, unless the one it has stays.
     Judged(Judgement, Stale, List, Option<Tick>),
 }
@@ -365,12 +421,21 @@ fn look_at<J: Judge>(
     let (a, b) = tree.ends(item.pair);
     let state = tree.state(item.pair);
     let new = state == State::New || fresh.binary_search(&item.pair).is_ok();
+    let history = tree.history(item.pair);
+    let mut due = false;
+    if let Some(ahead) = judge.lookahead().filter(|_| !new && history.is_live()) {
+        due = history.is_due(ahead);
+        if !due && let Some(look) = extrapolate(tree, judge, item.pair, &history, ahead) {
+            return look;
+        }
+    }
     let certified = !new && judge.certified(tree.due(item.pair));
     if certified && matches!(state, State::Culled(_)) {
         return Look::Certified;
     }
     let stale = match new {
         true => Stale::New,
+        false if due => Stale::Due,
         false => judge.stale(a, b, certified || item.list == List::CLEAR),
     };
     if stale == Stale::Brightness {
@@ -392,7 +457,14 @@ fn look_at<J: Judge>(
         _ => {}
     }
     let candidates = if stale == Stale::Followed { &[] } else { item.list.of(candidates) };
-    let found = judge.judge(a, b, candidates, narrowed);
+    let mut found = judge.judge(a, b, candidates, narrowed);
+    if let (Some(_), State::Refined(side), Verdict::Refine(_)) =
+        (judge.lookahead(), state, found.verdict)
+    {
+        // Which side is better matters little; making everything below anew costs much.
+        found.verdict = Verdict::Refine(side);
+        found.margin.side = Margin::ENDLESS;
+    }
     let refined = matches!(found.verdict, Verdict::Refine(_) | Verdict::RefineSelf);
     let clear = narrowed.len() == start || (!refined && found.segments == 0);
     if !refined {
@@ -412,12 +484,37 @@ fn look_at<J: Judge>(
     Look::Judged(found, stale, list, due)
 }
 
+/// What becomes of a dynamic pair that is not due; `None` if the light on it changed so much that it is
+/// judged all the same.
+fn extrapolate<J: Judge>(
+    tree: &PairTree,
+    judge: &J,
+    pair: PairId,
+    history: &History,
+    ahead: &Lookahead,
+) -> Option<Look> {
+    let (a, b) = tree.ends(pair);
+    let is_link = tree.state(pair) == State::Active;
+    let margin = match judge.dimmed(a, b) {
+        true => Some(judge.withstands(a, b, is_link, tree.margin(pair))?),
+        false => None,
+    };
+    match tree.link(pair) {
+        Some(link) => {
+            let (exchange_area_m2, visibility) = history.extrapolated(ahead);
+            let carried = Carried { exchange_area_m2, visibility, ..link.carried };
+            Some(Look::Extrapolated(carried, margin))
+        }
+        None => Some(margin.map_or(Look::Descend, Look::Withstands)),
+    }
+}
+
 /// The one writer of a tree.
 struct Editor<'a, J> {
     tree: &'a mut PairTree,
     hash: &'a mut PairHash,
     judge: &'a mut J,
-    record: bool,
+    record: Record,
     changes: Changes,
     next: Wave,
 }
@@ -442,8 +539,17 @@ impl<J: Judge> Editor<'_, J> {
                     let children = self.tree.children(item.pair);
                     self.look_at(children, item.list, &wave.candidates);
                 }
+                Look::Extrapolated(carried, margin) => {
+                    self.changes.work.extrapolated += 1;
+                    self.changes.work.dynamic_links += 1;
+                    self.carry(item.pair, carried);
+                    if let Some(margin) = margin {
+                        self.tree.set_margin(item.pair, *margin);
+                    }
+                }
                 Look::Judged(found, stale, list, due) => {
                     self.count(found, *stale);
+                    self.remember(item.pair, found, *stale);
                     let children = self.apply(item.pair, found, *stale);
                     if let Some(due) = due {
                         self.tree.set_due(item.pair, *due);
@@ -467,6 +573,42 @@ impl<J: Judge> Editor<'_, J> {
             Stale::Brightness => work.brightness_only += 1,
             _ => work.reevaluated += 1,
         }
+    }
+
+    /// Takes an evaluation into the history of a pair, before it is applied.
+    fn remember(&mut self, pair: PairId, found: &Judgement, stale: Stale) {
+        let Some(ahead) = self.judge.lookahead() else { return };
+        let (a, b) = self.tree.ends(pair);
+        let dynamic = match stale {
+            Stale::Moved | Stale::Occlusion | Stale::Due => true,
+            Stale::New => self.judge.stale(a, b, false) == Stale::Moved,
+            _ => return,
+        };
+        let same = match (self.tree.state(pair), found.verdict) {
+            (State::Active, Verdict::Link) => true,
+            (State::Refined(_), Verdict::Refine(_)) => true,
+            _ => false,
+        };
+        let goes_on = matches!(found.verdict, Verdict::Link | Verdict::Refine(_));
+        let sample = Sample {
+            exchange_area_m2: found.carried.exchange_area_m2,
+            visibility: found.carried.visibility,
+            margin: found.margin.error,
+        };
+        let before = self.tree.history(pair);
+        let history = match same {
+            _ if !(dynamic && goes_on) => History::default(),
+            // It came to rest.
+            true if stale == Stale::Due && before.is_straight_through(&sample) => {
+                match self.judge.stale(a, b, false) {
+                    Stale::Moved | Stale::Occlusion => before.evaluated(sample, ahead),
+                    _ => History::default(),
+                }
+            }
+            true => before.evaluated(sample, ahead),
+            false => History::begun(sample, ahead),
+        };
+        self.tree.set_history(pair, history);
     }
 
     fn look_at(&mut self, pairs: Range<u32>, list: List, candidates: &[u32]) {
@@ -495,7 +637,11 @@ impl<J: Judge> Editor<'_, J> {
         };
         let moved = match stale {
             Stale::New => wanted == State::Active && self.judge.stale(a, b, false) == Stale::Moved,
-            stale => wanted == State::Active && matches!(stale, Stale::Moved | Stale::Followed),
+            stale => {
+                wanted == State::Active && {
+                    matches!(stale, Stale::Moved | Stale::Followed | Stale::Due)
+                }
+            }
         };
         let work = &mut self.changes.work;
         work.dynamic_links += u64::from(moved);
@@ -503,6 +649,7 @@ impl<J: Judge> Editor<'_, J> {
             work.changed += 1;
             work.promoted += u64::from(before.is_refined() && wanted == State::Active);
             work.demoted += u64::from(before == State::Active && wanted.is_refined());
+            self.note_change(pair, wanted, &found.carried);
             self.leave(pair, before);
             let children = self.enter(pair, wanted, found);
             self.tree.set_margin(pair, found.margin);
@@ -528,6 +675,40 @@ impl<J: Judge> Editor<'_, J> {
                 u64::from(before.visibility != carried.visibility);
             self.tree.set_carried(pair, carried);
             self.record(Edit::Set(pair));
+            let kind = match before.visibility.cmp(&carried.visibility) {
+                Ordering::Equal => return,
+                Ordering::Greater => EventKind::Occluded,
+                Ordering::Less => EventKind::Revealed,
+            };
+            self.note(kind, pair, Some(before), Some(*carried));
+        }
+    }
+
+    /// Notes that a pair becomes a link or ceases to be one.
+    fn note_change(&mut self, pair: PairId, wanted: State, carried: &Carried) {
+        let before = self.tree.link(pair).map(|link| link.carried);
+        let after = (wanted == State::Active).then_some(*carried);
+        let kind = match (self.tree.state(pair), wanted) {
+            (State::Active, State::Culled(_)) => EventKind::Culled,
+            (State::Active, _) => EventKind::Demoted,
+            (State::Culled(_), State::Active) => EventKind::Woken,
+            (State::Refined(_) | State::RefinedSelf, State::Active) => EventKind::Promoted,
+            _ => return,
+        };
+        self.note(kind, pair, before, after);
+    }
+
+    fn note(
+        &mut self,
+        kind: EventKind,
+        pair: PairId,
+        before: Option<Carried>,
+        after: Option<Carried>,
+    ) {
+        if self.record.events {
+            let (a, b) = self.tree.ends(pair);
+            let ends = (self.judge.key(a), self.judge.key(b));
+            self.changes.events.push(LinkEvent { kind, ends, before, after });
         }
     }
 
@@ -542,7 +723,7 @@ impl<J: Judge> Editor<'_, J> {
 
     fn enter(&mut self, pair: PairId, wanted: State, found: &Judgement) -> Range<u32> {
         let (a, b) = self.tree.ends(pair);
-        if self.record && wanted.is_refined() {
+        if self.record.edits && wanted.is_refined() {
             self.changes.refined.push(pair);
         }
         match wanted {
@@ -610,7 +791,7 @@ impl<J: Judge> Editor<'_, J> {
     }
 
     fn record(&mut self, edit: Edit) {
-        if self.record {
+        if self.record.edits {
             self.changes.edits.push(edit);
         }
     }

@@ -3,8 +3,10 @@
 //! Without a state to start from, the same edits build it: a cold build is the update of nothing.
 
 use crate::element::{ElementId, Forest, Kind, WorldView};
-use crate::event::{Foresight, Ticks};
-use crate::pair::{Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Since, Stage, update};
+use crate::event::{Foresight, Lookahead, Ticks};
+use crate::pair::{
+    Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Record, Since, Stage, update,
+};
 use crate::scene::BodyId;
 use crate::solver::{Dirty, Links, Radiosity, Stop};
 
@@ -41,12 +43,16 @@ impl Session {
         let mut since =
             (!cold).then(|| Since::new(&self.scene, &solved.forest, &old, &solved.view));
         report.seconds.moving = clock.lap();
-        let ahead = if cold { None } else { self.look_ahead(&mut solved, &old, time_s) };
+        let ahead = match cold {
+            true => Ahead::default(),
+            false => self.look_ahead(&mut solved, &old, time_s),
+        };
         report.seconds.predict = clock.lap();
 
         let mut changes = Changes::default();
         let bring = |solved: &mut Solved, since: Option<&Since<'_>>, level, fresh: &[PairId]| {
-            let found = self.update(solved, (since, ahead.as_ref()), level, (!cold, fresh));
+            let record = Record { edits: !cold, events: !cold && self.options.events };
+            let found = self.update(solved, (since, &ahead), level, (record, fresh));
             found.map_err(|OutOfMemory| self.too_large(solved, frame))
         };
         if !self.coarse_ids.is_empty() {
@@ -56,6 +62,8 @@ impl Session {
         let fine = bring(&mut solved, since.as_ref(), Level::Fine, &changes.refined)?;
         changes.work.add_after_coarse(fine.work);
         changes.edits.extend(fine.edits);
+        changes.events.extend(fine.events);
+        solved.events = std::mem::take(&mut changes.events);
         let work = changes.work;
         report.seconds.evaluate = clock.lap();
 
@@ -93,16 +101,27 @@ impl Session {
         Ok(solved)
     }
 
-    /// What certificates rest on, from this time on; those that no longer hold are taken back.
-    fn look_ahead(&self, solved: &mut Solved, old: &WorldView, time_s: f64) -> Option<Foresight> {
-        if self.options.update != Update::Certificate {
-            return None;
+    /// What the strategy predicts with, from this time on; what no longer holds is taken back.
+    fn look_ahead(&self, solved: &mut Solved, old: &WorldView, time_s: f64) -> Ahead {
+        if matches!(self.options.update, Update::Scratch | Update::Reinspect) {
+            return Ahead::default();
         }
         let void = solved.ticks.go(solved.time_s, time_s);
         if void || old.far_m() != solved.view.far_m() {
-            solved.tree.void();
+            solved.tree.forget_predictions();
         }
-        Some(Foresight::new(&self.scene, &solved.ticks, time_s))
+        let mut ahead = Ahead::default();
+        match self.options.update {
+            Update::Extrapolate { frames, error } if solved.ticks.runs() => {
+                let frame_s = solved.ticks.length_s();
+                ahead.lookahead = Some(Lookahead { now_s: time_s, frame_s, frames, error });
+            }
+            Update::Certificate => {
+                ahead.foresight = Some(Foresight::new(&self.scene, &solved.ticks, time_s));
+            }
+            _ => {}
+        }
+        ahead
     }
 
     /// Nothing but the seed and an unjudged root.
@@ -117,6 +136,7 @@ impl Session {
             links: Links::default(),
             coarse: Coarse::default(),
             radiosity: Radiosity::default(),
+            events: Vec::new(),
             report: FrameReport::default(),
         }
     }
@@ -124,9 +144,9 @@ impl Session {
     fn update(
         &self,
         solved: &mut Solved,
-        (since, ahead): (Option<&Since<'_>>, Option<&Foresight>),
+        (since, ahead): (Option<&Since<'_>>, &Ahead),
         level: Level,
-        record_and_fresh: (bool, &[PairId]),
+        record_and_fresh: (Record, &[PairId]),
     ) -> Result<Changes, OutOfMemory> {
         let limit = self.options.max_memory_bytes.unwrap_or(u64::MAX);
         let may_go_on = |tree: &PairTree, elements: usize, scratch: u64| {
@@ -145,7 +165,8 @@ impl Session {
             oracle: self.options.pair_oracle(),
             simd: self.simd,
             since,
-            ahead,
+            ahead: ahead.foresight.as_ref(),
+            lookahead: ahead.lookahead,
         };
         let tree = (&mut solved.tree, &mut solved.hash);
         update(tree, &mut placed, &[Forest::ROOT.0], record_and_fresh, &may_go_on)
@@ -244,6 +265,13 @@ impl Session {
             links: solved.tree.len() as u64,
         }
     }
+}
+
+/// What a strategy predicts with.
+#[derive(Default)]
+struct Ahead {
+    foresight: Option<Foresight>,
+    lookahead: Option<Lookahead>,
 }
 
 /// Links by receiver, for each pair of the tree, bytes.

@@ -4,12 +4,12 @@
 //! radiosities are, and nothing of how they came about.
 
 use std::fmt;
-use std::ops::Range;
 
 use crate::element::{ElementId, ElementKey, Forest, Kind};
 use crate::pair::{Carried, Gradients, PairHash, PairTree, pair_key};
 use crate::scene::Scene;
 
+use super::names::{ElementName, name_of};
 use super::{Session, Solved};
 
 /// Single-precision roundings that a radiosity may differ by, in units of the last place: the
@@ -23,27 +23,6 @@ pub enum Which {
     One,
     /// The second.
     Two,
-}
-
-/// An element or a punctual light as a user knows it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum ElementName {
-    /// A punctual light.
-    Light(String),
-    /// An element of a patch.
-    Element {
-        /// Its body.
-        body: String,
-        /// Its surface.
-        surface: String,
-        /// Number of its patch within the surface from 1, where there are several.
-        patch: Option<u32>,
-        /// Number of its facet within the patch from 1, where there are several (a polygon of more
-        /// than four corners).
-        facet: Option<u32>,
-        /// Which child at each level below the facet, from 0; empty for the facet itself.
-        path: Vec<u8>,
-    },
 }
 
 /// The first thing that two sessions differ in.
@@ -367,58 +346,6 @@ fn first_alone(
     }
 }
 
-fn name_of(scene: &Scene, forest: &Forest, key: ElementKey) -> ElementName {
-    let facet = ElementId(key.facet);
-    let Some(id) = forest.patch(facet) else {
-        let light = forest.light(facet).expect("links end on elements and lights");
-        return ElementName::Light(scene.lights[light].name.clone());
-    };
-    let patch = &scene.patches[id.0 as usize];
-    let body = &scene.bodies[patch.body.0 as usize];
-    let siblings =
-        |range: Range<u32>| range.filter(|&p| scene.patches[p as usize].surface == patch.surface);
-    let facets: Vec<_> = forest.facets().iter().filter(|&&f| forest.patch(f) == Some(id)).collect();
-    let several = |count: usize, before: usize| (count > 1).then_some(before as u32 + 1);
-    ElementName::Element {
-        body: body.name.clone(),
-        surface: scene.surfaces[patch.surface.0 as usize].name.clone(),
-        patch: several(
-            siblings(body.patches.clone()).count(),
-            siblings(body.patches.start..id.0).count(),
-        ),
-        facet: several(facets.len(), facets.iter().take_while(|&&&f| f < facet).count()),
-        path: steps(key.path),
-    }
-}
-
-/// A path's steps: below its leading one bit, two bits a level.
-fn steps(path: u32) -> Vec<u8> {
-    let levels = (31 - path.leading_zeros().min(31)) / 2;
-    (0..levels).rev().map(|level| (path >> (2 * level) & 3) as u8).collect()
-}
-
-impl fmt::Display for ElementName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (body, surface, patch, facet, path) = match self {
-            ElementName::Light(name) => return write!(f, "light `{name}`"),
-            ElementName::Element { body, surface, patch, facet, path } => {
-                (body, surface, patch, facet, path)
-            }
-        };
-        write!(f, "surface `{surface}` of body `{body}`")?;
-        for (what, number) in [("patch", patch), ("facet", facet)] {
-            if let Some(number) = number {
-                write!(f, ", {what} {number}")?;
-            }
-        }
-        let steps: Vec<String> = path.iter().map(ToString::to_string).collect();
-        match steps.is_empty() {
-            true => f.write_str(", undivided"),
-            false => write!(f, ", element {}", steps.join(".")),
-        }
-    }
-}
-
 impl Difference {
     /// The difference in words, with what the two sessions are to be called, such as "incremental"
     /// and "from scratch".
@@ -490,13 +417,6 @@ impl std::error::Error for Difference {}
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn paths_are_read_from_the_top() {
-        assert!(steps(1).is_empty());
-        assert_eq!(steps(0b1_00), [0]);
-        assert_eq!(steps(0b1_00_11_01), [0, 3, 1]);
-    }
 
     #[test]
     fn a_gap_of_no_number_is_a_difference() {

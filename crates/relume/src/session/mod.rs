@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::element::{ElementId, Forest, WorldView};
 use crate::event::Ticks;
-use crate::pair::{PairHash, PairTree};
+use crate::pair::{LinkEvent, PairHash, PairTree};
 use crate::scene::{BodyId, Scene};
 use crate::solver::{Links, Radiosity};
 use crate::transport::Simd;
@@ -14,14 +14,20 @@ mod advance;
 mod coarse;
 mod compact;
 mod compare;
+mod events;
 mod gather;
+mod lossy;
+mod names;
 mod options;
 mod report;
 mod snapshot;
 mod surfaces;
 mod tally;
 
-pub use compare::{Difference, ElementName, RadiosityGap, Which, compare, radiosity_gap};
+pub use compare::{Difference, RadiosityGap, Which, compare, radiosity_gap};
+pub use events::{Event, EventKind};
+pub use lossy::{Missed, RadiosityError, missed, radiosity_error};
+pub use names::ElementName;
 pub use options::{Options, Oracle, Update};
 pub use report::{Energy, FrameReport, PairCounts, RowSumError, Seconds};
 pub use snapshot::{Leaf, Snapshot};
@@ -76,6 +82,7 @@ struct Solved {
     links: Links,
     coarse: Coarse,
     radiosity: Radiosity,
+    events: Vec<LinkEvent>,
     report: FrameReport,
 }
 
@@ -136,7 +143,7 @@ impl Session {
         let solved = match last {
             Some(last) if self.is_still(&last, time_s) => {
                 let report = last.report.of_a_still_frame(label);
-                Solved { time_s, report, ..last }
+                Solved { time_s, report, events: Vec::new(), ..last }
             }
             // On a thread of the pool: entering it anew for every small task would cost more.
             last => rayon::scope(|_| self.advance(last, from, label))?,
@@ -182,6 +189,16 @@ impl Session {
     pub fn pairs(&self) -> (&PairTree, &Forest) {
         let solved = self.solved.as_ref().expect("a step comes before a look at the pairs");
         (&solved.tree, &solved.forest)
+    }
+
+    /// The link events of the last step, if [`Options::events`] asks for them: none after a cold build.
+    /// In the order in which they were found, which is the same for any number of threads.
+    ///
+    /// # Panics
+    /// Before the first [`Session::step`].
+    pub fn events(&self) -> Vec<Event> {
+        let solved = self.solved.as_ref().expect("a step comes before its events");
+        events::named(&self.scene, solved)
     }
 
     /// Sum of the form factors from every leaf element, in no order of meaning; 1 in a closed scene,

@@ -11,6 +11,8 @@ pub struct Options {
     pub update: Update,
     /// Whether every step measures row sums and energies: a pass over all links, whatever moved.
     pub balance: bool,
+    /// Whether every step keeps the events of its links, for [`Session::events`](super::Session::events).
+    pub events: bool,
     /// Limit on the engine's memory, bytes; `None` for no limit.
     pub max_memory_bytes: Option<u64>,
 }
@@ -22,6 +24,7 @@ impl Default for Options {
             oracle: Oracle::Error,
             update: Update::Certificate,
             balance: true,
+            events: false,
             max_memory_bytes: None,
         }
     }
@@ -43,13 +46,23 @@ pub enum Oracle {
 }
 
 /// How the pair tree follows the motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Update {
     /// Rebuild everything in every frame: the reference that others are checked against.
     Scratch,
     /// Look again at every pair that the motion since the last step may concern, and at no other.
     Reinspect,
-    /// The same, but pairs that the known motion cannot concern before some time are not looked at
+    /// The paper's prediction, lossy: a line through the last two evaluations of each dynamic pair says
+    /// in which frame its verdict changes or its occlusion begins or ends; until then its exchange area
+    /// and visibility follow the line.
+    Extrapolate {
+        /// Frames from one evaluation to the next at most, in 1..=255. The paper's is 7.
+        frames: u32,
+        /// Where given, a pair is evaluated again as soon as the estimated error of X V, relative to X,
+        /// could pass this; then `frames` is only the limit.
+        error: Option<f64>,
+    },
+    /// As [`Update::Reinspect`], but pairs that the known motion cannot concern before some time are not looked at
     /// until then. The links are the same, bit for bit.
     Certificate,
 }
@@ -63,6 +76,16 @@ impl Options {
                 "tolerance {} is not between 0 and 1: it is a relative error, such as 0.02",
                 self.tolerance
             ));
+        }
+        if let Update::Extrapolate { frames, error } = self.update {
+            if !(1..=255).contains(&frames) {
+                return fail(format!("extrapolate={frames}: frames ahead must be 1 to 255"));
+            }
+            if let Some(error) = error.filter(|&e| !(e > 0.0 && e < 1.0)) {
+                return fail(format!(
+                    "the error {error} of extrapolation is not between 0 and 1: it is a relative error, such as 0.01"
+                ));
+            }
         }
         if let Oracle::FormFactor { epsilon, min_area_m2 } = self.oracle
             && !(epsilon > 0.0 && epsilon < 1.0 && min_area_m2 >= 0.0)

@@ -31,6 +31,8 @@ pub struct FrameReport {
     /// Pairs with moved ends of which the exchange area alone was evaluated: by certificate nothing
     /// stands between their ends.
     pub followed: u64,
+    /// Links of which exchange area and visibility were extrapolated.
+    pub extrapolated: u64,
     /// Pairs passed over, with all below them, because their certificate stands.
     pub certified: u64,
     /// Pairs judged for the coarse solution, beforehand: all of them are visited again.
@@ -129,6 +131,7 @@ impl FrameReport {
         self.examined = work.examined;
         self.followed = work.followed;
         self.certified = work.certified;
+        self.extrapolated = work.extrapolated;
         self.coarse_examined = work.coarse_examined;
         self.reevaluated = work.reevaluated;
         self.visibility_only = work.visibility_only;

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use relume::session::Update;
 use serde::{Deserialize, Serialize};
 
 use crate::frames::FrameSpec;
@@ -192,9 +193,17 @@ pub(crate) struct ClipFlags {
 /// How the links follow the motion.
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct UpdateChoice {
-    /// How the links follow the motion; the links of a frame are the same either way.
-    #[arg(long = "update", value_name = "STRATEGY", value_enum, default_value = "reinspect")]
+    /// How the links follow the motion. `certificate`: what the known motion cannot concern before some
+    /// time is not looked at until then. `reinspect`: what the motion since the last frame may
+    /// concern. `scratch`: everything anew in every frame. The links of a frame are the same with
+    /// these three. `extrapolate[=N]`: the paper's prediction, up to N frames ahead (7 if not
+    /// given); quicker and less exact.
+    #[arg(long = "update", value_name = "STRATEGY", default_value = "certificate")]
     pub(crate) strategy: UpdateFlag,
+    /// With `--update extrapolate`: evaluate a link again as soon as its exchange may be off by this
+    /// share; N then is the limit (64 if not given).
+    #[arg(long, value_name = "E", value_parser = parse_share, allow_negative_numbers = true)]
+    pub(crate) error: Option<f64>,
 }
 
 /// What every command that solves a clip and keeps the numbers takes.
@@ -211,6 +220,10 @@ pub(crate) struct SolveFlags {
     /// DIR), after checking that scene and options are the same.
     #[arg(long)]
     pub(crate) resume: bool,
+    /// Write every link event of the frames that follow one another to this file, one line each (CSV):
+    /// frame, kind, receiver, source, exchange area and visibility before and after.
+    #[arg(long, value_name = "FILE", conflicts_with = "resume")]
+    pub(crate) events: Option<PathBuf>,
 }
 
 /// A scene file, or a demonstration instead.
@@ -231,6 +244,27 @@ pub(crate) struct VerifyArgs {
     pub(crate) source: SourceFlags,
     #[command(flatten)]
     pub(crate) clip: ClipFlags,
+    /// How the links follow the motion.
+    #[arg(long, value_name = "STRATEGY", value_enum, default_value = "certificate")]
+    pub(crate) update: ExactUpdate,
+}
+
+/// The strategies that lose nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ExactUpdate {
+    /// Wait for certificates to expire.
+    Certificate,
+    /// Look again at the pairs that the motion may concern.
+    Reinspect,
+}
+
+impl From<ExactUpdate> for UpdateFlag {
+    fn from(update: ExactUpdate) -> UpdateFlag {
+        match update {
+            ExactUpdate::Certificate => UpdateFlag::Certificate,
+            ExactUpdate::Reinspect => UpdateFlag::Reinspect,
+        }
+    }
 }
 
 /// `relume bench`
@@ -245,6 +279,10 @@ pub(crate) struct BenchArgs {
     /// Build only every K-th frame from scratch beside the others: quicker, less exact.
     #[arg(long, value_name = "K", default_value = "1", value_parser = parse_every, allow_negative_numbers = true)]
     pub(crate) every: usize,
+    /// Follow the frames with every strategy side by side, and compare: time, evaluations, segments,
+    /// missed events, error of radiosity. Takes the place of the other tables.
+    #[arg(long, conflicts_with_all = ["every", "strategy", "error"])]
+    pub(crate) compare: bool,
     /// Draw no pictures; the row with them is left out.
     #[arg(long)]
     pub(crate) no_pictures: bool,
@@ -321,10 +359,17 @@ pub(crate) enum OracleFlag {
 }
 
 /// `--update`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum UpdateFlag {
+    /// Wait for certificates to expire.
+    Certificate,
     /// Look again at the pairs that the motion may concern, and at no other.
     Reinspect,
+    /// Follow a line through the last two evaluations.
+    Extrapolate {
+        /// Frames ahead at most, where given.
+        frames: Option<u32>,
+    },
     /// Rebuild everything in every frame.
     Scratch,
 }
@@ -347,6 +392,13 @@ fn parse_tolerance(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(tolerance) if tolerance > 0.0 && tolerance < 1.0 => Ok(tolerance),
         _ => Err("the tolerance is a relative error between 0 and 1, such as 0.02 for 2 %".into()),
+    }
+}
+
+fn parse_share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(error) if error > 0.0 && error < 1.0 => Ok(error),
+        _ => Err("give a relative error between 0 and 1, such as 0.01 for 1 %".into()),
     }
 }
 
@@ -451,13 +503,70 @@ impl fmt::Display for OracleFlag {
     }
 }
 
-impl UpdateFlag {
+impl FromStr for UpdateFlag {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<UpdateFlag, String> {
+        Ok(match text {
+            "certificate" => UpdateFlag::Certificate,
+            "reinspect" => UpdateFlag::Reinspect,
+            "scratch" => UpdateFlag::Scratch,
+            "extrapolate" => UpdateFlag::Extrapolate { frames: None },
+            _ => {
+                let frames = text
+                    .strip_prefix("extrapolate=")
+                    .ok_or("write `certificate`, `reinspect`, `extrapolate[=N]` or `scratch`")?;
+                let frames = frames.parse().ok().filter(|n| (1..=255).contains(n));
+                let frames = frames.ok_or("N is the number of frames ahead, 1 to 255")?;
+                UpdateFlag::Extrapolate { frames: Some(frames) }
+            }
+        })
+    }
+}
+
+/// The paper looks seven frames ahead.
+const FRAMES_AHEAD: u32 = 7;
+
+/// Frames ahead where an error is stated instead.
+const FRAMES_AHEAD_AT_MOST: u32 = 64;
+
+impl UpdateChoice {
+    /// A strategy without a stated error.
+    pub(crate) const fn of(strategy: UpdateFlag) -> UpdateChoice {
+        UpdateChoice { strategy, error: None }
+    }
+
     /// The name on the command line and in the report.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            UpdateFlag::Reinspect => "reinspect",
-            UpdateFlag::Scratch => "scratch",
+    pub(crate) fn name(self) -> String {
+        let name = match self.strategy {
+            UpdateFlag::Certificate => "certificate".to_owned(),
+            UpdateFlag::Reinspect => "reinspect".to_owned(),
+            UpdateFlag::Scratch => "scratch".to_owned(),
+            UpdateFlag::Extrapolate { frames: None } if self.error.is_some() => {
+                "extrapolate".to_owned()
+            }
+            UpdateFlag::Extrapolate { frames } => {
+                format!("extrapolate={}", frames.unwrap_or(FRAMES_AHEAD))
+            }
+        };
+        match self.error {
+            Some(error) => format!("{name} --error {error}"),
+            None => name,
         }
+    }
+
+    /// What the engine is asked for; `None` if an error is stated without extrapolation.
+    pub(crate) fn update(self) -> Option<Update> {
+        Some(match (self.strategy, self.error) {
+            (UpdateFlag::Extrapolate { frames }, error) => {
+                let most = if error.is_some() { FRAMES_AHEAD_AT_MOST } else { FRAMES_AHEAD };
+                Update::Extrapolate { frames: frames.unwrap_or(most), error }
+            }
+            (_, Some(_)) => return None,
+            (UpdateFlag::Certificate, None) => Update::Certificate,
+            (UpdateFlag::Reinspect, None) => Update::Reinspect,
+            (UpdateFlag::Scratch, None) => Update::Scratch,
+        })
     }
 }
 
@@ -526,6 +635,26 @@ mod tests {
         }
         for text in ["error", "form-factor=0.02", "form-factor=0.02,0.001"] {
             assert_eq!(oracle(text).unwrap().to_string(), text);
+        }
+    }
+
+    #[test]
+    fn strategies() {
+        let of = |text: &str, error| {
+            text.parse::<UpdateFlag>().map(|strategy| UpdateChoice { strategy, error })
+        };
+        for text in ["certificate", "reinspect", "scratch", "extrapolate=3"] {
+            assert_eq!(of(text, None).unwrap().name(), text);
+        }
+        let seven = Some(Update::Extrapolate { frames: 7, error: None });
+        assert_eq!(of("extrapolate", None).unwrap().update(), seven);
+        assert_eq!(of("extrapolate", None).unwrap().name(), "extrapolate=7");
+        let stated = of("extrapolate", Some(0.01)).unwrap();
+        assert_eq!(stated.name(), "extrapolate --error 0.01");
+        assert_eq!(stated.update(), Some(Update::Extrapolate { frames: 64, error: Some(0.01) }));
+        assert_eq!(of("reinspect", Some(0.01)).unwrap().update(), None);
+        for wrong in ["", "predict", "extrapolate=", "extrapolate=0", "extrapolate=256"] {
+            assert!(of(wrong, None).is_err(), "{wrong}");
         }
     }
 

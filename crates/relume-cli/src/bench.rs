@@ -8,7 +8,7 @@ use relume::session::{FrameReport, Session};
 use relume_picture::export::{probe, write_atomically};
 use relume_picture::picture::{self, Exposure, Viewpoint};
 
-use crate::args::{BenchArgs, ExposureFlag, UpdateFlag};
+use crate::args::{BenchArgs, ExposureFlag, UpdateChoice, UpdateFlag};
 use crate::clip::{self, Clip, fixed, now, step_failure};
 use crate::failure::Failure;
 use crate::figures::{Cold, Figures, Held, Measured};
@@ -16,6 +16,7 @@ use crate::interrupt;
 use crate::output::{self, count, counted};
 use crate::progress::Progress;
 use crate::report::peak_memory_bytes;
+use crate::strategies;
 
 /// Runs the command.
 pub(crate) fn bench(args: &BenchArgs) -> Result<(), Failure> {
@@ -29,6 +30,9 @@ pub(crate) fn bench(args: &BenchArgs) -> Result<(), Failure> {
     clip.warn();
     if let Some(path) = &args.json {
         probe(path).map_err(|error| Failure::write(path, &error))?;
+    }
+    if args.compare {
+        return strategies::compare(args, &clip);
     }
     let mut bench = Bench::new(args, &clip)?;
     let outcome = bench.frames();
@@ -74,7 +78,7 @@ impl<'a> Bench<'a> {
             args,
             clip,
             // Set up again, and timed, with the first frame.
-            session: clip.session(args.update.strategy, false)?,
+            session: clip.session(args.update, false)?,
             drawing,
             progress: Progress::new(clip.frames.len(), 0, args.clip.quiet),
             first: None,
@@ -103,8 +107,7 @@ impl<'a> Bench<'a> {
 
     /// Sets up and solves the first frame.
     fn first(&mut self, frame: u32) -> Result<Measured, Failure> {
-        let (session, Cold { seconds, report }) =
-            self.build(frame, None, self.args.update.strategy)?;
+        let (session, Cold { seconds, report }) = self.build(frame, None, self.args.update)?;
         self.session = session;
         let picture_seconds = self.draw(frame)?;
         Ok(Measured { seconds, picture_seconds, report, cold: None })
@@ -128,7 +131,7 @@ impl<'a> Bench<'a> {
     }
 
     fn cold(&self, frame: u32, from: u32) -> Result<Cold, Failure> {
-        Ok(self.build(frame, Some(from), UpdateFlag::Scratch)?.1)
+        Ok(self.build(frame, Some(from), UpdateChoice::of(UpdateFlag::Scratch))?.1)
     }
 
     /// A session set up for one frame, with the time that took; dynamic links are counted from
@@ -137,7 +140,7 @@ impl<'a> Bench<'a> {
         &self,
         frame: u32,
         from: Option<u32>,
-        update: UpdateFlag,
+        update: UpdateChoice,
     ) -> Result<(Session, Cold), Failure> {
         let started = now();
         let mut session = self.clip.session(update, false)?;
@@ -167,12 +170,11 @@ impl<'a> Bench<'a> {
             elements: report.elements,
             links: report.links,
         };
-        let options = self.clip.options(self.args.update.strategy, false);
         Some(Figures {
             sequence: self.clip.scene.name.clone(),
-            tolerance: options.tolerance,
+            tolerance: self.clip.tolerance,
             oracle: self.args.clip.oracle.to_string(),
-            update: self.args.update.strategy.name(),
+            update: self.args.update.name(),
             threads: self.clip.threads,
             first: self.first?,
             frames: self.frames,
@@ -181,7 +183,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-fn step(session: &mut Session, clip: &Clip, frame: u32) -> Result<FrameReport, Failure> {
+pub(crate) fn step(session: &mut Session, clip: &Clip, frame: u32) -> Result<FrameReport, Failure> {
     session.step(frame, clip.time_of(frame)).map_err(|error| step_failure(error, ""))
 }
 

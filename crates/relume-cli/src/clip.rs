@@ -7,11 +7,11 @@ use std::time::Instant;
 
 use indicatif::HumanBytes;
 use relume::scene::Scene;
-use relume::session::{Options, Oracle, Session, SessionError, Update};
+use relume::session::{Options, Oracle, Session, SessionError};
 use relume_picture::picture::{self, Exposure, Settings};
 
 use crate::args::{
-    ClipFlags, DemoScene, OracleFlag, PictureFlags, Shading, SourceFlags, UpdateFlag,
+    ClipFlags, DemoScene, OracleFlag, PictureFlags, Shading, SourceFlags, UpdateChoice,
 };
 use crate::demo;
 use crate::failure::Failure;
@@ -105,8 +105,8 @@ impl Clip {
         frames::time_of(frame, self.flags.fps)
     }
 
-    /// What the engine is asked for.
-    pub(crate) fn options(&self, update: UpdateFlag, balance: bool) -> Options {
+    /// What the engine is asked for; `balance` says whether its reports hold row sums and energies.
+    pub(crate) fn options(&self, update: UpdateChoice, balance: bool) -> Result<Options, Failure> {
         let oracle = match self.flags.oracle {
             OracleFlag::Error => Oracle::Error,
             OracleFlag::FormFactor { epsilon, min_area_m2 } => Oracle::FormFactor {
@@ -114,23 +114,30 @@ impl Clip {
                 min_area_m2: min_area_m2.unwrap_or(self.scene.area_m2() * MIN_AREA_SHARE),
             },
         };
-        let update = match update {
-            UpdateFlag::Reinspect => Update::Reinspect,
-            UpdateFlag::Scratch => Update::Scratch,
-        };
-        Options {
+        let update = update.update().ok_or_else(|| {
+            Failure::usage(
+                "--error goes with --update extrapolate only: the other strategies have none",
+            )
+            .help("leave out --error, or add --update extrapolate")
+        })?;
+        Ok(Options {
             tolerance: self.tolerance,
             oracle,
             update,
             balance,
+            events: false,
             max_memory_bytes: self.flags.max_memory.map(|memory| memory.bytes),
-        }
+        })
     }
 
-    /// A session that has solved nothing yet; `balance` says whether its reports hold row sums and
-    /// energies.
-    pub(crate) fn session(&self, update: UpdateFlag, balance: bool) -> Result<Session, Failure> {
-        Session::new(Arc::clone(&self.scene), self.options(update, balance)).map_err(Failure::new)
+    /// A session that has solved nothing yet.
+    pub(crate) fn session(&self, update: UpdateChoice, balance: bool) -> Result<Session, Failure> {
+        self.session_with(self.options(update, balance)?)
+    }
+
+    /// The same, with options changed.
+    pub(crate) fn session_with(&self, options: Options) -> Result<Session, Failure> {
+        Session::new(Arc::clone(&self.scene), options).map_err(Failure::new)
     }
 }
 

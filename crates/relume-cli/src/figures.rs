@@ -68,7 +68,7 @@ pub(crate) struct Figures {
     /// The oracle, as on the command line.
     pub(crate) oracle: String,
     /// The update strategy, as on the command line.
-    pub(crate) update: &'static str,
+    pub(crate) update: String,
     /// Threads used.
     pub(crate) threads: usize,
     /// The first frame, set up and solved.
@@ -157,7 +157,7 @@ struct File<'a> {
     scene: &'a str,
     tolerance: f64,
     oracle: &'a str,
-    update: &'static str,
+    update: &'a str,
     threads: usize,
     table: Vec<Row>,
     against_scratch: Against,
@@ -172,11 +172,14 @@ struct File<'a> {
 /// A counter of a frame's report.
 type Read = fn(&FrameReport) -> u64;
 
-const COUNTERS: [(&str, Read); 18] = [
+const COUNTERS: [(&str, Read); 21] = [
     ("links", |r| r.links),
     ("dynamic_links", |r| r.dynamic_links),
     ("visited", |r| r.visited),
     ("examined", |r| r.examined),
+    ("followed", |r| r.followed),
+    ("certified", |r| r.certified),
+    ("extrapolated", |r| r.extrapolated),
     ("coarse_examined", |r| r.coarse_examined),
     ("reevaluated", |r| r.reevaluated),
     ("visibility_only", |r| r.visibility_only),
@@ -351,7 +354,7 @@ impl Figures {
             scene: &self.sequence,
             tolerance: self.tolerance,
             oracle: &self.oracle,
-            update: self.update,
+            update: &self.update,
             threads: self.threads,
             table: self.rows(),
             against_scratch: self.against(),
@@ -465,16 +468,16 @@ fn by(one: f64, two: f64, otherwise: f64) -> f64 {
 }
 
 /// Quotient of two times.
-fn ratio(one_s: f64, two_s: f64) -> f64 {
+pub(crate) fn ratio(one_s: f64, two_s: f64) -> f64 {
     one_s / two_s.max(INSTANT_S)
 }
 
-fn mean(values: &[f64]) -> f64 {
+pub(crate) fn mean(values: &[f64]) -> f64 {
     by(values.iter().sum(), values.len() as f64, 0.0)
 }
 
 /// Of a sample: divided by one less than its size; 0 for one value.
-fn standard_deviation(values: &[f64]) -> f64 {
+pub(crate) fn standard_deviation(values: &[f64]) -> f64 {
     let mean = mean(values);
     let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
     by(squares, values.len() as f64 - 1.0, 0.0).sqrt()
@@ -493,7 +496,7 @@ fn median(values: &[f64]) -> f64 {
 }
 
 /// A time with three significant digits.
-fn time(seconds: f64) -> String {
+pub(crate) fn time(seconds: f64) -> String {
     match seconds {
         s if s >= 0.9995 => format!("{} s", three(s)),
         s if s >= 0.999_5e-3 => format!("{} ms", three(s * 1e3)),
@@ -511,12 +514,12 @@ fn three(x: f64) -> String {
 }
 
 /// A ratio: 18.1x.
-fn times(ratio: f64) -> String {
+pub(crate) fn times(ratio: f64) -> String {
     format!("{}x", three(ratio))
 }
 
 /// A mean count: whole where it is large.
-fn whole(mean: f64) -> String {
+pub(crate) fn whole(mean: f64) -> String {
     if mean == mean.round() || mean >= 100.0 {
         count(mean.round() as u64)
     } else {
@@ -552,7 +555,7 @@ mod tests {
             sequence: "room".into(),
             tolerance: 0.02,
             oracle: "error".into(),
-            update: "reinspect",
+            update: "reinspect".into(),
             threads: 2,
             first: frame(0.4, None),
             frames: vec![frame(0.01, Some(cold)), frame(0.03, None)],

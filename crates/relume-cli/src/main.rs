@@ -5,6 +5,7 @@ mod bench;
 mod check;
 mod clip;
 mod demo;
+mod events;
 mod failure;
 mod figures;
 mod frames;
@@ -16,6 +17,7 @@ mod report;
 mod resume;
 mod run;
 mod scene_file;
+mod strategies;
 mod verify;
 
 use std::process::ExitCode;

@@ -10,8 +10,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use relume::scene::{BodyId, Scene};
-use relume::session::{Session, SessionError, Snapshot};
-use relume_picture::export::{probe, write_glb};
+use relume::session::{Options, Session, SessionError, Snapshot};
+use relume_picture::export::{probe, write_atomically, write_glb};
 use relume_picture::picture::{self, Exposure, Viewpoint};
 
 use crate::args::{
@@ -19,6 +19,7 @@ use crate::args::{
 };
 use crate::clip::{self, Clip, TOLERANCE, fixed, now};
 use crate::demo;
+use crate::events::EventTable;
 use crate::failure::Failure;
 use crate::frames;
 use crate::interrupt;
@@ -115,14 +116,17 @@ impl Job {
         if !self.quiet() {
             self.warn_of_old_pictures(wanted, &report);
         }
-        let session = clip.session(self.solve.update.strategy, true)?;
+        let events = self.solve.events.as_ref().map(|_| EventTable::new());
+        let options = clip.options(self.solve.update, true)?;
+        let session = clip.session_with(Options { events: events.is_some(), ..options })?;
         let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.quiet());
-        let mut run = Run { job: &self, session, camera, report, progress, links: 0 };
+        let mut run = Run { job: &self, session, camera, report, progress, events, links: 0 };
         let outcome = run.frames(wanted, &pending);
         run.progress.clear();
         // Also where a frame failed: what was finished stays.
         if !run.report.frames.is_empty() {
             run.write_report()?;
+            run.write_events()?;
         }
         let finished = wanted.iter().filter(|f| run.report.frames.contains_key(f)).count();
         match outcome? {
@@ -152,7 +156,7 @@ impl Job {
         {
             resume::take_over(&mut report, earlier, &paths[0], |f| self.picture_is_whole(f))?;
         }
-        for path in &paths {
+        for path in paths.iter().chain(&self.solve.events) {
             probe(path).map_err(|error| Failure::write(path, &error))?;
         }
         Ok(report)
@@ -177,7 +181,7 @@ impl Job {
             animation: flags.animation.name.clone(),
             tolerance: clip.tolerance,
             oracle: flags.oracle.to_string(),
-            update: self.solve.update.strategy.name().to_owned(),
+            update: self.solve.update.name(),
             threads: clip.threads,
             max_memory_bytes: flags.max_memory.map(|memory| memory.bytes),
             picture,
@@ -275,6 +279,8 @@ struct Run<'a> {
     camera: Option<Viewpoint>,
     report: Report,
     progress: Progress,
+    /// What is written to `--events`.
+    events: Option<EventTable>,
     /// Links of the last frame.
     links: u64,
 }
@@ -313,6 +319,9 @@ impl Run<'_> {
             .step(frame, frames::time_of(frame, self.job.solve.clip.fps))
             .map_err(|error| self.session_failure(error))?;
         self.links = entry.links;
+        if let Some(table) = &mut self.events {
+            table.add(frame, &self.session.events());
+        }
         if let Some(path) = self.job.picture_path(frame) {
             self.draw(frame, &path)?;
         }
@@ -392,6 +401,15 @@ impl Run<'_> {
         let kept = !self.report.frames.is_empty() && !self.job.report_paths().is_empty();
         let kept = if kept { "the frames before it are finished and stay" } else { "" };
         clip::step_failure(error, kept)
+    }
+
+    fn write_events(&self) -> Result<(), Failure> {
+        let (Some(path), Some(table)) = (&self.job.solve.events, &self.events) else {
+            return Ok(());
+        };
+        let _guard = interrupt::writing();
+        write_atomically(path, table.text().as_bytes())
+            .map_err(|error| Failure::write(path, &error))
     }
 
     fn write_report(&mut self) -> Result<(), Failure> {

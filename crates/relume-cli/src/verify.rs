@@ -2,7 +2,7 @@
 
 use relume::session::{Difference, FrameReport, RadiosityGap, Session, compare, radiosity_gap};
 
-use crate::args::{UpdateFlag, VerifyArgs};
+use crate::args::{UpdateChoice, UpdateFlag, VerifyArgs};
 use crate::clip::{Clip, step_failure};
 use crate::failure::Failure;
 use crate::interrupt;
@@ -18,8 +18,8 @@ pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
     let clip = Clip::open(&args.source, &args.clip)?;
     clip.warn();
     let mut sides = Sides {
-        warm: clip.session(UpdateFlag::Reinspect, false)?,
-        cold: clip.session(UpdateFlag::Scratch, false)?,
+        warm: clip.session(UpdateChoice::of(args.update.into()), false)?,
+        cold: clip.session(UpdateChoice::of(UpdateFlag::Scratch), false)?,
     };
     let progress = Progress::new(clip.frames.len(), 0, args.clip.quiet);
     let outcome = sides.frames(&clip, &progress, args.clip.quiet);

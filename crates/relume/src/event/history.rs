@@ -127,6 +127,11 @@ impl History {
         if p.margin != Sample::FIRM && q.margin != Sample::FIRM {
             least = least.min(frames(f64::from(p.margin), f64::from(q.margin), 0.0));
         }
+        // Neither X on a straight way to nothing nor one that has doubled goes on as it did.
+        let x = [p, q].map(|s| f64::from(s.exchange_area_m2));
+        for goal in [0.5 * x[1], 2.0 * x[1]] {
+            least = least.min(frames(x[0], x[1], goal));
+        }
         for goal in [0.0, 65_535.0] {
             least = least.min(frames(f64::from(p.visibility), f64::from(q.visibility), goal));
         }

@@ -21,6 +21,7 @@ mod surfaces;
 mod tally;
 
 pub use compare::{Difference, ElementName, RadiosityGap, Which, compare, radiosity_gap};
+pub use gather::Sensor;
 pub use options::{Options, Oracle, Update};
 pub use report::{Energy, FrameReport, PairCounts, RowSumError, Seconds};
 pub use snapshot::{Leaf, Snapshot};

@@ -45,6 +45,17 @@ pub(crate) enum Command {
     Render(RenderArgs),
     /// Solve a scene without pictures.
     Solve(SolveArgs),
+    /// Irradiance at points, frame by frame, as a table (CSV).
+    ///
+    /// SENSORS is text, a line `x y z nx ny nz` for each sensor (metres, in the world; # begins a
+    /// comment), or CSV with those columns and, if wanted, `name` and `body`: a sensor with a body
+    /// rides on it, and is given where it is at the start of the animation. Sensors need not lie on
+    /// a surface. Columns of the table: frame, sensor (its name, or its number from 0), place and
+    /// normal in the world, and irradiance in W/m2, linear RGB.
+    #[command(
+        after_help = "Example:  relume probe room.glb sensors.txt -o irradiance.csv --frames 0-24x8"
+    )]
+    Probe(ProbeArgs),
     /// Say what was read: bodies, patches, materials, emitters, animations, cameras, lights.
     Info(InfoArgs),
     /// Say what is wrong with a scene, and what to do about it.
@@ -122,6 +133,28 @@ pub(crate) struct SolveArgs {
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) solve: SolveFlags,
+}
+
+/// `relume probe`
+#[derive(Debug, Args)]
+pub(crate) struct ProbeArgs {
+    /// The scene, a .glb, .gltf or .vs3 file.
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+    /// The sensors: text lines `x y z nx ny nz`, or CSV.
+    #[arg(value_name = "SENSORS")]
+    pub(crate) sensors: PathBuf,
+    /// File for the table; it appears when all frames are done [default: stdout].
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Read the mesh under each sensor instead of gathering at the point itself: quicker for very
+    /// many sensors, and wrong on either side of a shadow's edge. Sensors must lie on surfaces.
+    #[arg(long)]
+    pub(crate) interpolate: bool,
+    #[command(flatten)]
+    pub(crate) clip: ClipFlags,
+    #[command(flatten)]
+    pub(crate) update: UpdateChoice,
 }
 
 /// `relume info`

@@ -5,5 +5,5 @@
 mod file;
 mod glb;
 
-pub use file::{probe, write_atomically};
+pub use file::{WholeFile, probe, write_atomically};
 pub use glb::{ExportError, glb, write_glb};

@@ -15,6 +15,7 @@ mod draft;
 mod error;
 mod flatten;
 mod import;
+mod inside;
 mod merge;
 mod motion;
 mod names;

@@ -5,6 +5,7 @@ mod bench;
 mod check;
 mod clip;
 mod demo;
+mod factors;
 mod failure;
 mod figures;
 mod frames;
@@ -43,6 +44,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Check(args) => check::check(&args),
         Command::Verify(args) => interrupt::listen().and_then(|()| verify::verify(&args)),
         Command::Bench(args) => interrupt::listen().and_then(|()| bench::bench(&args)),
+        Command::Factors(args) => interrupt::listen().and_then(|()| factors::factors(&args)),
         Command::Probe(args) => interrupt::listen().and_then(|()| probe::probe(&args)),
         Command::Solve(args) => interrupt::listen().and_then(|()| run::solve(args)),
         Command::Render(args) => interrupt::listen().and_then(|()| run::render(args)),

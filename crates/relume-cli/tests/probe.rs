@@ -36,7 +36,7 @@ fn misses(arguments: &[&str]) -> Vec<f64> {
         .map(|line| line.split(',').map(str::to_owned).collect())
         .collect();
     assert_eq!(got.len(), want.len());
-    let mut sums = vec![(0.0, 0); 4];
+    let mut sums = [(0.0, 0); 4];
     for (got, want) in got.iter().zip(&want) {
         assert_eq!(got[..2], want[..2]);
         let frame: usize = got[0].parse().unwrap();

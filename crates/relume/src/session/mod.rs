@@ -13,6 +13,7 @@ mod advance;
 mod coarse;
 mod compact;
 mod compare;
+mod factors;
 mod gather;
 mod options;
 mod report;
@@ -21,6 +22,7 @@ mod surfaces;
 mod tally;
 
 pub use compare::{Difference, ElementName, RadiosityGap, Which, compare, radiosity_gap};
+pub use factors::{Closure, Factors, Grouping, Open};
 pub use gather::Sensor;
 pub use options::{Options, Oracle, Update};
 pub use report::{Energy, FrameReport, PairCounts, RowSumError, Seconds};

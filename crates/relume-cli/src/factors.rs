@@ -523,8 +523,9 @@ fn summary(args: &FactorsArgs, things: &Things, frames: &[Frame], seconds: f64) 
     }
     let mean = frames.iter().map(|f| f.escapes).sum::<f64>() / frames.len() as f64;
     output::complain(&format!(
-        "escapes: {:.3} % of what leaves all, in the mean (as `{}` in the table)",
-        100.0 * mean,
+        "escapes: {} % of what leaves all, in the mean (as `{}` in the table)",
+        // Adding 0 takes the sign from -0.
+        (1e5 * mean).round() / 1e3 + 0.0,
         things.environment
     ));
 }

@@ -19,6 +19,7 @@ pub(crate) fn failure(error: SceneError) -> Failure {
     let remedy = match &error {
         SceneError::Read { remedy, .. }
         | SceneError::Format { remedy, .. }
+        | SceneError::View3d { remedy, .. }
         | SceneError::Extension { remedy, .. }
         | SceneError::Geometry { remedy, .. }
         | SceneError::Material { remedy, .. }

@@ -284,3 +284,58 @@ fn combinations_that_make_no_sense_are_refused() {
     }
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "nothing may be left behind");
 }
+
+/// Two unit squares with half of the way between them blocked over a quarter of it.
+const BLOCKED: &str = "T two squares with a square in between
+C encl=0 list=2 eps=1.e-6
+F 3
+V 1 0 0 0
+V 2 1 0 0
+V 3 1 1 0
+V 4 0 1 0
+V 5 0 0 1
+V 6 1 0 1
+V 7 1 1 1
+V 8 0 1 1
+V 9 0 0 .5
+V 10 .5 0 .5
+V 11 .5 .5 .5
+V 12 0 .5 .5
+S 1 1 2 3 4 0 0 0.50 low
+S 2 7 6 5 8 0 0 0.20 high
+O 3 9 10 11 12
+End of data
+";
+
+#[test]
+fn files_of_view3d_are_read_and_answered_in_its_format() {
+    let dir = tempfile::tempdir().unwrap();
+    let (scene, out) = (dir.path().join("squares.vs3"), dir.path().join("F.vf"));
+    fs::write(&scene, BLOCKED).unwrap();
+    let ran =
+        relume(&["factors", text(&scene), "-o", text(&out), "--tolerance", "0.005"]).succeeds();
+    assert!(ran.err.contains("2 surfaces, 1 frame: 2 factors"), "{}", ran.err);
+    let vf = fs::read_to_string(&out).unwrap();
+    let lines: Vec<&str> = vf.lines().collect();
+    assert_eq!(lines[1], "1 1");
+    let factors: Vec<f64> = lines[2].split(' ').map(|f| f.parse().unwrap()).collect();
+    assert!(factors[0] == 0.0 && (factors[1] - 0.149_868_671_774).abs() < 1e-4, "{factors:?}");
+    assert_eq!(lines[4], "0.500 0.200");
+    // As a table: no factor to what is only in the way.
+    let found = table(&relume(&["factors", text(&scene)]).succeeds().out);
+    assert_eq!(found.len(), 4, "{found:?}");
+    relume(&["info", text(&scene)]).says(&[
+        "3 surfaces",
+        "low",
+        "obstruction 3",
+        "list=2 eps=1.e-6",
+    ]);
+    let checked = relume(&["check", text(&scene)]).succeeds();
+    assert!(!checked.out.contains("nothing-emits"), "{}", checked.out);
+    // A mistake is named by its line.
+    fs::write(&scene, BLOCKED.replace("S 2 7 6 5 8", "S 2 7 6 5 80")).unwrap();
+    relume(&["factors", text(&scene)]).fails(
+        1,
+        &["squares.vs3`, line 17", "refers to vertex 80", "help: there are vertices 1 to 12"],
+    );
+}

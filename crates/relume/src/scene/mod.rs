@@ -22,6 +22,7 @@ mod merge;
 mod motion;
 mod names;
 mod rigid;
+mod view3d;
 
 pub use builder::SceneBuilder;
 pub use check::check;

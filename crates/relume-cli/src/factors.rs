@@ -334,9 +334,10 @@ impl Table {
         things: &Things,
     ) -> Result<u64, Failure> {
         match self {
-            Table::Csv(sink) => csv_rows(report.frame, factors, before, things)
-                .and_then(|(bytes, rows)| sink.write_all(&bytes).map(|()| rows))
-                .map_err(|error| sink.failure(&error)),
+            Table::Csv(sink) => {
+                let rows = csv_rows(sink, report.frame, factors, before, things);
+                rows.map_err(|error| sink.failure(&error))
+            }
             Table::Dense(npz, rest) => {
                 rest.add(report, factors);
                 let mut row = vec![0.0; factors.len() + 1];
@@ -425,30 +426,31 @@ fn not_written(error: io::Error) -> Failure {
         .help("free some space or choose another place with -o")
 }
 
-/// The rows of a frame as CSV, and how many they are.
+/// Writes the rows of a frame as CSV; how many they are.
 fn csv_rows(
+    sink: &mut Sink,
     frame: u32,
     factors: &Factors,
     before: Option<&Factors>,
     things: &Things,
-) -> io::Result<(Vec<u8>, u64)> {
-    let mut table = csv::Writer::from_writer(Vec::new());
+) -> io::Result<u64> {
+    let mut table = csv::Writer::from_writer(sink);
     let mut rows = 0;
     let mut outcome = Ok(());
     let frame = frame.to_string();
     let areas: Vec<String> = factors.area_m2.iter().map(f64::to_string).collect();
     factors.changed_since(before, &mut |from, to, factor| {
-        rows += 1;
-        let to = to.map_or(things.environment.as_str(), |to| things.name(to));
-        let factor = factor.to_string();
-        let row = [&frame, things.name(from), to, &areas[from as usize], &factor];
-        if let Err(error) = table.write_record(row) {
-            outcome = Err(io::Error::other(error));
+        if outcome.is_ok() {
+            let to = to.map_or(things.environment.as_str(), |to| things.name(to));
+            let factor = factor.to_string();
+            outcome =
+                table.write_record([&frame, things.name(from), to, &areas[from as usize], &factor]);
+            rows += 1;
         }
     });
-    outcome?;
-    let bytes = table.into_inner().map_err(|error| io::Error::other(error.to_string()))?;
-    Ok((bytes, rows))
+    outcome.map_err(io::Error::other)?;
+    table.flush()?;
+    Ok(rows)
 }
 
 /// The report as JSON.

@@ -46,6 +46,28 @@ pub(crate) enum Command {
     Render(RenderArgs),
     /// Solve a scene without pictures.
     Solve(SolveArgs),
+    /// Irradiance at points, frame by frame, as a table (CSV).
+    ///
+    /// SENSORS is text, a line `x y z nx ny nz` for each sensor (metres, in the world; # begins a
+    /// comment), or CSV with those columns and, if wanted, `name` and `body`: a sensor with a body
+    /// rides on it, and is given where it is at the start of the animation. Sensors need not lie on
+    /// a surface. Columns of the table: frame, sensor (its name, or its number from 0), place and
+    /// normal in the world, and irradiance in W/m2, linear RGB.
+    #[command(
+        after_help = "Example:  relume probe room.glb sensors.txt -o irradiance.csv --frames 0-24x8"
+    )]
+    Probe(ProbeArgs),
+    /// Form factors between named surfaces, bodies or patches, frame by frame.
+    ///
+    /// F(from -> to) is the share of what leaves `from` that reaches `to`; `area_from_m2` times it is
+    /// the same number in both directions. What escapes stands in the table as going to
+    /// `environment`: into the open, or onto the black back of a single-sided polygon. Nothing needs
+    /// to emit: every surface weighs the same, and --tolerance bounds the error of a factor relative
+    /// to the sum of its row. Rows are reported as they are and never normalised unless asked.
+    #[command(
+        after_help = "Example:  relume factors satellite.glb --by body -o factors.csv --tolerance 0.01"
+    )]
+    Factors(FactorsArgs),
     /// Say what was read: bodies, patches, materials, emitters, animations, cameras, lights.
     Info(InfoArgs),
     /// Say what is wrong with a scene, and what to do about it.
@@ -123,6 +145,132 @@ pub(crate) struct SolveArgs {
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) solve: SolveFlags,
+}
+
+/// `relume probe`
+#[derive(Debug, Args)]
+pub(crate) struct ProbeArgs {
+    /// The scene, a .glb, .gltf or .vs3 file.
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+    /// The sensors: text lines `x y z nx ny nz`, or CSV.
+    #[arg(value_name = "SENSORS")]
+    pub(crate) sensors: PathBuf,
+    /// File for the table; it appears when all frames are done [default: stdout].
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Read the mesh under each sensor instead of gathering at the point itself: quicker for very
+    /// many sensors, and wrong on either side of a shadow's edge. Sensors must lie on surfaces.
+    #[arg(long)]
+    pub(crate) interpolate: bool,
+    #[command(flatten)]
+    pub(crate) clip: ClipFlags,
+    #[command(flatten)]
+    pub(crate) update: UpdateChoice,
+}
+
+/// `relume factors`
+#[derive(Debug, Args)]
+pub(crate) struct FactorsArgs {
+    /// The scene, a .glb, .gltf or .vs3 file.
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+    /// Between what factors are summed.
+    #[arg(long, value_enum, default_value = "surface")]
+    pub(crate) by: By,
+    /// File for the table; it appears when all frames are done [default: CSV on stdout].
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// What the file holds [default: what its name ends in says: .csv, .npz, .vf, .idf].
+    #[arg(long, value_enum)]
+    pub(crate) format: Option<FactorFormat>,
+    /// CSV: after the first frame only the factors that differ from the frame before; 0 for those
+    /// that are gone.
+    #[arg(long)]
+    pub(crate) changed_only: bool,
+    /// Make the rows of a closed scene sum to 1.
+    #[arg(long, value_enum, default_value = "none")]
+    pub(crate) closure: ClosureFlag,
+    /// Also write row sums, what escapes, and times to this file, frame by frame
+    /// (`relume-factors/1`).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) report: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) clip: ClipFlags,
+    #[command(flatten)]
+    pub(crate) update: UpdateChoice,
+}
+
+/// `--by`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum By {
+    /// Each planar polygon: `floor/0`, `floor/1`.
+    Patch,
+    /// Each surface: an object, or a part of it of one material.
+    Surface,
+    /// Each body: what moves together.
+    Body,
+}
+
+/// `--closure`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ClosureFlag {
+    /// As they are.
+    None,
+    /// Each row is divided by its sum; reciprocity is lost by as much as the sums differed.
+    Rows,
+    /// Exchange areas are scaled, the same in both directions, until rows sum to 1.
+    Reciprocal,
+}
+
+/// `--format`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FactorFormat {
+    /// A line for each factor above 0: frame,from,to,area_from_m2,factor.
+    Csv,
+    /// NumPy: `factors` (frame, from, to), `name`, `area_m2`, `frame`, `time_s`.
+    Npz,
+    /// SciPy: `scipy.sparse.load_npz` reads one CSR matrix, the frames one below the other.
+    NpzSparse,
+    /// The text file that View3D writes; one frame.
+    View3d,
+    /// The object of EnergyPlus that gives view factors by surface name; one frame.
+    Energyplus,
+}
+
+impl By {
+    /// As on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            By::Patch => "patch",
+            By::Surface => "surface",
+            By::Body => "body",
+        }
+    }
+}
+
+impl ClosureFlag {
+    /// As on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            ClosureFlag::None => "none",
+            ClosureFlag::Rows => "rows",
+            ClosureFlag::Reciprocal => "reciprocal",
+        }
+    }
+}
+
+impl FactorFormat {
+    /// As on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            FactorFormat::Csv => "csv",
+            FactorFormat::Npz => "npz",
+            FactorFormat::NpzSparse => "npz-sparse",
+            FactorFormat::View3d => "view3d",
+            FactorFormat::Energyplus => "energyplus",
+        }
+    }
 }
 
 /// `relume info`

@@ -93,6 +93,11 @@ impl Clip {
         })
     }
 
+    /// The same clip with nothing that emits, for form factors.
+    pub(crate) fn without_light(self) -> Clip {
+        Clip { scene: Arc::new(self.scene.without_light()), ..self }
+    }
+
     /// Says on stderr what is doubtful about the scene, unless the user wants quiet.
     pub(crate) fn warn(&self) {
         if !self.flags.quiet {

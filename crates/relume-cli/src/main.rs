@@ -6,17 +6,20 @@ mod check;
 mod clip;
 mod demo;
 mod events;
+mod factors;
 mod failure;
 mod figures;
 mod frames;
 mod info;
 mod interrupt;
 mod output;
+mod probe;
 mod progress;
 mod report;
 mod resume;
 mod run;
 mod scene_file;
+mod sensors;
 mod strategies;
 mod verify;
 
@@ -43,6 +46,8 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Check(args) => check::check(&args),
         Command::Verify(args) => interrupt::listen().and_then(|()| verify::verify(&args)),
         Command::Bench(args) => interrupt::listen().and_then(|()| bench::bench(&args)),
+        Command::Factors(args) => interrupt::listen().and_then(|()| factors::factors(&args)),
+        Command::Probe(args) => interrupt::listen().and_then(|()| probe::probe(&args)),
         Command::Solve(args) => interrupt::listen().and_then(|()| run::solve(args)),
         Command::Render(args) => interrupt::listen().and_then(|()| run::render(args)),
         Command::Demo(args) => interrupt::listen().and_then(|()| run::demo(args)),

@@ -1,19 +1,79 @@
-//! What goes to stdout: the result, and nothing else.
+//! What goes to stdout: the result, and nothing else. Tables go there or to a file.
 
 use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use relume_picture::export::WholeFile;
 
 use crate::failure::Failure;
+use crate::interrupt;
 
 /// Prints a result.
 ///
 /// A reader that has gone away (`relume info scene.glb | head -1`) is no error.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
+    print_bytes(text.as_bytes())
+}
+
+fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(bytes).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(Failure::new(format_args!("cannot write to stdout: {error}")))
         }
         _ => Ok(()),
+    }
+}
+
+/// Where a table goes: a file, which appears when it is finished, or stdout, likewise at the end, so
+/// that a run that fails has printed nothing.
+pub(crate) enum Sink {
+    /// A file and its path.
+    File(WholeFile, PathBuf),
+    /// What will be printed.
+    Stdout(Vec<u8>),
+}
+
+impl Sink {
+    /// A file at `path`, or stdout. That the file can be written is known from here on.
+    pub(crate) fn open(path: Option<&Path>) -> Result<Sink, Failure> {
+        let Some(path) = path else { return Ok(Sink::Stdout(Vec::new())) };
+        if path.is_dir() {
+            return Err(Failure::new(format_args!("{} is a directory", path.display()))
+                .help("name a file with -o"));
+        }
+        let file = WholeFile::create(path).map_err(|error| Failure::write(path, &error))?;
+        Ok(Sink::File(file, path.to_owned()))
+    }
+
+    /// The message of a write that failed.
+    pub(crate) fn failure(&self, error: &io::Error) -> Failure {
+        match self {
+            Sink::File(_, path) => Failure::write(path, error),
+            Sink::Stdout(_) => Failure::new(format_args!("cannot write to stdout: {error}")),
+        }
+    }
+
+    /// Puts the file into its place, or prints.
+    pub(crate) fn finish(self) -> Result<(), Failure> {
+        let _guard = interrupt::writing();
+        match self {
+            Sink::File(file, path) => file.finish().map_err(|error| Failure::write(&path, &error)),
+            Sink::Stdout(bytes) => print_bytes(&bytes),
+        }
+    }
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Sink::File(file, _) => file.write(bytes),
+            Sink::Stdout(out) => out.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 

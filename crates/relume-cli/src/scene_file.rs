@@ -19,6 +19,7 @@ pub(crate) fn failure(error: SceneError) -> Failure {
     let remedy = match &error {
         SceneError::Read { remedy, .. }
         | SceneError::Format { remedy, .. }
+        | SceneError::View3d { remedy, .. }
         | SceneError::Extension { remedy, .. }
         | SceneError::Geometry { remedy, .. }
         | SceneError::Material { remedy, .. }
@@ -38,9 +39,14 @@ pub(crate) fn failure(error: SceneError) -> Failure {
 /// Says on stderr, before a scene is solved, what was noticed while reading, unless it is merely
 /// worth knowing, and what `relume check` would call an error.
 pub(crate) fn warn(scene: &Scene) {
+    warn_but_for(scene, &[]);
+}
+
+/// The same but for some codes that do not matter for what is to be done.
+pub(crate) fn warn_but_for(scene: &Scene, codes: &[&str]) {
     let read = scene.notes.iter().filter(|note| note.severity > Severity::Info).cloned();
     let found = check(scene).into_iter().filter(|note| note.severity == Severity::Error);
-    for note in read.chain(found) {
+    for note in read.chain(found).filter(|note| !codes.contains(&note.code)) {
         // The run goes on, so it is no more than a warning here.
         output::complain(&line(&Note { severity: Severity::Warning, ..note }));
     }

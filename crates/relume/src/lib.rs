@@ -6,7 +6,7 @@
 //! | room | one sentence |
 //! |---|---|
 //! | [`geometry`] | polygons, bounds, shafts, rigid motion: pure functions |
-//! | [`scene`] | glTF in; bodies, patches, materials, motion: validated, then immutable |
+//! | [`scene`] | glTF and View3D's files in; bodies, patches, materials, motion: validated, then immutable |
 //! | [`element`] | the element forest: clusters, patches and their quadtrees |
 //! | [`transport`] | exchange area and visibility of two elements: pure queries |
 //! | [`event`] | what the known motion allows within the coming time, and until when |

@@ -241,3 +241,11 @@ fn the_mean_over_the_static_room_is_exact() {
     );
     assert!((mean / 0.019_113_149_8 - 1.0).abs() < 2e-3, "{mean}");
 }
+
+#[test]
+fn sensors_at_a_fine_tolerance_are_right_to_half_a_per_cent_in_every_frame() {
+    for frame in FRAMES {
+        let (gathered, _) = at_sensors(0.005, &[frame]);
+        assert!(rms(&gathered.all) <= 0.005, "frame {frame}: {}", rms(&gathered.all));
+    }
+}

@@ -1,7 +1,7 @@
 //! Files that appear whole or not at all.
 
 use std::fs;
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -12,23 +12,68 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// removed and whatever stood at `path` stays. A symbolic link is followed; what is neither a file
 /// nor a directory (a device, a pipe) is written to as it is.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let target = fs::canonicalize(path);
-    let path = target.as_deref().unwrap_or(path);
-    if fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
-        return fs::OpenOptions::new().write(true).open(path)?.write_all(bytes);
+    let mut file = WholeFile::create(path)?;
+    file.write_all(bytes)?;
+    file.finish()
+}
+
+/// A file that is written piece by piece and appears when it is finished, as
+/// [`write_atomically`] has it; one that is dropped before leaves nothing behind.
+#[derive(Debug)]
+pub struct WholeFile {
+    file: BufWriter<fs::File>,
+    /// The temporary file, and the place it is to take; `None` for devices and when done.
+    places: Option<(PathBuf, PathBuf)>,
+}
+
+impl WholeFile {
+    /// Starts a file that will stand at `path`.
+    pub fn create(path: &Path) -> io::Result<WholeFile> {
+        let target = fs::canonicalize(path);
+        let path = target.as_deref().unwrap_or(path);
+        if fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+            let file = BufWriter::new(fs::OpenOptions::new().write(true).open(path)?);
+            return Ok(WholeFile { file, places: None });
+        }
+        let temporary = temporary_beside(path)?;
+        let file = BufWriter::new(fs::File::create_new(&temporary)?);
+        Ok(WholeFile { file, places: Some((temporary, path.to_owned())) })
     }
-    let temporary = temporary_beside(path)?;
-    let written = fs::File::create_new(&temporary).and_then(|mut file| {
-        file.write_all(bytes)?;
-        file.flush()?;
-        drop(file);
-        fs::rename(&temporary, path)
-    });
-    if written.is_err() {
-        // Best effort: the error that matters is the one being returned.
-        let _ = fs::remove_file(&temporary);
+
+    /// Puts the file into its place.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.file.flush()?;
+        if let Some((temporary, path)) = &self.places {
+            fs::rename(temporary, path)?;
+            self.places = None;
+        }
+        Ok(())
     }
-    written
+}
+
+impl Write for WholeFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for WholeFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
+
+impl Drop for WholeFile {
+    fn drop(&mut self) {
+        if let Some((temporary, _)) = &self.places {
+            // Best effort: the error that matters is the one that kept it from being finished.
+            let _ = fs::remove_file(temporary);
+        }
+    }
 }
 
 /// Whether [`write_atomically`] could write to `path` now: makes a temporary file beside it and
@@ -81,6 +126,21 @@ mod tests {
         write_atomically(&path, b"two").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"two");
         assert_eq!(names(dir.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn a_file_that_is_not_finished_leaves_nothing_behind() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.txt");
+        fs::write(&path, "old").unwrap();
+        let mut half = WholeFile::create(&path).unwrap();
+        half.write_all(b"half of the ").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        drop(half);
+        assert_eq!(
+            (fs::read(&path).unwrap().as_slice(), names(dir.path())),
+            (&b"old"[..], vec!["a.txt".into()])
+        );
     }
 
     #[cfg(unix)]

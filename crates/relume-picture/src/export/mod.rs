@@ -1,9 +1,13 @@
-//! Scenes and solutions as files that other programs read.
+//! Scenes, solutions and tables as files that other programs read.
 //!
 //! Every file appears whole or not at all.
 
+mod factors;
 mod file;
 mod glb;
+mod npz;
 
-pub use file::{probe, write_atomically};
+pub use factors::{energyplus, view3d};
+pub use file::{WholeFile, probe, write_atomically};
 pub use glb::{ExportError, glb, write_glb};
+pub use npz::Npz;

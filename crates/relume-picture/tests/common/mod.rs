@@ -33,6 +33,7 @@ pub(crate) fn empty() -> Scene {
         name: "by hand".into(),
         bodies: Vec::new(),
         surfaces: Vec::new(),
+        obstructions: Default::default(),
         patches: Vec::new(),
         materials: Vec::new(),
         lights: Vec::new(),

@@ -3,6 +3,7 @@
 //!
 //! The one way in for files and code alike; must not know which of the two it was.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use glam::{DMat3, DVec2, DVec3};
@@ -59,6 +60,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
         name: draft.name,
         bodies: parts.bodies,
         surfaces: parts.surfaces,
+        obstructions: BTreeSet::new(),
         patches: parts.patches,
         materials: draft.materials,
         lights: draft.lights,

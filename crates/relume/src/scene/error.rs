@@ -26,6 +26,18 @@ pub enum SceneError {
         /// What to do.
         remedy: String,
     },
+    /// A line of a file of View3D says nothing that makes sense, or what is not supported.
+    #[error("`{file}`{at}: {what}; {remedy}", at = at(*line))]
+    View3d {
+        /// The file.
+        file: String,
+        /// The line, from 1; 0 for the whole file.
+        line: usize,
+        /// What is wrong.
+        what: String,
+        /// What to do.
+        remedy: String,
+    },
     /// The file needs an extension that is not supported.
     #[error("`{file}` needs the extension {extension}: {remedy}")]
     Extension {
@@ -96,4 +108,8 @@ pub enum SceneError {
         /// What to do.
         remedy: String,
     },
+}
+
+fn at(line: usize) -> String {
+    if line == 0 { String::new() } else { format!(", line {line}") }
 }

@@ -4,6 +4,8 @@
 //! function of time. This room reads files and nothing else does. It must not know elements,
 //! pairs or light transport.
 
+use std::collections::BTreeSet;
+
 use glam::{DVec2, DVec3};
 
 use crate::geometry::Pose;
@@ -16,10 +18,12 @@ mod drift;
 mod error;
 mod flatten;
 mod import;
+mod inside;
 mod merge;
 mod motion;
 mod names;
 mod rigid;
+mod view3d;
 
 pub use builder::SceneBuilder;
 pub use check::check;
@@ -53,6 +57,9 @@ pub struct Scene {
     pub bodies: Vec<Body>,
     /// Named parts of bodies: one for each mesh primitive that an object instantiates.
     pub surfaces: Vec<Surface>,
+    /// Surfaces that only block light: in tables of form factors what reaches them has escaped.
+    /// Files of View3D have such; everything else treats them as black surfaces.
+    pub obstructions: BTreeSet<SurfaceId>,
     /// All patches, sorted by body (then by surface): [`Body::patches`] is a range of them.
     pub patches: Vec<Patch>,
     /// Materials; every patch names one.
@@ -265,6 +272,14 @@ impl Scene {
             }
         }
         bounds
+    }
+
+    /// The same scene with nothing that emits: what form factors are found in, so that every surface
+    /// weighs the same.
+    pub fn without_light(&self) -> Scene {
+        let mut dark = Scene { lights: Vec::new(), ..self.clone() };
+        dark.materials.iter_mut().for_each(|material| material.exitance = [0.0; 3]);
+        dark
     }
 
     /// The patches of a body with their ids.

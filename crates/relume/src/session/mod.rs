@@ -15,6 +15,7 @@ mod coarse;
 mod compact;
 mod compare;
 mod events;
+mod factors;
 mod gather;
 mod lossy;
 mod names;
@@ -26,6 +27,8 @@ mod tally;
 
 pub use compare::{Difference, RadiosityGap, Which, compare, radiosity_gap};
 pub use events::{Event, EventKind};
+pub use factors::{Closure, Factors, Grouping, Open};
+pub use gather::Sensor;
 pub use lossy::{Missed, RadiosityError, missed, radiosity_error};
 pub use names::ElementName;
 pub use options::{Options, Oracle, Update};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use crate::element::{ElementId, Kind};
 use crate::geometry::Pose;
@@ -47,9 +47,49 @@ impl Leaf {
         let [gu, gv] = self.irradiance_gradient;
         std::array::from_fn(|c| (self.irradiance[c] + gu[c] * x + gv[c] * y).max(0.0))
     }
+
+    /// Whether a point of the patch's frame is in the leaf, or no further than `slack_m` beside it.
+    fn holds(&self, p: DVec2, slack_m: f64) -> bool {
+        (0..4).all(|k| {
+            let (from, to) = (self.corners[k], self.corners[(k + 1) % 4]);
+            (to - from).perp_dot(p - from) >= -slack_m * (to - from).length()
+        })
+    }
 }
 
+/// Cosine of the angle by which the normal of a sensor may differ from that of its patch.
+const FACES_ALONG: f64 = 0.9;
+
 impl Snapshot {
+    /// Irradiance that the mesh says is at a point of a surface, W/m2, linear RGB: on the nearest
+    /// patch that faces along `normal` (to within 25 degrees) and has the point on it, no further
+    /// than a 1/1000 of the scene's diagonal away; `None` where there is none.
+    ///
+    /// Linear over a leaf, with jumps between leaves: across the edge of a shadow it is right in the
+    /// mean and wrong on either side. [`super::Session::irradiance_at`] has no such limit.
+    pub fn irradiance_at(&self, point: DVec3, normal: DVec3) -> Option<[f64; 3]> {
+        let (lo, hi) = self.scene.bounds(self.time_s)?;
+        let near_m = 1e-3 * (hi - lo).length();
+        let mut found: Vec<(f64, PatchId, DVec2)> = Vec::new();
+        for (k, patch) in self.scene.patches.iter().enumerate() {
+            let Some(pose) = self.poses[patch.body.0 as usize] else { continue };
+            let d = pose.inverse_point(point) - patch.frame.origin;
+            let off_m = d.dot(patch.frame.normal).abs();
+            let along = pose.direction(patch.frame.normal).dot(normal);
+            if along > FACES_ALONG && off_m <= near_m {
+                let p = DVec2::new(d.dot(patch.frame.u), d.dot(patch.frame.v));
+                found.push((off_m, PatchId(k as u32), p));
+            }
+        }
+        // Stable: of patches alike the first.
+        found.sort_by(|one, other| one.0.total_cmp(&other.0));
+        found.iter().find_map(|&(_, patch, p)| {
+            let under = |leaf: &&Leaf| leaf.holds(p, 1e-3 * near_m);
+            let leaf = self.leaves_of(patch).iter().find(under)?;
+            Some(leaf.irradiance_at(p).map(f64::from))
+        })
+    }
+
     /// The leaves of one patch; empty if its body is absent.
     pub fn leaves_of(&self, patch: PatchId) -> &[Leaf] {
         let i = patch.0 as usize;

@@ -96,18 +96,36 @@ pub fn visible_form_factor(
     target: &ConvexPolygon,
     occluders: &[ConvexPolygon],
 ) -> f64 {
-    let corners = target.corners();
-    let up = target.area_vector2().normalize_or_zero();
-    let along = (corners[1] - corners[0]).normalize_or_zero();
-    let frame = TargetFrame { origin: corners[0], axes: [along, up.cross(along), up] };
+    let occluders = occluders.iter().map(ConvexPolygon::corners);
+    form_factor_past(point, normal, target.corners(), occluders).factor
+}
+
+/// A form factor past occluders.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FactorPast {
+    /// Form factor from the point to what it sees.
+    pub factor: f64,
+    /// Exact up to rounding; else the target fell into too many pieces, and `factor` counts some
+    /// of what is hidden.
+    pub is_exact: bool,
+}
+
+/// [`visible_form_factor`] for any number of occluders of any number of corners.
+pub fn form_factor_past<'a>(
+    point: DVec3,
+    normal: DVec3,
+    target: &[DVec3],
+    occluders: impl Iterator<Item = &'a [DVec3]>,
+) -> FactorPast {
+    let frame = TargetFrame::of_polygon(target);
     let from = frame.place(point);
     let mut between = Occluders::default();
     for occluder in occluders {
-        between.push(occluder.corners().iter().map(|&c| frame.place(c)), from);
+        between.push(occluder.iter().map(|&c| frame.place(c)), from);
     }
     between.largest_first();
     let mut cutter = Cutter::default();
-    cutter.cut(from, &frame.flat(corners), &between);
+    cutter.cut(from, &frame.flat(target), &between);
     let normal = frame.direction(normal);
     let mut solid = Vec::new();
     let mut factor = |piece: &[DVec2]| {
@@ -115,7 +133,16 @@ pub fn visible_form_factor(
         solid.extend(piece.iter().map(|c| c.extend(0.0)));
         form_factor_from_point(from, normal, &solid)
     };
-    (0..cutter.left.len()).map(|k| factor(cutter.left.get(k))).sum()
+    FactorPast {
+        factor: (0..cutter.left.len()).map(|k| factor(cutter.left.get(k))).sum(),
+        is_exact: cutter.left.len() <= FRAGMENTS_MAX,
+    }
+}
+
+/// The part of a polygon in front of a plane, in place (Sutherland & Hodgman 1974); for polygons of
+/// any number of corners. What is left is convex where the polygon was.
+pub fn keep_in_front(polygon: &mut Vec<DVec3>, plane: &Plane) {
+    keep_front(polygon, &mut Vec::new(), plane);
 }
 
 /// The frame of a target: the first two axes in its plane, the third towards its front.
@@ -127,6 +154,14 @@ struct TargetFrame {
 impl TargetFrame {
     fn of(e: &WorldElement) -> TargetFrame {
         TargetFrame { origin: e.centre, axes: [e.axes[0], e.axes[1], e.plane.normal] }
+    }
+
+    /// Of a planar polygon with three or more corners.
+    fn of_polygon(c: &[DVec3]) -> TargetFrame {
+        let fan = |k: usize| (c[k] - c[0]).cross(c[k + 1] - c[0]);
+        let up = (1..c.len() - 1).map(fan).sum::<DVec3>().normalize_or_zero();
+        let along = (c[1] - c[0]).normalize_or_zero();
+        TargetFrame { origin: c[0], axes: [along, up.cross(along), up] }
     }
 
     fn direction(&self, d: DVec3) -> DVec3 {

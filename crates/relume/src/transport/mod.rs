@@ -9,12 +9,12 @@ mod point;
 mod segments;
 mod visibility;
 
-pub use clip::visible_form_factor;
+pub use clip::{FactorPast, form_factor_past, keep_in_front, visible_form_factor};
 pub use exchange::{Exchange, Meeting, Variation, exchange, light_at, light_exchange, meeting};
 pub use kernel::Simd;
 pub use point::form_factor_from_point;
 pub use segments::{SEGMENTS, SegmentBundle};
 pub use visibility::{
-    CLIPPED_MAX, Candidates, Shaft, Visibility, exact_visibility, light_visibility,
+    CLIPPED_MAX, Candidates, Shaft, Visibility, covers, exact_visibility, light_visibility,
     segment_is_clear, visibility,
 };

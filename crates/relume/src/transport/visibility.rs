@@ -78,10 +78,11 @@ const COVER: f64 = 0.5;
 const LIFT: f64 = 8.0;
 
 /// Whether a polygon lies on an end and faces it: a box on a floor hides what it stands on.
-/// Of two coincident surfaces that face the same way neither hides the other.
-fn covers(polygon: &OccluderPolygon<'_>, e: &WorldElement, within_m: f64) -> bool {
-    polygon.plane.normal.dot(e.plane.normal) < -0.5
-        && polygon.corners.iter().all(|&c| e.plane.distance(c).abs() <= within_m)
+/// Of two coincident surfaces that face the same way neither hides the other. `within_m` is the
+/// distance from the end's plane up to which a corner lies in it.
+pub fn covers(polygon: &OccluderPolygon<'_>, end: &Plane, within_m: f64) -> bool {
+    polygon.plane.normal.dot(end.normal) < -0.5
+        && polygon.corners.iter().all(|&c| end.distance(c).abs() <= within_m)
 }
 
 /// A polygon, moved.
@@ -161,7 +162,7 @@ impl<'a> Shaft<'a> {
         within_m: f64,
     ) -> (bool, bool) {
         let twin = self.view.patch(patch).twin;
-        let on = |e, of| twin != Some(of) && covers(polygon, e, within_m);
+        let on = |e: &WorldElement, of| twin != Some(of) && covers(polygon, &e.plane, within_m);
         (on(a, self.patches.0), on(b, self.patches.1))
     }
 

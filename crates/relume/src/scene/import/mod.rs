@@ -1,4 +1,4 @@
-//! glTF 2.0 in: .glb and .gltf files become scenes.
+//! Files in: .glb and .gltf files become scenes here, files of View3D in `view3d`.
 //!
 //! Reads and translates; what makes a scene valid is `assemble`'s. Whatever is wrong with a file
 //! is an error that names the node or mesh and the remedy, never a panic. Must not know light
@@ -19,7 +19,7 @@ mod tree;
 use document::Document;
 
 use super::assemble::assemble;
-use super::{Note, Scene, SceneError, Severity};
+use super::{Note, Scene, SceneError, Severity, view3d};
 
 /// What to read of a file.
 #[derive(Clone, Debug, Default)]
@@ -29,7 +29,12 @@ pub struct ImportOptions {
     pub animation: Option<String>,
 }
 
-/// Reads a scene from a .glb or .gltf file (glTF 2.0; external and embedded buffers).
+/// Reads a scene from a .glb or .gltf file (glTF 2.0; external and embedded buffers), or a .vs3 file
+/// of View3D.
+///
+/// Of View3D: one body at rest with a surface for each of the file's, in its order and by its name;
+/// reflectance is 1 minus emittance, subsurfaces and null surfaces are cut out of their base, combined
+/// surfaces are one, obstructions are in [`Scene::obstructions`]. Of glTF:
 ///
 /// Units are metres, seconds and W: emissive factors are radiances in W/m2/sr, punctual lights are
 /// converted ([`super::Light::conversion`]). Extensions without effect on diffuse light are
@@ -40,6 +45,16 @@ pub struct ImportOptions {
 /// A file that is missing, damaged or needs what is not supported, a motion that is not rigid, a
 /// scene without polygons: each names the file, node or mesh, and the remedy.
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError> {
+    if view3d::is_view3d(path) {
+        return match &options.animation {
+            None => view3d::import(path),
+            Some(name) => Err(SceneError::Animation {
+                animation: name.clone(),
+                what: "files of View3D have no animation".into(),
+                remedy: "leave out --animation".into(),
+            }),
+        };
+    }
     let document = Document::open(path)?;
     let mut draft = tree::draft(&document, options)?;
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned());

@@ -156,10 +156,10 @@ fn howell_spheres() {
     let smooth = 1.0 - exact::concentric_spheres_outer_to_itself(0.5, 1.0);
     assert!((ratio - smooth).abs() < 1e-12, "{ratio}");
     let solve = |tolerance| common::solved(scene.clone(), at_tolerance(tolerance)).0;
-    line("C-135, sphere to the sphere around it, 128 triangles", 1.0, 2e-3, |t| {
+    line("sphere to the sphere around it, 128 triangles each", 1.0, 2e-3, |t| {
         form_factor(&solve(t), "inner", "outer")
     });
-    line("C-136, the outer sphere to the inner", ratio, 1e-3, |t| {
+    line("the outer sphere to the inner", ratio, 1e-3, |t| {
         form_factor(&solve(t), "outer", "inner")
     });
     let pair = Pair {
@@ -170,7 +170,7 @@ fn howell_spheres() {
     let (own, smooth) = (pair.judged(1e-6), exact::sphere_to_disc(0.8, 1.0));
     println!("sphere to disc: {smooth:.6}");
     assert!((own / smooth - 1.0).abs() < 0.02, "{own} {smooth}");
-    check("C-129, sphere to disc, 128 triangles and a 32-gon", own, &pair, 2e-3);
+    check("sphere to disc, 128 triangles and a 32-gon", own, &pair, 2e-3);
 }
 
 #[test]

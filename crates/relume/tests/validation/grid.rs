@@ -27,7 +27,7 @@ pub(crate) fn sites(scene: &Scene, time_s: f64, sides: Sides) -> Vec<Site> {
     out
 }
 
-/// Mean irradiance over the same cells in a solution, W/m2.
+/// Mean irradiance over the same cells in a solution and over the channels, W/m2.
 pub(crate) fn found(session: &Session, sides: Sides) -> Vec<f64> {
     let snapshot = session.snapshot();
     let scene = &snapshot.scene;
@@ -44,17 +44,24 @@ pub(crate) fn found(session: &Session, sides: Sides) -> Vec<f64> {
     out
 }
 
-/// Root mean square of relative errors, with the reference's own variance taken out.
+/// Mean over the channels.
+pub(crate) fn grey(rgb: [f64; 3]) -> f64 {
+    rgb.iter().sum::<f64>() / 3.0
+}
+
+/// Root mean square of relative errors, with the reference's own variance taken out; of means over the
+/// channels, as [`found`] gives them.
 pub(crate) fn error(found: &[f64], reference: &[Estimate]) -> f64 {
     assert_eq!(found.len(), reference.len());
     let pairs = found.iter().zip(reference);
-    let off: Vec<f64> = pairs.map(|(h, r)| h / r.irradiance[0] - 1.0).collect();
+    let off: Vec<f64> = pairs.map(|(h, r)| h / grey(r.irradiance) - 1.0).collect();
     (rms(&off).powi(2) - own_error(reference).powi(2)).max(0.0).sqrt()
 }
 
-/// Root mean square of the relative standard errors of a reference.
+/// Root mean square of the relative standard errors of a reference; as if the channels erred alike, which
+/// they do where one path carries all three.
 pub(crate) fn own_error(reference: &[Estimate]) -> f64 {
-    let own = reference.iter().map(|r| r.standard_error[0] / r.irradiance[0]);
+    let own = reference.iter().map(|r| grey(r.standard_error) / grey(r.irradiance));
     rms(&own.collect::<Vec<f64>>())
 }
 

@@ -4,14 +4,14 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::polygon::{Facet, area_vector};
+use crate::polygon::{Polygon, area_vector};
 use crate::seen::form_factor;
 
-/// A piece of a facet, with one radiosity.
+/// A piece of a polygon, with one radiosity.
 #[derive(Clone, Debug)]
 pub struct Element {
-    /// The facet it is part of.
-    pub facet: usize,
+    /// The polygon it is part of.
+    pub polygon: usize,
     /// Its corners, counter-clockwise seen from the front, convex, m.
     pub corners: Vec<DVec3>,
 }
@@ -23,22 +23,23 @@ impl Element {
     }
 }
 
-/// Exchange areas of all elements with all, occlusion by the facets included: symmetric, row by row,
+/// Exchange areas of all elements with all, occlusion by the polygons included: symmetric, row by row,
 /// m2. Each is A F of the smaller end, F to about `error_max` of itself.
 ///
-/// Cost: the square of the number of elements times the number of facets.
-pub fn exchange_areas(facets: &[Facet], elements: &[Element], error_max: f64) -> Vec<f64> {
+/// Cost: the square of the number of elements times the number of polygons.
+pub fn exchange_areas(polygons: &[Polygon], elements: &[Element], error_max: f64) -> Vec<f64> {
     let n = elements.len();
     let areas: Vec<f64> = elements.iter().map(Element::area_m2).collect();
     let between = |i: usize, k: usize| {
         let (small, large) = if areas[i] <= areas[k] { (i, k) } else { (k, i) };
         let ends = [&elements[small], &elements[large]];
-        if ends[0].facet == ends[1].facet {
+        if ends[0].polygon == ends[1].polygon {
             return 0.0;
         }
-        let own = |f: usize| ends.iter().any(|e| e.facet == f || facets[e.facet].twin == Some(f));
-        let others = (0..facets.len()).filter(|f| !own(*f));
-        let blockers: Vec<&[DVec3]> = others.map(|f| &facets[f].corners[..]).collect();
+        let own =
+            |f: usize| ends.iter().any(|e| e.polygon == f || polygons[e.polygon].twin == Some(f));
+        let others = (0..polygons.len()).filter(|f| !own(*f));
+        let blockers: Vec<&[DVec3]> = others.map(|f| &polygons[f].corners[..]).collect();
         areas[small] * form_factor(&ends[0].corners, &ends[1].corners, &blockers, error_max)
     };
     let rows: Vec<Vec<f64>> =
@@ -55,7 +56,7 @@ pub fn exchange_areas(facets: &[Facet], elements: &[Element], error_max: f64) ->
 
 /// Radiosities of all elements, W/m2, linear RGB: B = M + rho F B by elimination with pivots.
 pub fn radiosities(
-    facets: &[Facet],
+    polygons: &[Polygon],
     elements: &[Element],
     exchange_areas: &[f64],
 ) -> Vec<[f64; 3]> {
@@ -64,13 +65,13 @@ pub fn radiosities(
     for c in 0..3 {
         let mut matrix = vec![0.0; n * n];
         for (i, e) in elements.iter().enumerate() {
-            let share = facets[e.facet].reflectance[c] / e.area_m2();
+            let share = polygons[e.polygon].reflectance[c] / e.area_m2();
             for k in 0..n {
                 matrix[i * n + k] = -share * exchange_areas[i * n + k];
             }
             matrix[i * n + i] += 1.0;
         }
-        let right = elements.iter().map(|e| facets[e.facet].exitance[c]).collect();
+        let right = elements.iter().map(|e| polygons[e.polygon].exitance[c]).collect();
         for (b, x) in out.iter_mut().zip(solved(matrix, right)) {
             b[c] = x;
         }
@@ -138,23 +139,23 @@ mod tests {
                 if !inward {
                     q.reverse();
                 }
-                let facet = Facet::black(q.map(corner).to_vec());
-                Facet { reflectance: [0.5; 3], exitance: [1.0; 3], ..facet }
+                let polygon = Polygon::black(q.map(corner).to_vec());
+                Polygon { reflectance: [0.5; 3], exitance: [1.0; 3], ..polygon }
             })
         };
-        let mut facets = sides(DVec3::ZERO, DVec3::ONE, true).to_vec();
-        facets.extend(sides(DVec3::splat(0.3), v(0.6, 0.5, 0.7), false));
-        let elements: Vec<Element> = facets
+        let mut polygons = sides(DVec3::ZERO, DVec3::ONE, true).to_vec();
+        polygons.extend(sides(DVec3::splat(0.3), v(0.6, 0.5, 0.7), false));
+        let elements: Vec<Element> = polygons
             .iter()
             .enumerate()
-            .map(|(facet, f)| Element { facet, corners: f.corners.clone() })
+            .map(|(polygon, f)| Element { polygon, corners: f.corners.clone() })
             .collect();
-        let x = exchange_areas(&facets, &elements, 1e-5);
+        let x = exchange_areas(&polygons, &elements, 1e-5);
         for (k, e) in elements.iter().enumerate() {
             let row: f64 = x[k * 12..(k + 1) * 12].iter().sum();
             assert!((row / e.area_m2() - 1.0).abs() < 2e-4, "row sum {}", row / e.area_m2());
         }
-        for b in radiosities(&facets, &elements, &x) {
+        for b in radiosities(&polygons, &elements, &x) {
             assert!((b[0] - 2.0).abs() < 1e-3, "{b:?}");
         }
     }

@@ -2,7 +2,7 @@
 //! and a path tracer.
 //!
 //! An independent judge: this crate depends on no other crate of the project and shares no code with
-//! the engine. All it is told of a scene is its polygons ([`Facet`]). Nothing here is tuned for large
+//! the engine. All it is told of a scene is its polygons ([`Polygon`]). Nothing here is tuned for large
 //! scenes. The same input gives the same numbers on any number of threads.
 
 pub mod dense;
@@ -14,6 +14,6 @@ mod random;
 mod rays;
 pub mod seen;
 
-pub use polygon::{Facet, Quad};
+pub use polygon::{Polygon, Quad};
 pub use random::Random;
 pub use rays::{Hit, World};

@@ -79,9 +79,9 @@ pub fn irradiance(world: &World, sites: &[Site], batches: u32, seed: u64) -> Vec
 
 struct Tracer<'a> {
     world: &'a World,
-    /// Facets that emit, with the running sum of their shares of the flux.
+    /// Polygons that emit, with the running sum of their shares of the flux.
     emitters: Vec<(f64, usize)>,
-    /// Density of sampled points on each facet, 1/m2; 0 for those that do not emit.
+    /// Density of sampled points on each polygon, 1/m2; 0 for those that do not emit.
     density: Vec<f64>,
 }
 
@@ -90,13 +90,13 @@ struct Tracer<'a> {
 struct Vertex {
     at: DVec3,
     normal: DVec3,
-    facet: Option<usize>,
+    polygon: Option<usize>,
 }
 
 impl<'a> Tracer<'a> {
     fn new(world: &'a World) -> Tracer<'a> {
         let flux: Vec<f64> =
-            world.facets().iter().map(|f| f.exitance.iter().sum::<f64>() * f.area_m2()).collect();
+            world.polygons().iter().map(|f| f.exitance.iter().sum::<f64>() * f.area_m2()).collect();
         let all: f64 = flux.iter().sum();
         let mut emitters = Vec::new();
         let mut sum = 0.0;
@@ -104,7 +104,7 @@ impl<'a> Tracer<'a> {
             sum += w / all;
             emitters.push((sum, k));
         }
-        let areas = world.facets().iter().map(|f| f.area_m2());
+        let areas = world.polygons().iter().map(|f| f.area_m2());
         let density = flux.iter().zip(areas).map(|(w, a)| if *w > 0.0 { w / all / a } else { 0.0 });
         Tracer { world, density: density.collect(), emitters }
     }
@@ -123,7 +123,7 @@ impl<'a> Tracer<'a> {
             let (way, lamp, place) =
                 (cell(k), cell((k + shifts[0]) % BATCH), cell((k * 29 + shifts[1]) % BATCH));
             let at = site.origin + site.u * place[0] + site.v * place[1] + lift;
-            let start = Vertex { at, normal: site.normal, facet: None };
+            let start = Vertex { at, normal: site.normal, polygon: None };
             let found = self.path(start, way, lamp, random);
             (0..3).for_each(|c| sum[c] += found[c] / f64::from(BATCH));
         }
@@ -138,26 +138,26 @@ impl<'a> Tracer<'a> {
         for depth in 0_u32.. {
             self.add_lamp(&here, lamp, &share, &mut sum);
             let (d, cosine) = around(here.normal, way);
-            let Some(hit) = self.world.first_hit(here.at, d, here.facet) else { return sum };
+            let Some(hit) = self.world.first_hit(here.at, d, here.polygon) else { return sum };
             if !hit.front {
                 return sum;
             }
-            let facet = &self.world.facets()[hit.facet];
-            let normal = self.world.normal(hit.facet);
-            if self.density[hit.facet] > 0.0 {
-                let by_area = self.density[hit.facet] * hit.distance.powi(2) / -normal.dot(d);
+            let polygon = &self.world.polygons()[hit.polygon];
+            let normal = self.world.normal(hit.polygon);
+            if self.density[hit.polygon] > 0.0 {
+                let by_area = self.density[hit.polygon] * hit.distance.powi(2) / -normal.dot(d);
                 let by_cosine = cosine / PI;
                 let weight = by_cosine / (by_cosine + by_area);
-                (0..3).for_each(|c| sum[c] += share[c] * facet.exitance[c] * weight);
+                (0..3).for_each(|c| sum[c] += share[c] * polygon.exitance[c] * weight);
             }
-            (0..3).for_each(|c| share[c] *= facet.reflectance[c]);
+            (0..3).for_each(|c| share[c] *= polygon.reflectance[c]);
             let most = share.iter().fold(0.0_f64, |m, s| m.max(*s));
             let survives = if depth < 3 && most > 0.0 { 1.0 } else { most.min(0.95) };
             if random.unit() >= survives {
                 return sum;
             }
             share = share.map(|s| s / survives);
-            here = Vertex { at: here.at + d * hit.distance, normal, facet: Some(hit.facet) };
+            here = Vertex { at: here.at + d * hit.distance, normal, polygon: Some(hit.polygon) };
             way = [random.unit(), random.unit()];
             lamp = [random.unit(), random.unit()];
         }
@@ -166,18 +166,18 @@ impl<'a> Tracer<'a> {
 
     /// Adds what a sampled point of an emitter sends to a vertex.
     fn add_lamp(&self, here: &Vertex, lamp: [f64; 2], share: &[f64; 3], sum: &mut [f64; 3]) {
-        let Some((facet, point)) = self.on_emitter(lamp) else { return };
+        let Some((polygon, point)) = self.on_emitter(lamp) else { return };
         let way = point - here.at;
         let square = way.length_squared();
         let d = way / square.sqrt();
-        let (receives, sends) = (here.normal.dot(d), -self.world.normal(facet).dot(d));
-        if receives <= 0.0 || sends <= 0.0 || here.facet == Some(facet) {
+        let (receives, sends) = (here.normal.dot(d), -self.world.normal(polygon).dot(d));
+        if receives <= 0.0 || sends <= 0.0 || here.polygon == Some(polygon) {
             return;
         }
-        let by_area = self.density[facet] * square / sends;
+        let by_area = self.density[polygon] * square / sends;
         let arrives = receives / PI / (by_area + receives / PI);
-        if self.world.clear(here.at, point, [here.facet, Some(facet)]) {
-            let exitance = &self.world.facets()[facet].exitance;
+        if self.world.clear(here.at, point, [here.polygon, Some(polygon)]) {
+            let exitance = &self.world.polygons()[polygon].exitance;
             (0..3).for_each(|c| sum[c] += share[c] * exitance[c] * arrives);
         }
     }
@@ -187,9 +187,9 @@ impl<'a> Tracer<'a> {
         let k =
             self.emitters.partition_point(|e| e.0 <= s).min(self.emitters.len().checked_sub(1)?);
         let before = if k == 0 { 0.0 } else { self.emitters[k - 1].0 };
-        let (sum, facet) = self.emitters[k];
+        let (sum, polygon) = self.emitters[k];
         s = ((s - before) / (sum - before)).clamp(0.0, 1.0);
-        Some((facet, on_polygon(&self.world.facets()[facet].corners, s, t)))
+        Some((polygon, on_polygon(&self.world.polygons()[polygon].corners, s, t)))
     }
 }
 
@@ -225,23 +225,23 @@ fn on_polygon(corners: &[DVec3], s: f64, t: f64) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Facet;
+    use crate::Polygon;
 
     fn v(x: f64, y: f64, z: f64) -> DVec3 {
         DVec3::new(x, y, z)
     }
 
     /// The sides of a box, seen from inside.
-    fn room(reflectance: f64, exitance: f64) -> Vec<Facet> {
+    fn room(reflectance: f64, exitance: f64) -> Vec<Polygon> {
         let corner = |bits: usize| v((bits & 1) as f64, (bits >> 1 & 1) as f64, (bits >> 2) as f64);
         let sides =
             [[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]];
-        let facet = |s: [usize; 4]| Facet {
+        let polygon = |s: [usize; 4]| Polygon {
             reflectance: [reflectance; 3],
             exitance: [exitance, 2.0 * exitance, 0.0],
-            ..Facet::black(s.map(corner).to_vec())
+            ..Polygon::black(s.map(corner).to_vec())
         };
-        sides.map(facet).to_vec()
+        sides.map(polygon).to_vec()
     }
 
     #[test]
@@ -264,9 +264,9 @@ mod tests {
     fn direct_light_of_a_lamp_behind_a_plate_agrees_with_the_cut_polygon() {
         let lamp = [v(0.2, 0.2, 1.0), v(0.2, 0.9, 1.0), v(0.9, 0.9, 1.0), v(0.9, 0.2, 1.0)];
         let plate = [v(0.1, 0.1, 0.5), v(0.6, 0.1, 0.5), v(0.5, 0.5, 0.5)];
-        let mut facets = vec![Facet::black(lamp.to_vec()), Facet::black(plate.to_vec())];
-        facets[0].exitance = [3.0; 3];
-        let world = World::new(facets);
+        let mut polygons = vec![Polygon::black(lamp.to_vec()), Polygon::black(plate.to_vec())];
+        polygons[0].exitance = [3.0; 3];
+        let world = World::new(polygons);
         let point = v(0.3, 0.4, 0.0);
         let e = irradiance(&world, &[Site::point(point, DVec3::Z)], 400, 2)[0];
         let f = crate::seen::form_factor_from_point(point, DVec3::Z, &lamp, &[&plate]);

@@ -8,21 +8,21 @@ pub type Quad = [DVec3; 4];
 /// A diffuse convex polygon in the world: reflects and emits on its front, black on its back, blocks
 /// on both sides.
 #[derive(Clone, Debug)]
-pub struct Facet {
+pub struct Polygon {
     /// Corners, counter-clockwise seen from the front, m.
     pub corners: Vec<DVec3>,
     /// Diffuse reflectance, linear RGB.
     pub reflectance: [f64; 3],
     /// Exitance, W/m2, linear RGB.
     pub exitance: [f64; 3],
-    /// The facet that is the back of the same polygon, if that reflects too.
+    /// The index of its own back, if that reflects too.
     pub twin: Option<usize>,
 }
 
-impl Facet {
+impl Polygon {
     /// A black one-sided polygon that does not emit.
-    pub fn black(corners: Vec<DVec3>) -> Facet {
-        Facet { corners, reflectance: [0.0; 3], exitance: [0.0; 3], twin: None }
+    pub fn black(corners: Vec<DVec3>) -> Polygon {
+        Polygon { corners, reflectance: [0.0; 3], exitance: [0.0; 3], twin: None }
     }
 
     /// Unit normal of the front.

@@ -1,12 +1,12 @@
-//! Rays against the facets of a scene: a bounding-volume hierarchy over parallelograms and triangles.
+//! Rays against the polygons of a scene: a bounding-volume hierarchy over parallelograms and triangles.
 
 use glam::DVec3;
 
-use crate::polygon::Facet;
+use crate::polygon::Polygon;
 
-/// Facets with a hierarchy for rays. Immutable.
+/// Polygons with a hierarchy for rays. Immutable.
 pub struct World {
-    facets: Vec<Facet>,
+    polygons: Vec<Polygon>,
     normals: Vec<DVec3>,
     shapes: Vec<Shape>,
     nodes: Vec<Node>,
@@ -18,8 +18,8 @@ pub struct World {
 pub struct Hit {
     /// Distance in lengths of the ray's direction.
     pub distance: f64,
-    /// The facet.
-    pub facet: usize,
+    /// The polygon.
+    pub polygon: usize,
     /// Whether the ray comes from its front.
     pub front: bool,
 }
@@ -31,7 +31,7 @@ struct Shape {
     u: DVec3,
     v: DVec3,
     triangle: bool,
-    facet: u32,
+    polygon: u32,
 }
 
 #[derive(Clone, Copy)]
@@ -68,28 +68,31 @@ impl Shape {
 }
 
 impl World {
-    /// Sets the facets up for rays.
-    pub fn new(facets: Vec<Facet>) -> World {
-        let mut shapes: Vec<Shape> =
-            facets.iter().enumerate().flat_map(|(k, f)| shapes_of(&f.corners, k as u32)).collect();
+    /// Sets the polygons up for rays.
+    pub fn new(polygons: Vec<Polygon>) -> World {
+        let mut shapes: Vec<Shape> = polygons
+            .iter()
+            .enumerate()
+            .flat_map(|(k, f)| shapes_of(&f.corners, k as u32))
+            .collect();
         let mut nodes = Vec::new();
         if !shapes.is_empty() {
             let count = shapes.len();
             build(&mut shapes, 0..count, &mut nodes);
         }
         let size_m = nodes.first().map_or(0.0, |n: &Node| (n.max - n.min).length());
-        let normals = facets.iter().map(Facet::normal).collect();
-        World { facets, normals, shapes, nodes, size_m }
+        let normals = polygons.iter().map(Polygon::normal).collect();
+        World { polygons, normals, shapes, nodes, size_m }
     }
 
-    /// The facets, in the order given.
-    pub fn facets(&self) -> &[Facet] {
-        &self.facets
+    /// The polygons, in the order given.
+    pub fn polygons(&self) -> &[Polygon] {
+        &self.polygons
     }
 
-    /// Unit normal of a facet's front.
-    pub fn normal(&self, facet: usize) -> DVec3 {
-        self.normals[facet]
+    /// Unit normal of a polygon's front.
+    pub fn normal(&self, polygon: usize) -> DVec3 {
+        self.normals[polygon]
     }
 
     /// Diagonal of the box around everything, m.
@@ -97,32 +100,32 @@ impl World {
         self.size_m
     }
 
-    /// The nearest facet that a ray meets, `except` (where it starts) and its twin aside. Of the two
+    /// The nearest polygon that a ray meets, `except` (where it starts) and its twin aside. Of the two
     /// sides of one polygon, the one that faces the ray.
     pub fn first_hit(&self, origin: DVec3, d: DVec3, except: Option<usize>) -> Option<Hit> {
         let mut best = (f64::INFINITY, u32::MAX);
-        self.walk(origin, d, except, f64::INFINITY, |distance, facet| {
-            best = (distance, facet);
+        self.walk(origin, d, except, f64::INFINITY, |distance, polygon| {
+            best = (distance, polygon);
             Some(distance)
         });
         if best.1 == u32::MAX {
             return None;
         }
-        let facet = best.1 as usize;
-        let front = self.normals[facet].dot(d) < 0.0;
-        match self.facets[facet].twin {
-            Some(twin) if !front => Some(Hit { distance: best.0, facet: twin, front: true }),
-            _ => Some(Hit { distance: best.0, facet, front }),
+        let polygon = best.1 as usize;
+        let front = self.normals[polygon].dot(d) < 0.0;
+        match self.polygons[polygon].twin {
+            Some(twin) if !front => Some(Hit { distance: best.0, polygon: twin, front: true }),
+            _ => Some(Hit { distance: best.0, polygon, front }),
         }
     }
 
-    /// Whether nothing lies between two points, the facets they lie on and their twins aside.
+    /// Whether nothing lies between two points, the polygons they lie on and their twins aside.
     pub fn clear(&self, p: DVec3, q: DVec3, except: [Option<usize>; 2]) -> bool {
         let other = except[1];
-        let twin = other.and_then(|k| self.facets[k].twin);
+        let twin = other.and_then(|k| self.polygons[k].twin);
         let mut clear = true;
-        self.walk(p, q - p, except[0], 1.0 - 1e-9, |_, facet| {
-            let own = [other, twin].contains(&Some(facet as usize));
+        self.walk(p, q - p, except[0], 1.0 - 1e-9, |_, polygon| {
+            let own = [other, twin].contains(&Some(polygon as usize));
             clear &= own;
             (!own).then_some(0.0)
         });
@@ -138,7 +141,7 @@ impl World {
         mut most: f64,
         mut met: impl FnMut(f64, u32) -> Option<f64>,
     ) {
-        let twin = except.and_then(|k| self.facets[k].twin);
+        let twin = except.and_then(|k| self.polygons[k].twin);
         let own = [except, twin].map(|k| k.map_or(u32::MAX, |k| k as u32));
         let least = 1e-12 * self.size_m;
         let inverse = d.recip();
@@ -152,13 +155,13 @@ impl World {
             if node.count > 0 {
                 let range = node.start as usize..(node.start + node.count) as usize;
                 for shape in &self.shapes[range] {
-                    if own.contains(&shape.facet) {
+                    if own.contains(&shape.polygon) {
                         continue;
                     }
                     if let Some(t) = shape.meets(origin, d)
                         && t > least
                         && t < most
-                        && let Some(nearer) = met(t, shape.facet)
+                        && let Some(nearer) = met(t, shape.polygon)
                     {
                         most = nearer;
                     }
@@ -200,15 +203,15 @@ impl Node {
 }
 
 /// A polygon as one parallelogram where it is one, else as triangles.
-fn shapes_of(corners: &[DVec3], facet: u32) -> Vec<Shape> {
+fn shapes_of(corners: &[DVec3], polygon: u32) -> Vec<Shape> {
     let origin = corners[0];
     if let &[a, b, c, d] = corners
         && (a + c - b - d).length() <= 1e-9 * (c - a).length()
     {
-        return vec![Shape { origin, u: b - a, v: d - a, triangle: false, facet }];
+        return vec![Shape { origin, u: b - a, v: d - a, triangle: false, polygon }];
     }
     let fan =
-        |c: &[DVec3]| Shape { origin, u: c[0] - origin, v: c[1] - origin, triangle: true, facet };
+        |c: &[DVec3]| Shape { origin, u: c[0] - origin, v: c[1] - origin, triangle: true, polygon };
     corners[1..].windows(2).map(fan).collect()
 }
 
@@ -290,8 +293,8 @@ mod tests {
     use super::*;
     use crate::Random;
 
-    fn some_facets(random: &mut Random) -> Vec<Facet> {
-        let facet = |k: u32| {
+    fn some_polygons(random: &mut Random) -> Vec<Polygon> {
+        let polygon = |k: u32| {
             let at = random.point(DVec3::ZERO, DVec3::ONE);
             let mut side = || random.point(DVec3::splat(-0.2), DVec3::splat(0.2));
             let (u, v) = (side(), side());
@@ -301,28 +304,28 @@ mod tests {
                 1 => corners[2] -= (u + v) * 0.2,
                 _ => {}
             }
-            Facet::black(corners)
+            Polygon::black(corners)
         };
-        (0..200).map(facet).collect()
+        (0..200).map(polygon).collect()
     }
 
     #[test]
     fn the_hierarchy_finds_what_a_look_at_every_shape_finds() {
         let mut random = Random(3);
-        let world = World::new(some_facets(&mut random));
+        let world = World::new(some_polygons(&mut random));
         let mut hits = 0;
         for _ in 0..2000 {
             let origin = random.point(DVec3::splat(-0.5), DVec3::splat(1.5));
             let d = random.rotation() * DVec3::X;
-            let each = world.shapes.iter().filter_map(|s| Some((s.meets(origin, d)?, s.facet)));
+            let each = world.shapes.iter().filter_map(|s| Some((s.meets(origin, d)?, s.polygon)));
             let nearest = each.filter(|h| h.0 > 0.0).min_by(|a, b| a.0.total_cmp(&b.0));
             let hit = world.first_hit(origin, d, None);
-            assert_eq!(hit.map(|h| (h.distance, h.facet as u32)), nearest);
+            assert_eq!(hit.map(|h| (h.distance, h.polygon as u32)), nearest);
             if let Some(h) = hit {
                 hits += 1;
                 let past = origin + d * (h.distance * 1.01);
                 assert!(!world.clear(origin, past, [None, None]));
-                assert!(world.clear(origin, past, [Some(h.facet), None]) || nearest.is_some());
+                assert!(world.clear(origin, past, [Some(h.polygon), None]) || nearest.is_some());
                 assert!(world.clear(origin, origin + d * (h.distance * 0.99), [None, None]));
             }
         }
@@ -334,15 +337,15 @@ mod tests {
         let v = DVec3::new;
         let up = vec![v(0., 0., 0.), v(1., 0., 0.), v(1., 1., 0.), v(0., 1., 0.)];
         let down: Vec<DVec3> = up.iter().rev().copied().collect();
-        let mut facets = vec![Facet::black(up), Facet::black(down)];
-        (facets[0].twin, facets[1].twin) = (Some(1), Some(0));
-        let world = World::new(facets);
-        for (z, facet) in [(1.0, 0), (-1.0, 1)] {
+        let mut polygons = vec![Polygon::black(up), Polygon::black(down)];
+        (polygons[0].twin, polygons[1].twin) = (Some(1), Some(0));
+        let world = World::new(polygons);
+        for (z, polygon) in [(1.0, 0), (-1.0, 1)] {
             let hit = world.first_hit(v(0.4, 0.3, z), v(0., 0., -z), None).unwrap();
-            assert_eq!((hit.facet, hit.front), (facet, true));
+            assert_eq!((hit.polygon, hit.front), (polygon, true));
             let start = v(0.4, 0.3, 0.0);
             assert_eq!(world.first_hit(start, DVec3::Z * z, Some(0)), None);
-            assert!(world.clear(start, v(0.4, 0.3, z), [Some(facet), None]));
+            assert!(world.clear(start, v(0.4, 0.3, z), [Some(polygon), None]));
         }
     }
 }

@@ -32,7 +32,7 @@ fn factors_between_patches_are_exact_to_a_thousandth_where_bodies_hide_each_othe
     let mut session = Session::new(Arc::clone(&scene), Options::default()).unwrap();
     session.step(0, 0.0).unwrap();
     let (tree, forest) = session.pairs();
-    let facets = judged::facets(&scene, 0.0);
+    let polygons = judged::polygons(&scene, 0.0);
     let mut factors = vec![0.0; (patches * patches) as usize];
     for link in tree.links() {
         let [a, b] = [link.a, link.b].map(|id| forest.patch(id).unwrap().0);
@@ -49,8 +49,9 @@ fn factors_between_patches_are_exact_to_a_thousandth_where_bodies_hide_each_othe
         worst_row = worst_row.max((row.iter().sum::<f64>() - 1.0).abs());
         for to in (0..patches).filter(|&to| to != from) {
             let others = (0..patches).filter(|k| ![from, to].contains(k));
-            let blockers: Vec<&[DVec3]> = others.map(|k| &facets[k as usize].corners[..]).collect();
-            let ends = [from, to].map(|k| &facets[k as usize].corners);
+            let blockers: Vec<&[DVec3]> =
+                others.map(|k| &polygons[k as usize].corners[..]).collect();
+            let ends = [from, to].map(|k| &polygons[k as usize].corners);
             let off = row[to as usize] - seen::form_factor(ends[0], ends[1], &blockers, 1e-5);
             worst = worst.max(off.abs());
         }

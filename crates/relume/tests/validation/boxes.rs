@@ -12,7 +12,7 @@ use relume::scene::{PatchId, Scene, SceneBuilder};
 use relume::session::{Options, Session};
 use relume::transport::Shaft;
 use relume_judge::path::{self, Estimate};
-use relume_judge::{Facet, Random, World, seen};
+use relume_judge::{Polygon, Random, World, seen};
 
 use crate::common::{self, at_tolerance, form_factor_oracle, judged, v};
 use crate::grid;
@@ -78,7 +78,7 @@ fn show(scene: &Arc<Scene>, name: &str, options: Options, reference: &[Estimate]
 #[test]
 fn a_room_of_64_boxes_keeps_its_mean_and_its_cells() {
     let scene = Arc::new(room_of_boxes());
-    let world = World::new(judged::facets(&scene, 0.0));
+    let world = World::new(judged::polygons(&scene, 0.0));
     let sites = grid::sites(&scene, 0.0, sides);
     let reference = path::irradiance(&world, &sites, 30, 1);
     let off = show(&scene, "64 boxes at 0.05", at_tolerance(0.05), &reference);
@@ -97,7 +97,7 @@ fn a_room_of_64_boxes_keeps_its_mean_and_its_cells() {
 #[ignore = "figures for docs/tolerance.md: minutes"]
 fn error_against_time_among_64_boxes() {
     let scene = Arc::new(room_of_boxes());
-    let world = World::new(judged::facets(&scene, 0.0));
+    let world = World::new(judged::polygons(&scene, 0.0));
     let sites = grid::sites(&scene, 0.0, sides);
     let reference = path::irradiance(&world, &sites, 1500, 1);
     println!("{} cells, standard error {:.2} %", sites.len(), 100.0 * grid::own_error(&reference));
@@ -142,14 +142,14 @@ struct Looked<'a> {
     scene: &'a Scene,
     session: &'a Session,
     view: &'a WorldView,
-    facets: &'a [Facet],
+    polygons: &'a [Polygon],
     /// Mean radiosity and irradiance of each patch, W/m2.
     means: Vec<[f64; 2]>,
 }
 
 impl Looked<'_> {
     fn is_lamp(&self, patch: PatchId) -> bool {
-        self.facets[patch.0 as usize].exitance[0] > 0.0
+        self.polygons[patch.0 as usize].exitance[0] > 0.0
     }
 
     /// A link's kind: from the lamp or not, and what is in its way; and what it does, V by the judge's
@@ -164,10 +164,11 @@ impl Looked<'_> {
         let blockers = shaft.blockers(&[Forest::ROOT.0]).len();
         let bin = BLOCKERS.iter().position(|&most| blockers <= most).expect("the last takes all");
         let corners = ends.map(|e| e.corners[..e.len].to_vec());
-        let areas = corners.each_ref().map(|c| Facet::black(c.clone()).area_m2());
+        let areas = corners.each_ref().map(|c| Polygon::black(c.clone()).area_m2());
         let small = usize::from(areas[1] < areas[0]);
-        let others = (0..self.facets.len()).filter(|k| patches.iter().all(|p| p.0 as usize != *k));
-        let between: Vec<&[DVec3]> = others.map(|k| &self.facets[k].corners[..]).collect();
+        let others =
+            (0..self.polygons.len()).filter(|k| patches.iter().all(|p| p.0 as usize != *k));
+        let between: Vec<&[DVec3]> = others.map(|k| &self.polygons[k].corners[..]).collect();
         let x = f64::from(link.exchange_area_m2());
         let (from, to) = (&corners[small], &corners[1 - small]);
         let seen = areas[small] * seen::form_factor(from, to, &between, 2e-3 * x / areas[small]);
@@ -202,12 +203,12 @@ fn means(session: &Session) -> Vec<[f64; 2]> {
 #[ignore = "figures for docs/tolerance.md: a minute"]
 fn where_the_error_sits_among_64_boxes() {
     let scene = room_of_boxes();
-    let facets = judged::facets(&scene, 0.0);
+    let polygons = judged::polygons(&scene, 0.0);
     let (session, report) = common::solved(room_of_boxes(), at_tolerance(0.05));
     let (tree, forest) = session.pairs();
     let view = WorldView::new(&scene, forest, 0.0);
-    let (scene, session, view, facets) = (&scene, &session, &view, &facets[..]);
-    let looked = Looked { scene, session, view, facets, means: means(session) };
+    let (scene, session, view, polygons) = (&scene, &session, &view, &polygons[..]);
+    let looked = Looked { scene, session, view, polygons, means: means(session) };
     // A sample: one in ten of the lamp's links, one in forty of the others.
     let lamp =
         |l: &Link| [l.a, l.b].iter().any(|&id| looked.is_lamp(forest.patch(id).expect("a patch")));

@@ -21,7 +21,7 @@ struct Reflector {
 impl Reflector {
     /// Irradiance of the reflector where the light is 1 W/m2 across its way.
     fn irradiance(&self) -> f64 {
-        -relume_judge::Facet::black(self.corners.clone()).normal().dot(self.light)
+        -relume_judge::Polygon::black(self.corners.clone()).normal().dot(self.light)
     }
 
     fn scene(&self, reflectance: f64, add: &dyn Fn(&mut SceneBuilder, MaterialId)) -> Scene {

@@ -27,7 +27,7 @@ struct Case {
 impl Case {
     /// Path-traced references: `batches` for the cells, and 16 times as many for 16 points.
     fn new(name: &'static str, scene: Scene, sides: grid::Sides, batches: u32) -> Case {
-        let world = World::new(judged::facets(&scene, 0.0));
+        let world = World::new(judged::polygons(&scene, 0.0));
         let sites = grid::sites(&scene, 0.0, sides);
         let mut random = Random(5);
         let point = |_| {

@@ -8,32 +8,32 @@ use relume::scene::PatchId;
 use relume::session::{Session, Snapshot};
 use relume_judge::dense::{Element, exchange_areas, radiosities};
 use relume_judge::path::{self, Estimate, Site};
-use relume_judge::{Facet, World};
+use relume_judge::{Polygon, World};
 
 use crate::common::{self, at_tolerance, judged, leaf_area, rms};
 
 /// The leaves of a solution as elements of the judge's, with their radiosities and patches.
 fn leaves(snapshot: &Snapshot) -> (Vec<Element>, Vec<[f32; 3]>) {
     let (mut elements, mut radiosities) = (Vec::new(), Vec::new());
-    for facet in 0..snapshot.scene.patches.len() {
-        let patch = PatchId(facet as u32);
+    for polygon in 0..snapshot.scene.patches.len() {
+        let patch = PatchId(polygon as u32);
         for leaf in snapshot.leaves_of(patch) {
             assert!(leaf_area(leaf) > 0.0);
             let place = |&p: &glam::DVec2| common::world_point(snapshot, patch, p);
             let mut corners: Vec<DVec3> = leaf.corners.iter().map(place).collect();
             corners.dedup();
-            elements.push(Element { facet, corners });
+            elements.push(Element { polygon, corners });
             radiosities.push(leaf.radiosity);
         }
     }
     (elements, radiosities)
 }
 
-/// Area-weighted mean of a channel of some radiosities over each facet.
-fn means(facets: &[Facet], elements: &[Element], radiosity: impl Fn(usize) -> f64) -> Vec<f64> {
-    let mut sums = vec![(0.0, 0.0); facets.len()];
+/// Area-weighted mean of a channel of some radiosities over each polygon.
+fn means(polygons: &[Polygon], elements: &[Element], radiosity: impl Fn(usize) -> f64) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0); polygons.len()];
     for (k, e) in elements.iter().enumerate() {
-        let sum = &mut sums[e.facet];
+        let sum = &mut sums[e.polygon];
         *sum = (sum.0 + e.area_m2(), sum.1 + e.area_m2() * radiosity(k));
     }
     sums.into_iter().map(|(area, sum)| sum / area).collect()
@@ -47,12 +47,12 @@ fn dense_solve_on_the_same_leaves() {
     session.step(0, 0.0).unwrap();
     session.step(1, 0.6).unwrap();
     let (elements, found) = leaves(&session.snapshot());
-    let facets = judged::facets(&scene, 0.6);
-    let areas = exchange_areas(&facets, &elements, 1e-4);
-    let dense = radiosities(&facets, &elements, &areas);
+    let polygons = judged::polygons(&scene, 0.6);
+    let areas = exchange_areas(&polygons, &elements, 1e-4);
+    let dense = radiosities(&polygons, &elements, &areas);
     for c in 0..3 {
-        let wanted = means(&facets, &elements, |k| dense[k][c]);
-        let got = means(&facets, &elements, |k| f64::from(found[k][c]));
+        let wanted = means(&polygons, &elements, |k| dense[k][c]);
+        let got = means(&polygons, &elements, |k| f64::from(found[k][c]));
         let off: Vec<f64> = got.iter().zip(&wanted).map(|(g, w)| g / w - 1.0).collect();
         let worst = off.iter().fold(0.0_f64, |m, e| m.max(e.abs()));
         println!(
@@ -114,7 +114,7 @@ fn the_path_tracer_agrees_with_another_renderer() {
     let scene = common::shipped("box_room.glb");
     let published = rows("box_room.csv");
     for (k, frame) in [0_u32, 24].into_iter().enumerate() {
-        let world = World::new(judged::facets(&scene, f64::from(frame) / 24.0));
+        let world = World::new(judged::polygons(&scene, f64::from(frame) / 24.0));
         let sites = sensors(3);
         let places: Vec<Site> = sites.iter().map(|s| s.1).collect();
         let traced = path::irradiance(&world, &places, 60, 3 + u64::from(frame));
@@ -156,7 +156,7 @@ fn path_traced_at_other_poses() {
         let places: Vec<Site> = sensors(5).iter().map(|s| s.1).collect();
         let found: Vec<[f64; 3]> =
             places.iter().map(|s| session.irradiance_at(s.origin, s.normal)).collect();
-        let world = World::new(judged::facets(&scene, time));
+        let world = World::new(judged::polygons(&scene, time));
         let traced = path::irradiance(&world, &places, 400, u64::from(frame));
         let z = z_test(&found, traced.iter(), 0.002);
         let pure = z_test(&found, traced.iter(), 0.0);

@@ -45,7 +45,7 @@ impl Pair {
         let between: Vec<&[DVec3]> = self.between.iter().map(|p| &p[..]).collect();
         let (mut sum, mut whole) = (0.0, 0.0);
         for a in &self.floor {
-            let area = relume_judge::Facet::black(a.clone()).area_m2();
+            let area = relume_judge::Polygon::black(a.clone()).area_m2();
             whole += area;
             for b in &self.other {
                 sum += area * seen::form_factor(a, b, &between, error_max);

@@ -17,9 +17,9 @@ fn side_of(scene: &Scene, patch: usize, sides: Sides) -> usize {
 /// The cells of all patches at a time, row by row; rectangular patches only.
 pub(crate) fn sites(scene: &Scene, time_s: f64, sides: Sides) -> Vec<Site> {
     let mut out = Vec::new();
-    for (k, facet) in judged::facets(scene, time_s).iter().enumerate() {
+    for (k, polygon) in judged::polygons(scene, time_s).iter().enumerate() {
         let side = side_of(scene, k, sides);
-        let (o, c) = (facet.corners[0], &facet.corners);
+        let (o, c) = (polygon.corners[0], &polygon.corners);
         let (u, v) = ((c[1] - o) / side as f64, (c[3] - o) / side as f64);
         let at = |k: usize| o + u * (k % side) as f64 + v * (k / side) as f64;
         out.extend((0..side * side).map(|k| Site::mean(at(k), u, v)));

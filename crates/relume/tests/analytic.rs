@@ -8,11 +8,11 @@ mod common;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use common::exact::{self, parallelogram_to_polygon};
 use common::{Quad, Random, at_tolerance, facing_up, flipped, form_factor, plate_scene, solved, v};
 use glam::{DQuat, DVec3};
 use relume::scene::{Scene, SceneBuilder};
 use relume::session::{Options, Session};
+use relume_judge::exact::{self, parallelogram_to_polygon};
 
 const UNIT: [f64; 2] = [0.0, 1.0];
 

@@ -1,18 +1,15 @@
 //! Form factors between the patches of a room with two bodies, as sums over links, against exact
-//! ones: clipped closed forms from a fine grid of points. Occlusion decides here; a wrong list of
-//! possible occluders shows in no mean, but here.
+//! the judge's. Occlusion decides here; a wrong list of possible occluders shows in no mean, but here.
 
 mod common;
 
 use std::sync::Arc;
 
-use common::{sliding, turn, v};
+use common::{judged, sliding, turn, v};
 use glam::{DQuat, DVec3};
-use relume::element::{WorldView, bilinear};
-use relume::geometry::{ConvexPolygon, Plane};
-use relume::scene::{PatchId, Scene, SceneBuilder};
+use relume::scene::{Scene, SceneBuilder};
 use relume::session::{Options, Session};
-use relume::transport::visible_form_factor;
+use relume_judge::seen;
 
 /// A cubical room (patches 0 to 5) with two boxes of six patches each.
 fn room() -> Scene {
@@ -28,34 +25,6 @@ fn room() -> Scene {
     b.build().unwrap()
 }
 
-/// Points along each side of a patch.
-const GRID: u32 = 16;
-
-/// Form factor from a quadrilateral patch to another past all others.
-fn exact(view: &WorldView, from: PatchId, to: PatchId, patches: u32) -> f64 {
-    let (source, receiver) = (view.occluder(to), view.occluder(from));
-    let c: [DVec3; 4] = receiver.corners.try_into().unwrap();
-    let mut sum = 0.0;
-    for k in 0..GRID * GRID {
-        let at = |k: u32| (f64::from(k) + 0.5) / f64::from(GRID);
-        let point = bilinear(&c, at(k % GRID), at(k / GRID));
-        let tangent = Plane::through(point, receiver.plane.normal);
-        let seen = ConvexPolygon::new(source.corners).clipped(&tangent, 0.0);
-        if source.plane.distance(point) <= 0.0 || seen.corners().len() < 3 {
-            continue;
-        }
-        let between: Vec<ConvexPolygon> = (0..patches)
-            .map(PatchId)
-            .filter(|&p| p != from && p != to)
-            .map(|p| ConvexPolygon::new(view.occluder(p).corners))
-            .map(|o| o.clipped(&tangent, 0.0).clipped(&source.plane, 0.0))
-            .filter(|o| o.corners().len() >= 3)
-            .collect();
-        sum += visible_form_factor(point, receiver.plane.normal, &seen, &between);
-    }
-    sum / f64::from(GRID * GRID)
-}
-
 #[test]
 fn factors_between_patches_are_exact_to_a_thousandth_where_bodies_hide_each_other() {
     let scene = Arc::new(room());
@@ -63,7 +32,7 @@ fn factors_between_patches_are_exact_to_a_thousandth_where_bodies_hide_each_othe
     let mut session = Session::new(Arc::clone(&scene), Options::default()).unwrap();
     session.step(0, 0.0).unwrap();
     let (tree, forest) = session.pairs();
-    let view = WorldView::new(&scene, forest, 0.0);
+    let polygons = judged::polygons(&scene, 0.0);
     let mut factors = vec![0.0; (patches * patches) as usize];
     for link in tree.links() {
         let [a, b] = [link.a, link.b].map(|id| forest.patch(id).unwrap().0);
@@ -79,7 +48,11 @@ fn factors_between_patches_are_exact_to_a_thousandth_where_bodies_hide_each_othe
         let row = &factors[(from * patches) as usize..((from + 1) * patches) as usize];
         worst_row = worst_row.max((row.iter().sum::<f64>() - 1.0).abs());
         for to in (0..patches).filter(|&to| to != from) {
-            let off = row[to as usize] - exact(&view, PatchId(from), PatchId(to), patches);
+            let others = (0..patches).filter(|k| ![from, to].contains(k));
+            let blockers: Vec<&[DVec3]> =
+                others.map(|k| &polygons[k as usize].corners[..]).collect();
+            let ends = [from, to].map(|k| &polygons[k as usize].corners);
+            let off = row[to as usize] - seen::form_factor(ends[0], ends[1], &blockers, 1e-5);
             worst = worst.max(off.abs());
         }
     }

@@ -14,6 +14,9 @@ const ROOMS: [&str; 8] =
 const CRATES: [(&str, &str); 3] =
     [("relume", "relume"), ("relume-picture", "relume_picture"), ("relume-cli", "relume_cli")];
 
+/// The crate of references: it uses none of those above, and only their tests may use it.
+const JUDGE: (&str, &str) = ("relume-judge", "relume_judge");
+
 /// Text without comments, with line breaks kept so that lines can be counted.
 fn without_comments(text: &str) -> String {
     text.lines()
@@ -151,6 +154,32 @@ fn each_crate_uses_only_crates_above_it() {
         }
     }
     assert!(wrong.is_empty(), "crates out of order:\n{}", wrong.join("\n"));
+}
+
+/// The entries of one table of a manifest.
+fn table(manifest: &str, name: &str) -> String {
+    let after = manifest.split_once(&format!("[{name}]\n")).map_or("", |(_, rest)| rest);
+    after.split("\n[").next().unwrap_or("").to_owned()
+}
+
+#[test]
+fn the_judge_is_independent_and_for_tests_only() {
+    let read = |dir: &str| fs::read_to_string(crates_dir().join(dir).join("Cargo.toml")).unwrap();
+    let code = |dir: &str| -> Vec<(PathBuf, String)> {
+        let files = sources(&crates_dir().join(dir).join("src"));
+        files.into_iter().map(|f| (f.clone(), fs::read_to_string(f).unwrap())).collect()
+    };
+    let manifest = read(JUDGE.0);
+    assert!(manifest.contains("publish = false"));
+    assert!(!table(&manifest, "dependencies").contains("relume"), "the judge uses the engine");
+    assert!(!manifest.contains("dev-dependencies"), "the judge needs no help in its own tests");
+    for (dir, _) in CRATES {
+        assert!(!table(&read(dir), "dependencies").contains(JUDGE.0), "{dir} uses the judge");
+        for (file, text) in code(dir) {
+            assert!(!without_comments(&text).contains(JUDGE.1), "{} uses it", file.display());
+        }
+    }
+    assert!(table(&read("relume"), "dev-dependencies").contains(JUDGE.0));
 }
 
 #[test]

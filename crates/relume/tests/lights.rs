@@ -9,11 +9,11 @@ mod common;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use common::exact::quad_sr;
 use common::{Quad, area_of, at_tolerance, facing_up, leaf_area, patches_of, rms, solved, v};
 use glam::{DQuat, DVec3};
 use relume::scene::{LightKind, Scene, SceneBuilder};
 use relume::session::{Options, Session};
+use relume_judge::exact::quad_sr;
 
 /// Intensities, W/sr or W/m2.
 const I: [f64; 3] = [4.0, 2.0, 1.0];

@@ -38,6 +38,12 @@ impl Cells {
         cells
     }
 
+    /// Means of the cells of one patch, row by row, W/m2.
+    pub(crate) fn of_patch(&self, id: PatchId) -> &[f64] {
+        let each = self.side * self.side;
+        &self.irradiance[id.0 as usize * each..][..each]
+    }
+
     fn add_patch(&mut self, snapshot: &Snapshot, id: PatchId) {
         let (side, first) = (self.side, self.irradiance.len());
         self.irradiance.resize(first + side * side, 0.0);

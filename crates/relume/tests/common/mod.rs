@@ -7,7 +7,7 @@
 #![allow(clippy::disallowed_methods)]
 
 pub(crate) mod audit;
-pub(crate) mod exact;
+pub(crate) mod judged;
 pub(crate) mod pairs;
 
 use std::path::{Path, PathBuf};
@@ -19,9 +19,8 @@ use relume::scene::{
     Track, import,
 };
 use relume::session::{FrameReport, Leaf, Options, Oracle, Session, Snapshot};
-
-/// A quadrilateral, counter-clockwise seen from its front.
-pub(crate) type Quad = [DVec3; 4];
+#[allow(unused_imports)] // each test uses its part
+pub(crate) use relume_judge::{Quad, Random, exact};
 
 /// Short for [`DVec3::new`].
 pub(crate) fn v(x: f64, y: f64, z: f64) -> DVec3 {
@@ -236,33 +235,4 @@ pub(crate) fn data(name: &str) -> PathBuf {
 /// A scene of `tests/data`.
 pub(crate) fn shipped(name: &str) -> Scene {
     import(&data(name), &ImportOptions::default()).unwrap()
-}
-
-/// The same random numbers on every machine: SplitMix64 (Steele, Lea, Flood 2014).
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    /// In [0, 1).
-    pub(crate) fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// In [lo, hi).
-    pub(crate) fn between(&mut self, lo: f64, hi: f64) -> f64 {
-        lo + (hi - lo) * self.unit()
-    }
-
-    /// Uniform in a box.
-    pub(crate) fn point(&mut self, lo: DVec3, hi: DVec3) -> DVec3 {
-        lo + (hi - lo) * v(self.unit(), self.unit(), self.unit())
-    }
-
-    /// A rotation; near enough to uniform.
-    pub(crate) fn rotation(&mut self) -> DQuat {
-        let axis = self.point(DVec3::splat(-1.0), DVec3::ONE) + v(1e-3, 0.0, 0.0);
-        DQuat::from_axis_angle(axis.normalize(), self.between(0.0, std::f64::consts::TAU))
-    }
 }

@@ -1,0 +1,291 @@
+//! Path-traced irradiance with its standard error: every bounce, no bias.
+//!
+//! At each vertex of a path one emitter is sampled by area and one direction by its cosine; what both
+//! can find is weighted by the balance heuristic (Veach 1997). Paths end by Russian roulette.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::polygon::area_vector;
+use crate::{Random, World};
+
+/// Where irradiance is wanted: at a point, or in the mean over a parallelogram.
+#[derive(Clone, Copy, Debug)]
+pub struct Site {
+    /// The point, or a corner of the parallelogram, m.
+    pub origin: DVec3,
+    /// Unit normal of the side that receives.
+    pub normal: DVec3,
+    /// First side of the parallelogram; zero for a point.
+    pub u: DVec3,
+    /// Second side of the parallelogram; zero for a point.
+    pub v: DVec3,
+}
+
+impl Site {
+    /// A point, on a surface or off any.
+    pub fn point(origin: DVec3, normal: DVec3) -> Site {
+        Site { origin, normal, u: DVec3::ZERO, v: DVec3::ZERO }
+    }
+
+    /// The mean over a parallelogram that faces `u x v`.
+    pub fn mean(origin: DVec3, u: DVec3, v: DVec3) -> Site {
+        Site { origin, normal: u.cross(v).normalize(), u, v }
+    }
+}
+
+/// Irradiance with its standard error, W/m2, linear RGB.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Estimate {
+    /// Mean over the samples.
+    pub irradiance: [f64; 3],
+    /// Standard error of that mean, from the spread between batches.
+    pub standard_error: [f64; 3],
+}
+
+/// Paths in a batch: stratified 8 x 8 in the first direction, in the first point on an emitter, and
+/// over the site.
+pub const BATCH: u32 = 64;
+
+/// Points start this far off their surface, in sizes of the scene: given in six decimals, they may lie
+/// a little behind it.
+const LIFT: f64 = 1e-6;
+
+/// Irradiance at each site from `batches` (two or more) batches of 64 paths; the same bits on any number
+/// of threads.
+pub fn irradiance(world: &World, sites: &[Site], batches: u32, seed: u64) -> Vec<Estimate> {
+    let tracer = Tracer::new(world);
+    let at = |(k, site): (usize, &Site)| {
+        let mut random = Random::of_part(seed, k as u64);
+        let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
+        for _ in 0..batches {
+            let mean = tracer.batch(site, &mut random);
+            for c in 0..3 {
+                sum[c] += mean[c];
+                squares[c] += mean[c] * mean[c];
+            }
+        }
+        let n = f64::from(batches);
+        let spread = |c: usize| (squares[c] / n - (sum[c] / n).powi(2)).max(0.0) / (n - 1.0);
+        Estimate {
+            irradiance: sum.map(|s| s / n),
+            standard_error: [0, 1, 2].map(|c| spread(c).sqrt()),
+        }
+    };
+    sites.par_iter().enumerate().map(at).collect()
+}
+
+struct Tracer<'a> {
+    world: &'a World,
+    /// Polygons that emit, with the running sum of their shares of the flux.
+    emitters: Vec<(f64, usize)>,
+    /// Density of sampled points on each polygon, 1/m2; 0 for those that do not emit.
+    density: Vec<f64>,
+}
+
+/// A place a path passes, or starts from.
+#[derive(Clone, Copy)]
+struct Vertex {
+    at: DVec3,
+    normal: DVec3,
+    polygon: Option<usize>,
+}
+
+impl<'a> Tracer<'a> {
+    fn new(world: &'a World) -> Tracer<'a> {
+        let flux: Vec<f64> =
+            world.polygons().iter().map(|f| f.exitance.iter().sum::<f64>() * f.area_m2()).collect();
+        let all: f64 = flux.iter().sum();
+        let mut emitters = Vec::new();
+        let mut sum = 0.0;
+        for (k, &w) in flux.iter().enumerate().filter(|f| *f.1 > 0.0) {
+            sum += w / all;
+            emitters.push((sum, k));
+        }
+        let areas = world.polygons().iter().map(|f| f.area_m2());
+        let density = flux.iter().zip(areas).map(|(w, a)| if *w > 0.0 { w / all / a } else { 0.0 });
+        Tracer { world, density: density.collect(), emitters }
+    }
+
+    /// Mean over a batch.
+    fn batch(&self, site: &Site, random: &mut Random) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        // Which cells of the three squares go together differs from batch to batch.
+        let shifts = [random.bits(), random.bits()].map(|b| b as u32 % BATCH);
+        let lift = site.normal * (LIFT * self.world.size_m());
+        for k in 0..BATCH {
+            let mut cell = |k: u32| {
+                [(k % 8, random.unit()), (k / 8, random.unit())]
+                    .map(|(cell, within)| (f64::from(cell) + within) / 8.0)
+            };
+            let (way, lamp, place) =
+                (cell(k), cell((k + shifts[0]) % BATCH), cell((k * 29 + shifts[1]) % BATCH));
+            let at = site.origin + site.u * place[0] + site.v * place[1] + lift;
+            let start = Vertex { at, normal: site.normal, polygon: None };
+            let found = self.path(start, way, lamp, random);
+            (0..3).for_each(|c| sum[c] += found[c] / f64::from(BATCH));
+        }
+        sum
+    }
+
+    /// Irradiance that one path finds.
+    fn path(&self, start: Vertex, way: [f64; 2], lamp: [f64; 2], random: &mut Random) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        let mut share = [1.0; 3];
+        let (mut here, mut way, mut lamp) = (start, way, lamp);
+        for depth in 0_u32.. {
+            self.add_lamp(&here, lamp, &share, &mut sum);
+            let (d, cosine) = around(here.normal, way);
+            let Some(hit) = self.world.first_hit(here.at, d, here.polygon) else { return sum };
+            if !hit.front {
+                return sum;
+            }
+            let polygon = &self.world.polygons()[hit.polygon];
+            let normal = self.world.normal(hit.polygon);
+            if self.density[hit.polygon] > 0.0 {
+                let by_area = self.density[hit.polygon] * hit.distance.powi(2) / -normal.dot(d);
+                let by_cosine = cosine / PI;
+                let weight = by_cosine / (by_cosine + by_area);
+                (0..3).for_each(|c| sum[c] += share[c] * polygon.exitance[c] * weight);
+            }
+            (0..3).for_each(|c| share[c] *= polygon.reflectance[c]);
+            let most = share.iter().fold(0.0_f64, |m, s| m.max(*s));
+            let survives = if depth < 3 && most > 0.0 { 1.0 } else { most.min(0.95) };
+            if random.unit() >= survives {
+                return sum;
+            }
+            share = share.map(|s| s / survives);
+            here = Vertex { at: here.at + d * hit.distance, normal, polygon: Some(hit.polygon) };
+            way = [random.unit(), random.unit()];
+            lamp = [random.unit(), random.unit()];
+        }
+        unreachable!("a path ends by roulette")
+    }
+
+    /// Adds what a sampled point of an emitter sends to a vertex.
+    fn add_lamp(&self, here: &Vertex, lamp: [f64; 2], share: &[f64; 3], sum: &mut [f64; 3]) {
+        let Some((polygon, point)) = self.on_emitter(lamp) else { return };
+        let way = point - here.at;
+        let square = way.length_squared();
+        let d = way / square.sqrt();
+        let (receives, sends) = (here.normal.dot(d), -self.world.normal(polygon).dot(d));
+        if receives <= 0.0 || sends <= 0.0 || here.polygon == Some(polygon) {
+            return;
+        }
+        let by_area = self.density[polygon] * square / sends;
+        let arrives = receives / PI / (by_area + receives / PI);
+        if self.world.clear(here.at, point, [here.polygon, Some(polygon)]) {
+            let exitance = &self.world.polygons()[polygon].exitance;
+            (0..3).for_each(|c| sum[c] += share[c] * exitance[c] * arrives);
+        }
+    }
+
+    /// A point on an emitter from a point of the unit square.
+    fn on_emitter(&self, [mut s, t]: [f64; 2]) -> Option<(usize, DVec3)> {
+        let k =
+            self.emitters.partition_point(|e| e.0 <= s).min(self.emitters.len().checked_sub(1)?);
+        let before = if k == 0 { 0.0 } else { self.emitters[k - 1].0 };
+        let (sum, polygon) = self.emitters[k];
+        s = ((s - before) / (sum - before)).clamp(0.0, 1.0);
+        Some((polygon, on_polygon(&self.world.polygons()[polygon].corners, s, t)))
+    }
+}
+
+/// A direction with a cosine distribution about a normal, and its cosine.
+fn around(normal: DVec3, [s, t]: [f64; 2]) -> (DVec3, f64) {
+    let (u, v) = normal.any_orthonormal_pair();
+    let (r, up) = (s.sqrt(), (1.0 - s).sqrt());
+    let (sine, cosine) = (2.0 * PI * t).sin_cos();
+    (u * (r * cosine) + v * (r * sine) + normal * up, up)
+}
+
+/// Uniform on a convex polygon, from a point of the unit square.
+fn on_polygon(corners: &[DVec3], s: f64, t: f64) -> DVec3 {
+    if let &[a, b, c, d] = corners
+        && (a + c - b - d).length_squared() <= 1e-18 * (c - a).length_squared()
+    {
+        return a + (b - a) * s + (d - a) * t;
+    }
+    let whole = area_vector(corners).length();
+    let mut left = s * whole;
+    for k in 1..corners.len() - 1 {
+        let triangle = [corners[0], corners[k], corners[k + 1]];
+        let area = area_vector(&triangle).length();
+        if left <= area || k == corners.len() - 2 {
+            let root = (left / area).min(1.0).sqrt();
+            return triangle[0].lerp(triangle[1].lerp(triangle[2], t), root);
+        }
+        left -= area;
+    }
+    corners[0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Polygon;
+
+    fn v(x: f64, y: f64, z: f64) -> DVec3 {
+        DVec3::new(x, y, z)
+    }
+
+    /// The sides of a box, seen from inside.
+    fn room(reflectance: f64, exitance: f64) -> Vec<Polygon> {
+        let corner = |bits: usize| v((bits & 1) as f64, (bits >> 1 & 1) as f64, (bits >> 2) as f64);
+        let sides =
+            [[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]];
+        let polygon = |s: [usize; 4]| Polygon {
+            reflectance: [reflectance; 3],
+            exitance: [exitance, 2.0 * exitance, 0.0],
+            ..Polygon::black(s.map(corner).to_vec())
+        };
+        sides.map(polygon).to_vec()
+    }
+
+    #[test]
+    fn the_furnace_is_exact_without_noise_from_lamps_alone() {
+        let world = World::new(room(0.5, 1.0));
+        let sites = [
+            Site::point(v(0.0, 0.3, 0.6), DVec3::X),
+            Site::mean(v(0.2, 0.1, 0.0), v(0.3, 0.0, 0.0), v(0.0, 0.5, 0.0)),
+            Site::point(v(0.5, 0.5, 0.5), v(1.0, 2.0, 3.0).normalize()),
+        ];
+        for e in irradiance(&world, &sites, 200, 1) {
+            for (c, exact) in [2.0, 4.0, 0.0].into_iter().enumerate() {
+                let off = (e.irradiance[c] - exact).abs();
+                assert!(off <= 4.0 * e.standard_error[c] && off < 0.02, "{e:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn direct_light_of_a_lamp_behind_a_plate_agrees_with_the_cut_polygon() {
+        let lamp = [v(0.2, 0.2, 1.0), v(0.2, 0.9, 1.0), v(0.9, 0.9, 1.0), v(0.9, 0.2, 1.0)];
+        let plate = [v(0.1, 0.1, 0.5), v(0.6, 0.1, 0.5), v(0.5, 0.5, 0.5)];
+        let mut polygons = vec![Polygon::black(lamp.to_vec()), Polygon::black(plate.to_vec())];
+        polygons[0].exitance = [3.0; 3];
+        let world = World::new(polygons);
+        let point = v(0.3, 0.4, 0.0);
+        let e = irradiance(&world, &[Site::point(point, DVec3::Z)], 400, 2)[0];
+        let f = crate::seen::form_factor_from_point(point, DVec3::Z, &lamp, &[&plate]);
+        let free = crate::seen::form_factor_from_point(point, DVec3::Z, &lamp, &[]);
+        assert!(f < 0.9 * free && f > 0.1 * free, "{f} {free}");
+        let off = e.irradiance[0] - 3.0 * f;
+        assert!(off.abs() < 4.0 * e.standard_error[0] && off.abs() < 5e-3, "{e:?} {f}");
+    }
+
+    #[test]
+    fn the_same_bits_on_any_number_of_threads() {
+        let world = World::new(room(0.8, 0.5));
+        let sites: Vec<Site> =
+            (0..20).map(|k| Site::point(v(0.0, 0.5, f64::from(k) / 20.0), DVec3::X)).collect();
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let found = pool.install(|| irradiance(&world, &sites, 4, 9));
+            found.iter().map(|e| e.irradiance.map(f64::to_bits)).collect::<Vec<_>>()
+        };
+        assert_eq!(on(1), on(3));
+    }
+}

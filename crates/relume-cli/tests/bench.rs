@@ -12,7 +12,7 @@ fn bench_prints_the_tables() {
     let more = ["bench", "--demo", "room", "--frames", "0-4", "--size", "64x48", "--every", "2"];
     let ran = relume(&[&more[..], &COARSE[..]].concat());
     ran.says(&[
-        "room: tolerance 0.3, oracle error, update reinspect, 2 threads\n",
+        "room: tolerance 0.3, oracle error, update certificate, 2 threads\n",
         "solve frame 1   ratio\n",
         "\nroom                     4  ",
         "\nroom with pictures       4  ",
@@ -39,7 +39,7 @@ fn bench_writes_json() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("bench.json");
     let fixed = ["bench", "--demo", "room", "--frames", "0-2", "--no-pictures", "--quiet"];
-    for strategy in ["reinspect", "scratch"] {
+    for strategy in ["certificate", "reinspect", "scratch"] {
         let more = ["--json", text(&path), "--update", strategy];
         let ran = relume(&[&fixed[..], &COARSE[..], &more[..]].concat());
         ran.says(&[]);
@@ -58,6 +58,39 @@ fn bench_writes_json() {
         }
         assert!(value["memory_each"]["pair_bytes"].as_f64().unwrap() > 0.0);
     }
+}
+
+#[test]
+fn bench_compares_the_strategies() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("strategies.json");
+    let more = ["bench", "--demo", "room", "--frames", "0-4", "--compare", "--json", text(&path)];
+    let ran = relume(&[&more[..], &COARSE[..]].concat());
+    ran.says(&[
+        "room: tolerance 0.3, oracle error, 2 threads, 4 frames after the first",
+        "\nscratch  ",
+        "\nreinspect  ",
+        "\ncertificate  ",
+        "\nextrapolate=7  ",
+        "\nextrapolate --error 0.05  ",
+        "fewer segments",
+    ]);
+    let value = json(&path);
+    assert_eq!(value["schema"], "relume-strategies/1");
+    let means = |k: usize| value["strategies"][k]["means"].clone();
+    for exact in 0..3 {
+        let row = means(exact);
+        assert_eq!(row["equal_frames"], 4, "{row}");
+        assert_eq!(
+            (row["missed_states"].as_f64(), row["missed_occlusions"].as_f64()),
+            (Some(0.0), Some(0.0))
+        );
+        assert!(row["rms_error"].as_f64() < Some(0.01), "{row}");
+    }
+    // What certificates spare is looked at by nobody else.
+    assert!(means(2)["examined"].as_f64() < means(1)["examined"].as_f64());
+    assert!(means(3)["rms_error"].as_f64() > Some(0.0), "extrapolation loses something");
+    relume(&["bench", "--demo", "room", "--compare", "--every", "2"]).fails(2, &["--every"]);
 }
 
 #[test]

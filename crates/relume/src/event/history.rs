@@ -95,6 +95,10 @@ impl History {
         if self.count == 0 {
             return History::begun(sample, ahead);
         }
+        if self.at_s[1] >= ahead.now_s as f32 {
+            // It was evaluated at this time already.
+            return *self;
+        }
         let mut out = History {
             samples: [self.samples[1], sample],
             at_s: [self.at_s[1], ahead.now_s as f32],

@@ -21,21 +21,35 @@ impl Ticks {
     /// Goes on from one time to another. Whether all certificates are void: time went back, jumped or
     /// begins only now, and the numbers start anew.
     pub fn go(&mut self, from_s: f64, to_s: f64) -> bool {
+        match self.tick_at(from_s, to_s) {
+            Some(now) => {
+                self.now = now;
+                false
+            }
+            None => {
+                // Ticks of length 0 lead nowhere: nothing is certified then.
+                let length_s = (to_s - from_s).max(0.0);
+                *self = Ticks { start_s: to_s - length_s, length_s, now: 1 };
+                true
+            }
+        }
+    }
+
+    /// Whether the clock goes on from one time to another, and predictions hold.
+    pub fn goes_on(&self, from_s: f64, to_s: f64) -> bool {
+        self.tick_at(from_s, to_s).is_some()
+    }
+
+    fn tick_at(&self, from_s: f64, to_s: f64) -> Option<Tick> {
         let step = to_s - from_s;
-        let odd = step > ODD * self.length_s || step * ODD < self.length_s;
+        if step <= 0.0 || step > ODD * self.length_s || step * ODD < self.length_s {
+            return None;
+        }
         let mut now = u32::from(self.now);
-        while !odd && self.at(now) < to_s {
+        while self.at(now) < to_s {
             now += 1;
         }
-        if odd || step <= 0.0 || now > u32::from(Tick::MAX / 2) {
-            *self = Ticks { start_s: to_s, length_s: step.max(0.0), now: 0 };
-            // Ticks of length 0 lead nowhere: nothing is certified then.
-            self.start_s -= self.length_s;
-            self.now = 1;
-            return true;
-        }
-        self.now = now as Tick;
-        false
+        (now <= u32::from(Tick::MAX / 2)).then_some(now as Tick)
     }
 
     fn at(&self, tick: u32) -> f64 {

@@ -5,7 +5,9 @@
 
 use glam::DVec3;
 
-use crate::element::{ElementId, Forest, Kind, WorldElement, WorldPatch, WorldView};
+use crate::element::{
+    ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldPatch, WorldView,
+};
 use crate::event::{Foresight, Tick};
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
 use crate::scene::{BodyId, Drift, PatchId};
@@ -232,24 +234,42 @@ impl Outlook<'_> {
         let c = self.view.occluder(patch);
         let WorldPatch { body, twin, .. } = *self.view.patch(patch);
         let (turns_a, turns_b, turns_c) = moves.turning;
-        let at_end = |e: &WorldElement, end: (Option<BodyId>, Option<PatchId>), by, turns: bool| {
+        // Distances of an end from the blocker's plane at all times.
+        let span = |e: &WorldElement, by: &Aabb| {
+            let (lo, hi) = e.span(&c.plane);
+            let shift = along(&against(by, &moves.c), c.plane.normal);
+            (lo + shift.0, hi + shift.1)
+        };
+        let spans = (span(a, &moves.a), span(b, &moves.b));
+        let tilt = self.tilt_m(&c, half);
+        let at_end = |e: &WorldElement,
+                      end: (Option<BodyId>, Option<PatchId>),
+                      by,
+                      turns: bool,
+                      span| {
             let corners = c.corners.iter().map(|&p| e.plane.distance(p));
             let (lo, hi) = corners.fold(NO_SPAN, |(lo, hi), d| (f64::min(lo, d), f64::max(hi, d)));
             // What rides with the end keeps its distances.
             let rides = end.0 == Some(body);
-            let shift =
-                if rides { (0.0, 0.0) } else { along(&against(&moves.c, by), e.plane.normal) };
-            let known = rides || !(turns || turns_c);
-            let off = hi + shift.0 > OFF * half || lo + shift.1 < -OFF * half;
-            let faces = c.plane.normal.dot(e.plane.normal) < -0.5 + 1e-9;
+            let shift = match rides {
+                true => (0.0, 0.0),
+                false => along(&against(&moves.c, by), e.plane.normal),
+            };
+            // The end's plane does not turn against what bounds the blocker's corners.
+            let known = rides || !turns;
+            let (span_lo, span_hi): (f64, f64) = span;
+            let off = match known {
+                true => hi + shift.0 > OFF * half || lo + shift.1 < -OFF * half,
+                false => !turns_c && (span_lo > tilt || span_hi < -tilt),
+            };
+            let turned = !rides && (turns || turns_c);
+            let faces = turned || c.plane.normal.dot(e.plane.normal) < -0.5 + 1e-9;
             let other_side = twin.is_some() && twin == end.1;
-            AtEnd {
-                behind: known && hi + shift.1 <= half,
-                may_cover: !other_side && !(known && (off || !faces)),
-            }
+            AtEnd { behind: known && hi + shift.1 <= half, may_cover: !other_side && !off && faces }
         };
-        let at_a = at_end(a, (ends.bodies.0, ends.patches.0), &moves.a, turns_a);
-        let at_b = at_end(b, (ends.bodies.1, ends.patches.1), &moves.b, turns_b);
+        let (patch_a, patch_b) = ends.patches;
+        let at_a = at_end(a, (ends.bodies.0, patch_a), &moves.a, turns_a, spans.0);
+        let at_b = at_end(b, (ends.bodies.1, patch_b), &moves.b, turns_b, spans.1);
         if at_a.may_cover || at_b.may_cover {
             return true;
         }
@@ -257,16 +277,20 @@ impl Outlook<'_> {
             return false;
         }
         // Both ends on one side of the blocker's plane.
-        if turns_c {
-            return true;
-        }
-        let span = |e: &WorldElement, by: &Aabb| {
-            let (lo, hi) = e.span(&c.plane);
-            let shift = along(&against(by, &moves.c), c.plane.normal);
-            (lo + shift.0, hi + shift.1)
-        };
-        let ((a_lo, a_hi), (b_lo, b_hi)) = (span(a, &moves.a), span(b, &moves.b));
-        !(a_lo.min(b_lo) >= -half || a_hi.max(b_hi) <= half)
+        let ((a_lo, a_hi), (b_lo, b_hi)) = spans;
+        turns_c || !(a_lo.min(b_lo) >= -half || a_hi.max(b_hi) <= half)
+    }
+
+    /// How far from a blocker's plane what it covers can be, however it is turned.
+    ///
+    /// All of the blocker's corners within s of a plane tilt it by at most 2 s by its width, and a
+    /// convex polygon is no narrower than its area by its diameter.
+    fn tilt_m(&self, c: &OccluderPolygon<'_>, half: f64) -> f64 {
+        let first = c.corners[0];
+        let diameter = 2.0 * c.corners.iter().map(|p| p.distance(first)).fold(0.0, f64::max);
+        let fan = c.corners.windows(2).map(|e| (e[0] - first).cross(e[1] - first));
+        let area = 0.5 * fan.fold(DVec3::ZERO, |sum, n| sum + n).length();
+        OFF * half * (1.0 + 2.0 * self.view.far_m() * diameter / area.max(f64::MIN_POSITIVE))
     }
 
     /// Whether one end stays behind the other, as it is now.

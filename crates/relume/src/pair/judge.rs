@@ -9,8 +9,8 @@ use crate::event::{Foresight, Lookahead, Tick};
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
 use crate::scene::{BodyId, LightKind, PatchId};
 use crate::transport::{
-    Exchange, Meeting, SEGMENTS, SegmentBundle, Shaft, Simd, Visibility, exact_visibility,
-    exchange, light_at, light_exchange, light_visibility, meeting, visibility,
+    CLIPPED_MAX, Exchange, Meeting, SEGMENTS, SegmentBundle, Shaft, Simd, Visibility,
+    exact_visibility, exchange, light_at, light_exchange, light_visibility, meeting, visibility,
 };
 
 use super::brightness::Brightness;
@@ -102,11 +102,7 @@ impl Judge for Placed<'_> {
         is_link: bool,
         margin: Margin,
     ) -> Option<Margin> {
-        let (least, most) = self.since?.growth(self.forest, a, b);
-        // Of a link the error must not grow; of a refined pair it must not shrink, and its sides must
-        // keep their order.
-        let error = Margin::less(margin.error, if is_link { most } else { -least })?;
-        Some(Margin { error, side: Margin::less(margin.side, most - least)? })
+        margin.after(is_link, self.since?.growth(self.forest, a, b))
     }
 
     fn stale(&self, a: ElementId, b: ElementId, certified: bool) -> Stale {
@@ -335,7 +331,18 @@ impl Placed<'_> {
             }
         }
         let blockers = shaft.blockers(candidates);
-        let v = exact_visibility(self.simd, shaft, &blockers, 1)
+        let mut most = CLIPPED_MAX;
+        let mut way = Margin::ENDLESS;
+        if let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle) {
+            let ends = [(a, place_a.area), (b, place_b.area)];
+            let brings = self.brings(brightness, ends, x.area_m2);
+            let limit = CLOSE_SHARE * threshold;
+            most = if brings > limit { CLIPPED_MAX_CLOSE } else { CLIPPED_MAX_REST };
+            if (CLIPPED_MAX_REST + 1..=CLIPPED_MAX_CLOSE).contains(&blockers.len()) {
+                way = Margin::between(brings.max(limit), brings.min(limit));
+            }
+        }
+        let v = exact_visibility(self.simd, shaft, &blockers, 1, most)
             .unwrap_or_else(|| visibility(self.simd, shaft, &blockers, key, 4));
         let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
         else {
@@ -350,19 +357,35 @@ impl Placed<'_> {
         let ends = (end(a, place_a.area), end(b, place_b.area));
         let e = estimate(&x, &v, (&ends.0, &ends.1), brightness.reference_area_m2());
         let stake = x.area_m2 / place_a.area.min(place_b.area) / threshold.max(FINEST);
-        let mut margin = Margin::FIRM;
+        let both_ways = way != Margin::ENDLESS;
+        let mut margin = Margin { error: way, both_ways, ..Margin::FIRM };
         let (better, ahead) = e.side(&ends.0, &ends.1);
         if let Some((side, firm)) = self.splittable((a, b), better) {
             if e.error > threshold {
-                let error = Margin::between(e.error, threshold);
-                let side_margin = if firm { Margin::ENDLESS } else { ahead };
-                let margin = Margin { error, side: side_margin };
+                margin.error = way.min(Margin::between(e.error, threshold));
+                margin.side = if firm { Margin::ENDLESS } else { ahead };
                 return Judgement { margin, ..passing(Verdict::Refine(side), v.segments) };
             }
-            margin.error = Margin::between(threshold, e.error);
+            margin.error = way.min(Margin::between(threshold, e.error));
         }
         let v = self.settle(v, shaft, &blockers, key, stake);
         Judgement { margin, ..carrying(Verdict::Link, &x, &v, (place_a, place_b)) }
+    }
+
+    /// The share of a receiver's irradiance that a pair brings without occlusion, weighed as errors
+    /// are: what V errs by is multiplied with it. The larger of both directions.
+    fn brings(
+        &self,
+        brightness: &Brightness,
+        [a, b]: [(ElementId, f64); 2],
+        exchange_area_m2: f64,
+    ) -> f64 {
+        let one_way = |(receiver, area): (ElementId, f64), source: ElementId| {
+            let arrives = brightness.of(self.forest, source).radiosity * exchange_area_m2;
+            let known = brightness.of(self.forest, receiver).irradiance;
+            arrives / known / (area * brightness.reference_area_m2()).sqrt()
+        };
+        one_way(a, b.0).max(one_way(b, a.0))
     }
 
     /// A link that is partly blocked is looked at more closely, the more so the larger
@@ -389,7 +412,7 @@ impl Placed<'_> {
                 s if s <= 16.0 * CLOSER => 4,
                 _ => 8,
             };
-            exact_visibility(self.simd, shaft, blockers, cells).unwrap_or(v)
+            exact_visibility(self.simd, shaft, blockers, cells, blockers.len()).unwrap_or(v)
         };
         Visibility { segments: v.segments + again.segments, ..again }
     }
@@ -530,6 +553,15 @@ impl Places {
         }
     }
 }
+
+/// Where a pair brings this many thresholds or more, any number of polygons is clipped in reason.
+const CLOSE_SHARE: f64 = 2.0;
+
+/// Occluding polygons up to which pairs are clipped that bring so much.
+const CLIPPED_MAX_CLOSE: usize = 96;
+
+/// The same for pairs that bring less: sampling a few of their shares of light does little harm.
+const CLIPPED_MAX_REST: usize = 4;
 
 /// Spread of visibility that four points which agree may have overlooked.
 const UNSEEN: f64 = 0.05;

@@ -11,18 +11,46 @@ const STEPS: f64 = 256.0;
 /// What a verdict withstands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Margin {
-    /// By how much the estimate of the error is away from the threshold.
+    /// By how much the estimate of the error is away from the threshold; 15 bits.
     pub error: u16,
-    /// By how much the better side to refine is ahead of the other.
+    /// By how much the better side to refine is ahead of the other; 15 bits.
     pub side: u16,
+    /// Whether `error` counts both ways: it is also how far the pair is from being looked at in
+    /// another way, which a change in either sense may bring about.
+    pub both_ways: bool,
 }
 
 impl Margin {
     /// Whatever the brightness, the verdict is the same.
-    pub const ENDLESS: u16 = u16::MAX;
+    pub const ENDLESS: u16 = u16::MAX >> 1;
 
     /// A verdict that does not depend on brightness.
-    pub const FIRM: Margin = Margin { error: Margin::ENDLESS, side: Margin::ENDLESS };
+    pub const FIRM: Margin =
+        Margin { error: Margin::ENDLESS, side: Margin::ENDLESS, both_ways: false };
+
+    /// `error` and `both_ways` in 16 bits.
+    pub(super) fn packed(self) -> u16 {
+        self.error | u16::from(self.both_ways) << 15
+    }
+
+    /// The inverse of [`Margin::packed`].
+    pub(super) fn unpacked(packed: u16, side: u16) -> Margin {
+        Margin { error: packed & Margin::ENDLESS, side, both_ways: packed >> 15 == 1 }
+    }
+
+    /// What is left after the errors of the pair grew by at least and at most so many steps, if its
+    /// verdict withstands that.
+    pub(super) fn after(self, is_link: bool, (least, most): (i32, i32)) -> Option<Margin> {
+        // Of a link the error must not grow; of a refined pair it must not shrink, and its sides must
+        // keep their order.
+        let growth = match (self.both_ways, is_link) {
+            (true, _) => most.max(-least),
+            (false, true) => most,
+            (false, false) => -least,
+        };
+        let error = Margin::less(self.error, growth)?;
+        Some(Margin { error, side: Margin::less(self.side, most - least)?, ..self })
+    }
 
     /// The margin between two numbers of which the first is the larger.
     pub fn between(large: f64, small: f64) -> u16 {
@@ -32,7 +60,7 @@ impl Margin {
     }
 
     /// What is left after the logarithm changed to the worse by `steps`; `None` if that is nothing.
-    pub(super) fn less(margin: u16, steps: i32) -> Option<u16> {
+    fn less(margin: u16, steps: i32) -> Option<u16> {
         if margin == Margin::ENDLESS {
             return Some(margin);
         }
@@ -107,6 +135,19 @@ mod tests {
         assert_eq!(Margin::less(0, 0), None);
         assert_eq!(Margin::less(Margin::ENDLESS, ENDLESS), Some(Margin::ENDLESS));
         assert_eq!(Margin::less(Margin::ENDLESS - 1, ENDLESS), None);
+    }
+
+    #[test]
+    fn links_mind_growth_and_refined_pairs_shrinking() {
+        let margin = |both_ways| Margin { error: 100, side: Margin::ENDLESS, both_ways };
+        let left = |m: Margin, link, growth| m.after(link, growth).map(|m| m.error);
+        assert_eq!(left(margin(false), true, (-500, 30)), Some(70));
+        assert_eq!(left(margin(false), false, (-30, 500)), Some(70));
+        assert_eq!(left(margin(true), true, (-500, 30)), None);
+        assert_eq!(left(margin(true), false, (-30, 40)), Some(60));
+        for margin in [margin(true), margin(false), Margin::FIRM] {
+            assert_eq!(Margin::unpacked(margin.packed(), margin.side), margin);
+        }
     }
 
     #[test]

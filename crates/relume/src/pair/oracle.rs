@@ -69,7 +69,7 @@ impl Estimate {
 }
 
 /// How many times as much the smaller side must mend to be refined in place of the larger.
-const PREFERENCE: f64 = 2.0;
+const PREFERENCE: f64 = 1.5;
 
 /// Weight of the variation of visibility over a receiver, for emitted light: few of a receiver's
 /// links have the edge of a lamp's shadow within it, while all have a bend.

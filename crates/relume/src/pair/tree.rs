@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use crate::element::{ElementId, Renumbering};
-use crate::event::{History, Tick};
+use crate::event::{History, Lookahead, Tick};
 
 use super::margin::Margin;
 use super::oracle::Side;
@@ -247,6 +247,8 @@ pub struct PairTree {
     due: Beside<Tick>,
     /// What extrapolation knows of each pair.
     history: Beside<History>,
+    /// Pairs that are extrapolated.
+    live: usize,
 }
 
 /// Something beside the nodes, by their ids: nothing at all where it is the default of all of them.
@@ -421,12 +423,10 @@ impl PairTree {
     pub(super) fn margin(&self, id: PairId) -> Margin {
         let node = &self.nodes[id.0 as usize];
         match node.state() {
-            State::Active => {
-                Margin { error: (node.payload[1] >> 16) as u16, side: Margin::ENDLESS }
-            }
+            State::Active => Margin::unpacked((node.payload[1] >> 16) as u16, Margin::ENDLESS),
             State::Refined(_) => {
                 let both = node.payload[2];
-                Margin { error: both as u16, side: (both >> 16) as u16 }
+                Margin::unpacked(both as u16, (both >> 16) as u16)
             }
             _ => Margin::FIRM,
         }
@@ -434,7 +434,7 @@ impl PairTree {
 
     pub(super) fn set_margin(&mut self, id: PairId, margin: Margin) {
         let node = &mut self.nodes[id.0 as usize];
-        let (error, side) = (u32::from(margin.error), u32::from(margin.side));
+        let (error, side) = (u32::from(margin.packed()), u32::from(margin.side));
         match node.state() {
             State::Active => node.payload[1] = error << 16 | node.payload[1] & 0xffff,
             State::Refined(_) => node.payload[2] = side << 16 | error,
@@ -459,13 +459,31 @@ impl PairTree {
     }
 
     pub(super) fn set_history(&mut self, id: PairId, history: History) {
+        self.live -= usize::from(self.history.get(id).is_live());
+        self.live += usize::from(history.is_live());
         self.history.set(id, history, self.nodes.len());
+    }
+
+    /// Pairs that are extrapolated from time to time.
+    pub fn live_count(&self) -> usize {
+        self.live
+    }
+
+    /// Those of them that are to be evaluated, ascending.
+    pub(super) fn due_pairs(&self, ahead: &Lookahead) -> Vec<PairId> {
+        if self.live == 0 {
+            return Vec::new();
+        }
+        let is_due = |(_, history): &(usize, &History)| history.is_live() && history.is_due(ahead);
+        let histories = self.history.values.iter().enumerate();
+        histories.filter(is_due).map(|(id, _)| PairId(id as u32)).collect()
     }
 
     /// Takes back all certificates and forgets all histories.
     pub fn forget_predictions(&mut self) {
         self.due = Beside::default();
         self.history = Beside::default();
+        self.live = 0;
     }
 
     fn count(&mut self, state: State, by: i64) {
@@ -510,6 +528,7 @@ impl PairTree {
         for child in children.clone() {
             debug_assert!(!self.state(PairId(child)).is_refined());
             self.set_state(PairId(child), State::Vacant);
+            self.set_history(PairId(child), History::default());
         }
         let count = children.len();
         if self.vacant.len() <= count {
@@ -540,7 +559,7 @@ mod tests {
         let carried = Carried { exchange_area_m2: 0.123, visibility: 65_535, gradients };
         let mut tree = PairTree::new(ElementId(0));
         tree.set_state(PairTree::ROOT, State::Active);
-        let margin = Margin { error: 1234, side: Margin::ENDLESS };
+        let margin = Margin { error: 1234, side: Margin::ENDLESS, both_ways: true };
         tree.set_margin(PairTree::ROOT, margin);
         tree.set_carried(PairTree::ROOT, &carried);
         assert_eq!(tree.link(PairTree::ROOT).unwrap().carried, carried);

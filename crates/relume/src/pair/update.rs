@@ -303,18 +303,27 @@ pub fn update<J: Judge>(
         Editor { tree, hash, judge, record, changes: Changes::default(), next: Wave::default() };
     let list = editor.next.push_candidates(root_candidates);
     editor.next.items.push(Item { pair: PairTree::ROOT, list });
-    while !editor.next.items.is_empty() {
-        let wave = std::mem::take(&mut editor.next);
-        for block in wave.items.chunks(BLOCK) {
-            let judged = judge_block(editor.tree, editor.judge, block, &wave.candidates, fresh);
-            for chunk in &judged {
-                editor.apply_chunk(chunk, &wave);
+    loop {
+        while !editor.next.items.is_empty() {
+            let wave = std::mem::take(&mut editor.next);
+            for block in wave.items.chunks(BLOCK) {
+                let judged = judge_block(editor.tree, editor.judge, block, &wave.candidates, fresh);
+                for chunk in &judged {
+                    editor.apply_chunk(chunk, &wave);
+                }
+                let held = editor.changes.held.capacity() * size_of::<Held>();
+                let scratch = wave.memory_bytes() + editor.next.memory_bytes() + held as u64;
+                if !may_go_on(editor.tree, editor.judge.element_count(), scratch) {
+                    return Err(OutOfMemory);
+                }
             }
-            let held = editor.changes.held.capacity() * size_of::<Held>();
-            let scratch = wave.memory_bytes() + editor.next.memory_bytes() + held as u64;
-            if !may_go_on(editor.tree, editor.judge.element_count(), scratch) {
-                return Err(OutOfMemory);
-            }
+        }
+        // Pairs that are due though no motion led to them.
+        let due = editor.judge.lookahead().map(|ahead| editor.tree.due_pairs(ahead));
+        let list = editor.next.push_candidates(root_candidates);
+        editor.next.items.extend(due.into_iter().flatten().map(|pair| Item { pair, list }));
+        if editor.next.items.is_empty() {
+            break;
         }
     }
     editor.changes.refined.sort_unstable();
@@ -332,6 +341,14 @@ struct Wave {
 struct Item {
     pair: PairId,
     list: List,
+}
+
+impl Item {
+    /// Whether the pair is no longer what was looked at: an edit before it in the same wave removed
+    /// it. Only pairs that are due can have another of their wave above them.
+    fn is_gone(&self, tree: &PairTree, ends: (ElementId, ElementId)) -> bool {
+        tree.state(self.pair) == State::Vacant || tree.ends(self.pair) != ends
+    }
 }
 
 /// Some candidates of a wave.
@@ -371,6 +388,7 @@ impl List {
 
 struct Chunk<'a> {
     items: &'a [Item],
+    ends: Vec<(ElementId, ElementId)>,
     looks: Vec<Look>,
     candidates: Vec<u32>,
 }
@@ -406,7 +424,8 @@ fn judge_block<'a, J: Judge>(
             .iter()
             .map(|item| look_at(tree, judge, item, (candidates, &mut narrowed), fresh))
             .collect();
-        Chunk { items, looks, candidates: narrowed }
+        let ends = items.iter().map(|item| tree.ends(item.pair)).collect();
+        Chunk { items, ends, looks, candidates: narrowed }
     };
     items.par_chunks(CHUNK).map(judge_chunk).collect()
 }
@@ -521,7 +540,10 @@ struct Editor<'a, J> {
 
 impl<J: Judge> Editor<'_, J> {
     fn apply_chunk(&mut self, chunk: &Chunk<'_>, wave: &Wave) {
-        for (item, look) in chunk.items.iter().zip(&chunk.looks) {
+        for ((item, look), &ends) in chunk.items.iter().zip(&chunk.looks).zip(&chunk.ends) {
+            if item.is_gone(self.tree, ends) {
+                continue;
+            }
             self.changes.work.visited += 1;
             match look {
                 Look::Certified => self.changes.work.certified += 1,
@@ -593,7 +615,10 @@ impl<J: Judge> Editor<'_, J> {
         let sample = Sample {
             exchange_area_m2: found.carried.exchange_area_m2,
             visibility: found.carried.visibility,
-            margin: found.margin.error,
+            margin: match found.margin.error {
+                Margin::ENDLESS => Sample::FIRM,
+                margin => margin,
+            },
         };
         let before = self.tree.history(pair);
         let history = match same {

@@ -89,6 +89,13 @@ struct Solved {
     report: FrameReport,
 }
 
+impl Solved {
+    /// Whether nothing is extrapolated.
+    fn is_settled(&self) -> bool {
+        self.tree.live_count() == 0
+    }
+}
+
 /// Threshold of the error oracle for a link, relative to the tolerance of the whole: the errors of
 /// a receiver's links add up. Measured; see docs/tolerance.md.
 const LINK_SHARE: f64 = 0.25;
@@ -143,8 +150,10 @@ impl Session {
         if self.options.update == Update::Scratch {
             last = None;
         }
+        // What was extrapolated cannot be taken along when time jumps or goes back.
+        last = last.filter(|last| last.is_settled() || last.ticks.goes_on(last.time_s, time_s));
         let solved = match last {
-            Some(last) if self.is_still(&last, time_s) => {
+            Some(last) if last.is_settled() && self.is_still(&last, time_s) => {
                 let report = last.report.of_a_still_frame(label);
                 Solved { time_s, report, events: Vec::new(), ..last }
             }

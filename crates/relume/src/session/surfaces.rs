@@ -161,7 +161,9 @@ pub(super) fn apply_edits(
     for edit in edits {
         let (a, b) = match *edit {
             Edit::Set(id) => {
-                let link = tree.link(id).expect("a link that was set stays one");
+                // A pair that was due and, after that, one above it may have edited the same link:
+                // then its removal is among the edits too.
+                let Some(link) = tree.link(id) else { continue };
                 set_pair(links, forest, &link);
                 (link.a, link.b)
             }

@@ -302,22 +302,24 @@ pub fn visibility(
     tally.finish(1 << log2_count, a, b)
 }
 
-/// Occluding polygons up to which partial visibility is found by clipping.
+/// Occluding polygons up to which partial visibility is found by clipping where nothing is known of
+/// the light.
 pub const CLIPPED_MAX: usize = 12;
 
 /// Visibility of a pair by clipping, exact from 2 x 2 points in each of `cells` x `cells` parts of
-/// its smaller end (each counts as a segment), if at most twelve polygons stand in its shaft;
+/// its smaller end (each counts as a segment), if at most `most` polygons stand in its shaft;
 /// `None` if there are more.
 pub fn exact_visibility(
     simd: Simd,
     shaft: &Shaft<'_>,
     blockers: &[PatchId],
     cells: u32,
+    most: usize,
 ) -> Option<Visibility> {
     if blockers.is_empty() {
         return Some(Visibility::CLEAR);
     }
-    if blockers.len() > CLIPPED_MAX {
+    if blockers.len() > most {
         return None;
     }
     let (a, b) = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
@@ -507,7 +509,8 @@ mod tests {
         let key = |k: u64| k.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let trace = |k| visibility(Simd::detect(), &shaft, &blockers, key(k), 6).value;
         let traced = (1..=16).map(trace).sum::<f64>() / 16.0;
-        let clipped = exact_visibility(Simd::detect(), &shaft, &blockers, 8).unwrap().value;
+        let clipped =
+            exact_visibility(Simd::detect(), &shaft, &blockers, 8, CLIPPED_MAX).unwrap().value;
         assert!((traced - clipped).abs() < 0.04, "{traced} {clipped}");
         clipped
     }

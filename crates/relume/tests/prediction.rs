@@ -1,0 +1,181 @@
+//! The strategies of prediction: certificates miss nothing and spare work; extrapolation loses what it
+//! says, and nothing once all is at rest.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::{at_tolerance, form_factor_oracle, lit_room};
+use relume::scene::Scene;
+use relume::session::{
+    EventKind, FrameReport, Missed, Options, Session, Update, missed, radiosity_error,
+};
+
+/// Small steps through the second that things move in, and beyond.
+const STEP_S: f64 = 1.0 / 48.0;
+
+fn session(scene: &Arc<Scene>, options: &Options, update: Update) -> Session {
+    Session::new(Arc::clone(scene), Options { update, ..options.clone() }).unwrap()
+}
+
+fn oracles() -> [(&'static str, Options); 2] {
+    [("error", at_tolerance(0.1)), ("form factor", form_factor_oracle(0.05, 1e-3))]
+}
+
+/// Follows frames 0 to `frames` with two strategies; what `look` makes of each frame after the first.
+fn follow<T>(
+    options: &Options,
+    updates: [Update; 2],
+    frames: u32,
+    mut look: impl FnMut(u32, [(&FrameReport, &Session); 2]) -> T,
+) -> Vec<T> {
+    let scene = Arc::new(lit_room());
+    let mut both = updates.map(|update| session(&scene, options, update));
+    let mut out = Vec::new();
+    for frame in 0..=frames {
+        let reports = both.each_mut().map(|s| s.step(frame, f64::from(frame) * STEP_S).unwrap());
+        if frame > 0 {
+            let [one, two] = [0, 1].map(|k| (&reports[k], &both[k]));
+            out.push(look(frame, [one, two]));
+        }
+    }
+    out
+}
+
+const SEVEN: Update = Update::Extrapolate { frames: 7, error: None };
+
+#[test]
+fn certificates_miss_nothing_and_spare_work() {
+    for (name, options) in oracles() {
+        let updates = [Update::Certificate, Update::Reinspect];
+        let seen = follow(&options, updates, 47, |frame, [(one, a), (two, b)]| {
+            assert_eq!(one.hash, two.hash, "{name}, frame {frame}");
+            assert_eq!(missed(a, b), Missed::default(), "{name}, frame {frame}");
+            assert_eq!((one.changed, one.segments), (two.changed, two.segments));
+            assert_eq!(two.followed + two.certified + two.extrapolated, 0);
+            [one.examined, two.examined, one.followed, one.certified, one.changed]
+        });
+        let sum = |k: usize| seen.iter().map(|s| s[k]).sum::<u64>();
+        println!(
+            "{name}: judged {} with certificates, {} without; {} followed, {} passed over",
+            sum(0),
+            sum(1),
+            sum(2),
+            sum(3)
+        );
+        assert!(sum(0) * 10 < sum(1) * 9, "{name}");
+        assert!(sum(2) > 0 && sum(3) > 0, "{name}");
+    }
+}
+
+#[test]
+fn extrapolation_of_one_frame_loses_nothing() {
+    let options = form_factor_oracle(0.05, 1e-3);
+    let one = Update::Extrapolate { frames: 1, error: None };
+    follow(&options, [one, Update::Reinspect], 20, |frame, [(one, _), (two, _)]| {
+        assert_eq!(one.extrapolated, 0);
+        assert_eq!(one.hash, two.hash, "frame {frame}");
+    });
+}
+
+#[test]
+fn extrapolation_spares_work_and_says_what_it_loses() {
+    for (name, options) in oracles() {
+        let seen = follow(&options, [SEVEN, Update::Reinspect], 47, |_, [(one, a), (two, b)]| {
+            let error = radiosity_error(a, b);
+            assert!(error.max >= error.rms);
+            (one.examined, two.examined, one.extrapolated, error.rms)
+        });
+        let judged = seen.iter().map(|s| s.0).sum::<u64>();
+        let reinspected = seen.iter().map(|s| s.1).sum::<u64>();
+        let worst = seen.iter().map(|s| s.3).fold(0.0, f64::max);
+        println!("{name}: judged {judged} of {reinspected}, RMS up to {:.2} %", 100.0 * worst);
+        assert!(judged * 3 < reinspected * 2, "{name}");
+        assert!(seen.iter().any(|s| s.2 > 0));
+        assert!(worst > 0.0 && worst < 0.1, "{name}: {worst}");
+    }
+}
+
+#[test]
+fn a_smaller_error_asked_for_is_a_smaller_error() {
+    let options = form_factor_oracle(0.05, 1e-3);
+    let found = [0.1, 0.003].map(|error| {
+        let update = Update::Extrapolate { frames: 64, error: Some(error) };
+        let seen = follow(&options, [update, Update::Reinspect], 40, |_, [(one, a), (_, b)]| {
+            (one.examined, radiosity_error(a, b).rms)
+        });
+        let judged = seen.iter().map(|s| s.0).sum::<u64>();
+        (judged, seen.iter().map(|s| s.1).fold(0.0, f64::max))
+    });
+    println!("{found:?}");
+    assert!(found[1].1 < found[0].1 && found[1].0 > found[0].0, "{found:?}");
+}
+
+/// The tracks of the room end at 1 s.
+#[test]
+fn once_all_is_at_rest_nothing_is_lost() {
+    let options = form_factor_oracle(0.05, 1e-3);
+    let last = follow(&options, [SEVEN, Update::Reinspect], 70, |_, [(one, a), (two, b)]| {
+        (one.hash == two.hash, missed(a, b), one.extrapolated, one.examined)
+    });
+    assert!(!last[30].0, "the test means nothing if nothing is extrapolated");
+    let (same, missed, extrapolated, examined) = last[last.len() - 1];
+    assert!(
+        same && missed == Missed::default() && extrapolated + examined == 0,
+        "{:?}",
+        &last[45..]
+    );
+}
+
+#[test]
+fn a_jump_in_time_is_built_anew() {
+    let scene = Arc::new(lit_room());
+    let options = form_factor_oracle(0.05, 1e-3);
+    let mut warm = session(&scene, &options, SEVEN);
+    let mut cold = session(&scene, &options, Update::Scratch);
+    for frame in 0..20 {
+        warm.step(frame, f64::from(frame) * STEP_S).unwrap();
+    }
+    for time_s in [0.1, 0.1, 0.9, 0.05] {
+        let (one, two) = (warm.step(0, time_s).unwrap(), cold.step(0, time_s).unwrap());
+        assert_eq!(one.hash, two.hash, "at {time_s}");
+        for k in 1..4 {
+            warm.step(k, time_s + f64::from(k) * STEP_S).unwrap();
+        }
+    }
+}
+
+#[test]
+fn events_are_those_that_are_counted() {
+    for (name, options) in oracles() {
+        let options = Options { events: true, ..options };
+        let updates = [Update::Certificate, Update::Reinspect];
+        let events = follow(&options, updates, 24, |frame, [(report, a), (_, b)]| {
+            let (events, same) = (a.events(), b.events());
+            assert_eq!(events, same, "{name}, frame {frame}");
+            let count = |kinds: &[EventKind]| {
+                events.iter().filter(|e| kinds.contains(&e.kind)).count() as u64
+            };
+            assert_eq!(count(&[EventKind::Promoted]), report.promoted, "{name}, frame {frame}");
+            assert_eq!(count(&[EventKind::Demoted]), report.demoted, "{name}, frame {frame}");
+            let occluded = count(&[EventKind::Occluded, EventKind::Revealed]);
+            assert_eq!(occluded, report.occlusion_changed, "{name}, frame {frame}");
+            for event in &events {
+                let linked = (event.before.is_some(), event.after.is_some());
+                assert_eq!(
+                    linked,
+                    match event.kind {
+                        EventKind::Promoted | EventKind::Woken => (false, true),
+                        EventKind::Demoted | EventKind::Culled => (true, false),
+                        EventKind::Occluded | EventKind::Revealed => (true, true),
+                    }
+                );
+                if event.kind == EventKind::Occluded {
+                    assert!(event.before.unwrap().1 > event.after.unwrap().1);
+                }
+            }
+            events.len()
+        });
+        assert!(events.iter().sum::<usize>() > 100, "{name}: {events:?}");
+    }
+}

@@ -676,7 +676,7 @@ impl FromStr for UpdateFlag {
 const FRAMES_AHEAD: u32 = 7;
 
 /// Frames ahead where an error is stated instead.
-const FRAMES_AHEAD_AT_MOST: u32 = 64;
+const FRAMES_AHEAD_AT_MOST: u32 = 4;
 
 impl UpdateChoice {
     /// A strategy without a stated error.

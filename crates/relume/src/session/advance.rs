@@ -7,7 +7,7 @@ use crate::event::{Foresight, Lookahead, Ticks};
 use crate::pair::{
     Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Record, Since, Stage, update,
 };
-use crate::scene::BodyId;
+use crate::scene::{BodyId, LightKind};
 use crate::solver::{Dirty, Links, Radiosity, Stop};
 
 use super::coarse::{self, Coarse};
@@ -76,7 +76,12 @@ impl Session {
         let lit = LitForest::new(&self.scene, &solved.forest).present_in(&solved.view);
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
         let share = if cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE };
-        let stop = Stop::Residual(self.options.tolerance * share);
+        let residual = self.options.tolerance * share;
+        let stop = match ahead.lookahead {
+            // Extrapolated links may feed each other.
+            Some(_) => Stop::Bounded { residual, mean_w_m2: 1.1 * self.most_mean_w_m2() },
+            None => Stop::Residual(residual),
+        };
         let lamps = (0..self.scene.lights.len()).any(|k| solved.view.light(k).is_some());
         if lit.is_dark() && !lamps {
             // What is left of earlier light would fade for ever.
@@ -99,6 +104,28 @@ impl Session {
         report.seconds.total = clock.total();
         solved.report = report;
         Ok(solved)
+    }
+
+    /// A bound on the mean radiosity of the scene at any time: all that can be emitted, over what is
+    /// absorbed at least.
+    fn most_mean_w_m2(&self) -> f64 {
+        let scene = &self.scene;
+        let mean = |c: [f64; 3]| c.iter().sum::<f64>() / 3.0;
+        let (mut emitted_w, mut area_m2, mut rho) = (0.0, 0.0, 0.0_f64);
+        for patch in &scene.patches {
+            let material = &scene.materials[patch.material.0 as usize];
+            area_m2 += patch.area_m2();
+            emitted_w += patch.area_m2() * mean(material.exitance);
+            rho = material.reflectance.into_iter().fold(rho, f64::max);
+        }
+        for light in &scene.lights {
+            let spread = match light.kind {
+                LightKind::Directional => area_m2,
+                LightKind::Point | LightKind::Spot { .. } => 4.0 * std::f64::consts::PI,
+            };
+            emitted_w += mean(light.intensity) * spread;
+        }
+        emitted_w / area_m2 / (1.0 - rho)
     }
 
     /// What the strategy predicts with, from this time on; what no longer holds is taken back.

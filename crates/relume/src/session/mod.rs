@@ -158,7 +158,14 @@ impl Session {
                 Solved { time_s, report, events: Vec::new(), ..last }
             }
             // On a thread of the pool: entering it anew for every small task would cost more.
-            last => rayon::scope(|_| self.advance(last, from, label))?,
+            last => rayon::scope(|_| {
+                let solved = self.advance(last, from, label.clone())?;
+                // Extrapolated links that no scene can have: this frame is built anew.
+                match solved.report.residual.is_infinite() {
+                    true => self.advance(None, from, label),
+                    false => Ok(solved),
+                }
+            })?,
         };
         let report = solved.report.clone();
         self.solved = Some(solved);

@@ -18,6 +18,14 @@ use super::work::{Dirty, PENDING_SHARE, Way, Work};
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stop {
+    /// As `Residual`, but given up, with an infinite residual, once the mean radiosity passes a bound
+    /// that no scene can: for links that are not quite true to any.
+    Bounded {
+        /// The residual, relative to the mean radiosity.
+        residual: f64,
+        /// The bound, W/m2.
+        mean_w_m2: f64,
+    },
     /// After exactly this many sweeps.
     Sweeps(u32),
     /// When no element's radiosity would change by more than this, relative to the mean radiosity.
@@ -130,11 +138,12 @@ impl Radiosity {
         (self.sweeps, self.gathers) = (0, 0);
         let limit_of = |mean: f64| match stop {
             Stop::Sweeps(_) => 0.0,
-            Stop::Residual(limit) => (limit * mean) as f32,
+            Stop::Residual(limit) | Stop::Bounded { residual: limit, .. } => (limit * mean) as f32,
         };
+        let to_residual = !matches!(stop, Stop::Sweeps(_));
         let mut limit = limit_of(self.mean(surfaces));
         loop {
-            if self.held > HELD_MAX * limit && !work.all && matches!(stop, Stop::Residual(_)) {
+            if self.held > HELD_MAX * limit && !work.all && to_residual {
                 // What was little beside a brighter scene is too much beside this one.
                 work.start_all(surfaces);
             }
@@ -156,17 +165,21 @@ impl Radiosity {
             self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
             let done = match stop {
                 Stop::Sweeps(count) => self.sweeps >= count,
+                Stop::Bounded { mean_w_m2, .. } if !(mean <= mean_w_m2) => {
+                    self.residual = f64::INFINITY;
+                    true
+                }
                 // Where the sweep itself made the scene much darker, what it left is no longer little.
-                Stop::Residual(_) if before > HELD_MAX * limit => {
+                _ if before > HELD_MAX * limit => {
                     work.start_all(surfaces);
                     false
                 }
-                Stop::Residual(_) => !work.is_left(surfaces, links, limit, &mut self.pending),
+                _ => !work.is_left(surfaces, links, limit, &mut self.pending),
             };
             if done || self.sweeps >= SWEEPS_MAX {
                 return;
             }
-            if all && work.all && matches!(stop, Stop::Residual(_)) {
+            if all && work.all && to_residual {
                 jump.after(&mut self.radiosity);
             }
         }

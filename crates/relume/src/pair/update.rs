@@ -468,10 +468,10 @@ fn look_at<J: Judge>(
         Stale::Nothing if certified => return Look::Certified,
         Stale::Nothing => return Look::Unaffected(judge.foresee(a, b, Finding::Unaffected)),
         Stale::Below => return Look::Descend,
-        Stale::Occlusion if state.is_refined() => {
-            if judge.narrow(a, b, item.list.of(candidates), narrowed) {
-                return Look::Narrowed(List::since(start, narrowed));
-            }
+        Stale::Occlusion
+            if state.is_refined() && judge.narrow(a, b, item.list.of(candidates), narrowed) =>
+        {
+            return Look::Narrowed(List::since(start, narrowed));
         }
         _ => {}
     }
@@ -606,11 +606,10 @@ impl<J: Judge> Editor<'_, J> {
             Stale::New => self.judge.stale(a, b, false) == Stale::Moved,
             _ => return,
         };
-        let same = match (self.tree.state(pair), found.verdict) {
-            (State::Active, Verdict::Link) => true,
-            (State::Refined(_), Verdict::Refine(_)) => true,
-            _ => false,
-        };
+        let same = matches!(
+            (self.tree.state(pair), found.verdict),
+            (State::Active, Verdict::Link) | (State::Refined(_), Verdict::Refine(_))
+        );
         let goes_on = matches!(found.verdict, Verdict::Link | Verdict::Refine(_));
         let sample = Sample {
             exchange_area_m2: found.carried.exchange_area_m2,

@@ -260,7 +260,7 @@ mod tests {
                 translation_track: (moves & 1 > 0).then(|| Track {
                     times_s: times_s.clone(), values, interpolation: kind,
                 }),
-                rotation_track: (moves & 2 > 0).then(|| RotationTrack {
+                rotation_track: (moves & 2 > 0).then_some(RotationTrack {
                     times_s, values: turned, interpolation: turning,
                 }),
                 presence: vec![],

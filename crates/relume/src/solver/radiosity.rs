@@ -165,7 +165,7 @@ impl Radiosity {
             self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
             let done = match stop {
                 Stop::Sweeps(count) => self.sweeps >= count,
-                Stop::Bounded { mean_w_m2, .. } if !(mean <= mean_w_m2) => {
+                Stop::Bounded { mean_w_m2, .. } if mean > mean_w_m2 || mean.is_nan() => {
                     self.residual = f64::INFINITY;
                     true
                 }

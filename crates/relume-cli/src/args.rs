@@ -349,7 +349,7 @@ pub(crate) struct UpdateChoice {
     #[arg(long = "update", value_name = "STRATEGY", default_value = "certificate")]
     pub(crate) strategy: UpdateFlag,
     /// With `--update extrapolate`: evaluate a link again as soon as its exchange may be off by this
-    /// share; N then is the limit (64 if not given).
+    /// share; N then is the limit (4 if not given).
     #[arg(long, value_name = "E", value_parser = parse_share, allow_negative_numbers = true)]
     pub(crate) error: Option<f64>,
 }

@@ -5,8 +5,9 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{at_tolerance, form_factor_oracle, lit_room};
-use relume::scene::Scene;
+use common::{at_tolerance, facing_up, flipped, form_factor_oracle, lit_room, sliding, still, v};
+use glam::{DQuat, DVec3};
+use relume::scene::{Interpolation, Scene, SceneBuilder, Track};
 use relume::session::{
     EventKind, FrameReport, Missed, Options, Session, Update, missed, radiosity_error,
 };
@@ -178,4 +179,71 @@ fn events_are_those_that_are_counted() {
         });
         assert!(events.iter().sum::<usize>() > 100, "{name}: {events:?}");
     }
+}
+
+/// There and back in a second: the last pose is the first, so playing it again begins with a step back
+/// in which nothing moves.
+#[test]
+fn a_loop_played_again_has_no_certificates_of_its_end() {
+    let mut b = SceneBuilder::new("loop");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let lamp = b.material("lamp", [0.0; 3], [10.0; 3]);
+    let room = still(&mut b, "room");
+    b.cuboid_inward(room, "walls", grey, DVec3::ZERO, DVec3::ONE);
+    let at = [v(0.3, 0.3, 0.4), v(0.7, 0.5, 0.4), v(0.3, 0.3, 0.4)];
+    let node = b.node("box", None, at[0], DQuat::IDENTITY);
+    let interpolation = Interpolation::Linear;
+    b.animate_translation(
+        node,
+        Track { times_s: vec![0.0, 0.5, 1.0], values: at.into(), interpolation },
+    );
+    b.cuboid(node, "box", grey, DVec3::splat(-0.1), DVec3::splat(0.1));
+    let node = still(&mut b, "lamp");
+    b.polygon(node, "lamp", lamp, &flipped(facing_up([0.4, 0.6], [0.4, 0.6], 0.95)));
+    let scene = Arc::new(b.build().unwrap());
+    for (name, options) in oracles() {
+        let mut warm = session(&scene, &options, Update::Certificate);
+        let mut cold = session(&scene, &options, Update::Scratch);
+        for frame in 0..50 {
+            let time_s = f64::from(frame % 17) / 16.0;
+            let (one, two) = (warm.step(0, time_s).unwrap(), cold.step(0, time_s).unwrap());
+            assert_eq!(one.hash, two.hash, "{name}, frame {frame}");
+        }
+    }
+}
+
+/// A body that leaves changes the extent of the scene while another, at rest by then, is still
+/// extrapolated.
+#[test]
+fn a_scene_that_grows_forgets_no_extrapolated_link() {
+    let options = form_factor_oracle(0.05, 1e-3);
+    let mut judged = 0;
+    for speed in [3.0, 5.0, 8.0] {
+        let mut b = SceneBuilder::new("growing");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let lamp = b.material("lamp", [0.0; 3], [10.0; 3]);
+        let room = still(&mut b, "room");
+        b.cuboid_inward(room, "walls", grey, DVec3::ZERO, DVec3::ONE);
+        let node = sliding(&mut b, "box", v(0.3, 0.3, 0.4), v(0.7, 0.5, 0.4));
+        b.cuboid(node, "box", grey, DVec3::splat(-0.1), DVec3::splat(0.1));
+        let from = v(2.0, 0.5, 0.5);
+        let node = b.node("leaver", None, from, DQuat::IDENTITY);
+        let (times_s, interpolation) = (vec![0.0, 1.4], Interpolation::Linear);
+        let values = vec![from, from + DVec3::X * speed];
+        b.animate_translation(node, Track { times_s, values, interpolation });
+        b.cuboid(node, "leaver", grey, DVec3::splat(-0.1), DVec3::splat(0.1));
+        let node = still(&mut b, "lamp");
+        b.polygon(node, "lamp", lamp, &flipped(facing_up([0.4, 0.6], [0.4, 0.6], 0.95)));
+        let scene = Arc::new(b.build().unwrap());
+        let mut warm = session(&scene, &options, SEVEN);
+        let mut last = String::new();
+        for frame in 0..110 {
+            let report = warm.step(frame, f64::from(frame) * STEP_S).unwrap();
+            judged += report.extrapolated;
+            last = report.hash;
+        }
+        let mut cold = session(&scene, &options, Update::Scratch);
+        assert_eq!(last, cold.step(0, 109.0 * STEP_S).unwrap().hash, "{speed} m/s");
+    }
+    assert!(judged > 0);
 }

@@ -64,6 +64,11 @@ impl History {
         f64::from(self.due_s) <= ahead.now_s + 0.25 * ahead.frame_s
     }
 
+    /// Whether it has not been evaluated at the present time, as far as its times tell.
+    pub fn is_older_than(&self, ahead: &Lookahead) -> bool {
+        self.at_s[1] < ahead.now_s as f32
+    }
+
     /// X and V on the line through both evaluations.
     pub fn extrapolated(&self, ahead: &Lookahead) -> (f32, u16) {
         let (x, v) = self.line(ahead.now_s);
@@ -101,7 +106,7 @@ impl History {
         if self.count == 0 {
             return History::begun(sample, ahead);
         }
-        if self.at_s[1] >= ahead.now_s as f32 {
+        if !self.is_older_than(ahead) {
             // It was evaluated at this time already.
             return *self;
         }

@@ -46,7 +46,7 @@ impl Ticks {
             return None;
         }
         let mut now = u32::from(self.now);
-        while self.at(now) < to_s {
+        while now <= u32::from(Tick::MAX / 2) && self.at(now) < to_s {
             now += 1;
         }
         (now <= u32::from(Tick::MAX / 2)).then_some(now as Tick)

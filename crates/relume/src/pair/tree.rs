@@ -474,14 +474,19 @@ impl PairTree {
         if self.live == 0 {
             return Vec::new();
         }
-        let is_due = |(_, history): &(usize, &History)| history.is_live() && history.is_due(ahead);
+        let is_due =
+            |(_, h): &(usize, &History)| h.is_live() && h.is_due(ahead) && h.is_older_than(ahead);
         let histories = self.history.values.iter().enumerate();
         histories.filter(is_due).map(|(id, _)| PairId(id as u32)).collect()
     }
 
-    /// Takes back all certificates and forgets all histories.
-    pub fn forget_predictions(&mut self) {
+    /// Takes back all certificates.
+    pub fn forget_certificates(&mut self) {
         self.due = Beside::default();
+    }
+
+    /// Extrapolates no pair any more.
+    pub fn forget_histories(&mut self) {
         self.history = Beside::default();
         self.live = 0;
     }

@@ -135,7 +135,10 @@ impl Session {
         }
         let void = solved.ticks.go(solved.time_s, time_s);
         if void || old.far_m() != solved.view.far_m() {
-            solved.tree.forget_predictions();
+            solved.tree.forget_certificates();
+        }
+        if void {
+            solved.tree.forget_histories();
         }
         let mut ahead = Ahead::default();
         match self.options.update {

@@ -153,7 +153,12 @@ impl Session {
         // What was extrapolated cannot be taken along when time jumps or goes back.
         last = last.filter(|last| last.is_settled() || last.ticks.goes_on(last.time_s, time_s));
         let solved = match last {
-            Some(last) if last.is_settled() && self.is_still(&last, time_s) => {
+            Some(mut last) if last.is_settled() && self.is_still(&last, time_s) => {
+                if time_s < last.time_s {
+                    // What was foreseen from a later time says nothing of an earlier one.
+                    last.ticks = Ticks::default();
+                    last.tree.forget_certificates();
+                }
                 let report = last.report.of_a_still_frame(label);
                 Solved { time_s, report, events: Vec::new(), ..last }
             }

@@ -1,0 +1,45 @@
+//! How the error falls with the number of links.
+
+use std::sync::Arc;
+
+use relume::flat::{FlatOptions, FlatSession, parse};
+
+/// A closed room with a lamp and a box: everything a scene has.
+const ROOM: &str = "polygon room 0 0 2 0 2 1 0 1 reflectance 0.6\n\
+    polygon box 1.2 0 1.2 0.3 1.5 0.3 1.5 0 reflectance 0.4\n\
+    segment lamp 0.9 0.95 0.5 0.95 emit 10 reflectance 0\n";
+
+/// Mean radiosity of each wall, and the number of links.
+fn solve(epsilon: f64) -> (Vec<f64>, u64) {
+    let options = FlatOptions {
+        epsilon,
+        min_length_m: 0.2 * epsilon,
+        residual: 1e-7,
+        ..FlatOptions::default()
+    };
+    let mut session = FlatSession::new(Arc::new(parse(ROOM).unwrap()), options).unwrap();
+    let links = session.step(0, 0.0).links;
+    let (_, forest) = session.pairs();
+    let means = forest.facets().iter().map(|&f| f64::from(session.radiosity(f)[0])).collect();
+    (means, links)
+}
+
+/// With constant elements a link between elements of size h at distance d errs by a share of h / d, which
+/// the threshold bounds, and a threshold of e takes 1 / e^2 links: the error falls as the root of the
+/// number of links.
+#[test]
+fn the_error_of_wall_means_falls_with_the_number_of_links() {
+    let (reference, _) = solve(0.003);
+    let mut runs = Vec::new();
+    for epsilon in [0.2, 0.1, 0.05, 0.025, 0.0125] {
+        let (means, links) = solve(epsilon);
+        let squares = means.iter().zip(&reference).map(|(m, r)| ((m - r) / r.max(0.1)).powi(2));
+        let error = (squares.sum::<f64>() / means.len() as f64).sqrt();
+        println!("epsilon {epsilon}: {links} links, error {error:e}");
+        runs.push(((links as f64).ln(), error.ln()));
+    }
+    let (first, last) = (runs[0], runs[runs.len() - 1]);
+    let order = (first.1 - last.1) / (last.0 - first.0);
+    println!("order {order}");
+    assert!((0.45..0.8).contains(&order), "{order}");
+}

@@ -61,7 +61,8 @@ fn random_scene(dice: &mut Dice, bodies: usize, duration_s: f64) -> FlatScene {
             material.two_sided = dice.next() < 0.5;
             scene.wall("sheet", Segment::new(ends.0, ends.1), material).unwrap();
         } else {
-            let corner = |k| DVec2::from_angle(-6.283 * k as f64 / corners as f64) * size;
+            let corner =
+                |k| DVec2::from_angle(-std::f64::consts::TAU * k as f64 / corners as f64) * size;
             let corners: Vec<DVec2> = (0..corners).map(corner).collect();
             scene.polygon("side", &corners, material).unwrap();
         }

@@ -223,6 +223,10 @@ impl FlatSession {
         }
         solved.time_s = report.time_s;
         report.count(&changes.work);
+        if cold {
+            // There is nothing that they moved against.
+            report.dynamic_links = 0;
+        }
         self.tally(&mut report, &solved);
         report.seconds.total = clock.total();
         solved.report = report;

@@ -138,6 +138,22 @@ pub(crate) struct FlatArgs {
     /// Write every link event to this file (CSV).
     #[arg(long, value_name = "FILE")]
     pub(crate) events: Option<PathBuf>,
+    /// What to print.
+    #[arg(long, value_enum, value_name = "WHAT", conflicts_with = "verify")]
+    pub(crate) print: Option<FlatPrint>,
+}
+
+/// `relume flat --print`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FlatPrint {
+    /// The report, JSON: what is printed if there is no -o.
+    Report,
+    /// A line for each frame: counts, and the first digits of the hash.
+    Frames,
+    /// Mean radiosity of each wall in the last frame, W/m2.
+    Walls,
+    /// The link events, CSV.
+    Events,
 }
 
 /// `relume flat ...`

@@ -282,7 +282,7 @@ fn plot(points: &[[f64; 2]]) -> Drawing {
     let [x, y] = points[points.len() / 2];
     let line = |at: f64| place([at, y - 0.5 * (at - x)]);
     out.dashes(line(2.1), line(4.9), 5.0, Pen::new(1.2, GREY));
-    out.letters([LEFT + 300.0, TOP + 140.0], 9.0, "order 1/2", GREY);
+    out.letters([LEFT + 300.0, TOP + 132.0], 9.0, "order 1/2", GREY);
     for pair in points.windows(2) {
         out.stroke(place(pair[0]), place(pair[1]), Pen::new(1.4, BLUE));
     }

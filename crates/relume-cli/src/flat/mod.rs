@@ -3,6 +3,7 @@
 mod draw;
 mod figures;
 
+use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
@@ -13,7 +14,7 @@ use relume_picture::drawing::Pen;
 use relume_picture::export::write_atomically;
 use serde::Serialize;
 
-use crate::args::{FlatArgs, FlatCommand, UpdateChoice, UpdateFlag};
+use crate::args::{FlatArgs, FlatCommand, FlatPrint, UpdateChoice, UpdateFlag};
 use crate::events::EventTable;
 use crate::failure::Failure;
 use crate::frames::{resolve, time_of};
@@ -81,7 +82,7 @@ impl Run<'_> {
             epsilon: self.args.epsilon,
             min_length_m: self.args.min_length,
             update,
-            events: self.args.events.is_some(),
+            events: self.args.events.is_some() || self.args.print == Some(FlatPrint::Events),
             ..FlatOptions::default()
         })
     }
@@ -131,9 +132,15 @@ impl Run<'_> {
         if let Some(path) = &self.args.events {
             write(path, events.text())?;
         }
-        match &self.args.output {
-            Some(dir) => write(&dir.join("report.json"), &text),
-            None => output::print(&text),
+        if let Some(dir) = &self.args.output {
+            write(&dir.join("report.json"), &text)?;
+        }
+        match (self.args.print, &self.args.output) {
+            (None, Some(_)) => Ok(()),
+            (None | Some(FlatPrint::Report), _) => output::print(&text),
+            (Some(FlatPrint::Frames), _) => output::print(&lines(&reports)),
+            (Some(FlatPrint::Walls), _) => output::print(&walls(&session)),
+            (Some(FlatPrint::Events), _) => output::print(events.text()),
         }
     }
 
@@ -168,6 +175,40 @@ impl Run<'_> {
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {
     write_atomically(path, text.as_bytes()).map_err(|error| Failure::write(path, &error))
+}
+
+/// A line for each frame.
+fn lines(reports: &[FrameReport]) -> String {
+    let mut out = String::from(
+        "frame  links  elements  examined  extrapolated  demoted  promoted  occluded  hash\n",
+    );
+    for r in reports {
+        let _ = writeln!(
+            out,
+            "{:>5}  {:>5}  {:>8}  {:>8}  {:>12}  {:>7}  {:>8}  {:>8}  {}",
+            r.frame,
+            r.links,
+            r.elements,
+            r.examined,
+            r.extrapolated,
+            r.demoted,
+            r.promoted,
+            r.occlusion_changed,
+            &r.hash[..8]
+        );
+    }
+    out
+}
+
+/// Mean radiosities, red, of undivided elements.
+fn walls(session: &FlatSession) -> String {
+    let (_, forest) = session.pairs();
+    let mut out = String::new();
+    for &facet in forest.facets() {
+        let [red, ..] = session.radiosity(facet);
+        let _ = writeln!(out, "{:<12} {red:.4}", session.name(facet).short());
+    }
+    out
 }
 
 /// Widest side of a picture, pixels.

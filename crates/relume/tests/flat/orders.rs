@@ -6,7 +6,8 @@ use relume::flat::{FlatOptions, FlatSession, parse};
 
 /// A closed room with a lamp and a box: everything a scene has.
 const ROOM: &str = "polygon room 0 0 2 0 2 1 0 1 reflectance 0.6\n\
-    polygon box 1.2 0 1.2 0.3 1.5 0.3 1.5 0 reflectance 0.4\n\
+    segment left 1.2 0 1.2 0.3 reflectance 0.4\nsegment top 1.2 0.3 1.5 0.3 reflectance 0.4\n\
+    segment right 1.5 0.3 1.5 0 reflectance 0.4\n\
     segment lamp 0.9 0.95 0.5 0.95 emit 10 reflectance 0\n";
 
 /// Mean radiosity of each wall, and the number of links.

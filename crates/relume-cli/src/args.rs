@@ -128,6 +128,9 @@ pub(crate) struct FlatArgs {
     /// Elements up to this length are not refined, m.
     #[arg(long, value_name = "M", default_value = "0.02", allow_negative_numbers = true)]
     pub(crate) min_length: f64,
+    /// Elements are constant, as in the paper; otherwise links carry gradients.
+    #[arg(long)]
+    pub(crate) constant: bool,
     /// How the links follow the motion: `reinspect`, `scratch` (the same links) or
     /// `extrapolate[=N]`.
     #[arg(long, value_name = "STRATEGY", default_value = "reinspect")]

@@ -34,7 +34,7 @@ fn a_scene_gives_a_report_and_drawings() {
 
 #[test]
 fn every_scene_that_ships_agrees_with_cold_builds() {
-    for name in ["triangle", "wedge", "screen", "approach", "gutter", "room"] {
+    for name in ["triangle", "duct", "wedge", "screen", "approach", "gutter", "room"] {
         let file = scene(&format!("{name}.flat"));
         let ran = relume(&["flat", text(&file), "--verify", "--fps", "5", "--epsilon", "0.1"]);
         ran.says(&["equal: links bit for bit"]);

@@ -18,6 +18,7 @@ const WEDGE: &str = include_str!("../../scenes/wedge.flat");
 const SCREEN: &str = include_str!("../../scenes/screen.flat");
 const APPROACH: &str = include_str!("../../scenes/approach.flat");
 const GUTTER: &str = include_str!("../../scenes/gutter.flat");
+const DUCT: &str = include_str!("../../scenes/duct.flat");
 const ROOM: &str = include_str!("../../scenes/room.flat");
 
 /// Draws one figure into a directory; returns the names of the files.
@@ -227,13 +228,20 @@ fn count(session: &FlatSession, which: &str) -> u64 {
     session.link_events().iter().filter(|e| e.kind == kind).count() as u64
 }
 
-/// Error of the walls' mean radiosities against the number of links, both by powers of ten.
+/// Error of the walls' mean radiosities against the number of links, both by powers of ten: of a room
+/// with a box and a lamp, with constant elements and with gradients, and of one without shadows.
 fn convergence() -> Drawing {
-    let scene = scene(ROOM);
-    let means = |epsilon: f64| {
+    plot([&errors(ROOM, true), &errors(ROOM, false), &errors(DUCT, false)])
+}
+
+/// (links, error) by their logarithms, for ever lower thresholds.
+fn errors(text: &str, constant: bool) -> Vec<[f64; 2]> {
+    let scene = scene(text);
+    let means = |epsilon: f64, constant: bool| {
         let options = FlatOptions {
             epsilon,
             min_length_m: 0.2 * epsilon,
+            constant,
             residual: 1e-7,
             ..FlatOptions::default()
         };
@@ -243,49 +251,55 @@ fn convergence() -> Drawing {
         let mean = |&f: &ElementId| f64::from(session.radiosity(f)[0]);
         (forest.facets().iter().map(mean).collect::<Vec<f64>>(), links as f64)
     };
-    let (reference, _) = means(0.003);
-    let mut points = Vec::new();
-    for epsilon in [0.2, 0.14, 0.1, 0.07, 0.05, 0.035, 0.025, 0.0175, 0.0125] {
-        let (found, links) = means(epsilon);
+    let (reference, _) = means(0.003, false);
+    let point = |epsilon: f64| {
+        let (found, links) = means(epsilon, constant);
         let squares = found.iter().zip(&reference).map(|(m, r)| ((m - r) / r.max(0.1)).powi(2));
         let error = (squares.sum::<f64>() / found.len() as f64).sqrt();
-        points.push([libm::log10(links), libm::log10(error)]);
-    }
-    plot(&points)
+        [libm::log10(links), libm::log10(error)]
+    };
+    [0.2, 0.14, 0.1, 0.07, 0.05, 0.035, 0.025, 0.0175, 0.0125].map(point).to_vec()
 }
 
-fn plot(points: &[[f64; 2]]) -> Drawing {
-    const LEFT: f64 = 96.0;
-    const TOP: f64 = 40.0;
-    const DECADE: f64 = 140.0;
-    let mut out = Drawing::new(600, 390);
-    let place = |[x, y]: [f64; 2]| [LEFT + (x - 2.0) * DECADE, TOP + (-1.0 - y) * DECADE];
-    for decade in 0..=3 {
-        let k = f64::from(decade);
-        let (from, to) = (place([2.0 + k, -1.0]), place([2.0 + k, -3.0]));
-        out.stroke(from, to, Pen::new(0.8, [215; 3]));
-        out.letters([to[0] - 12.0, to[1] + 20.0], 9.0, &format!("10^{}", 2 + decade), BLACK);
-        if decade < 3 {
-            let (from, to) = (place([2.0, -1.0 - k]), place([5.0, -1.0 - k]));
-            out.stroke(from, to, Pen::new(0.8, [215; 3]));
-            out.letters(
-                [from[0] - 52.0, from[1] + 4.0],
-                9.0,
-                &format!("10^-{}", 1 + decade),
-                BLACK,
-            );
-        }
+const ORANGE: [u8; 3] = [225, 130, 20];
+
+/// Left end of the axis of links, upper end of that of errors, and the sizes of a decade, pixels.
+const AXES: [f64; 4] = [96.0, 40.0, 110.0, 58.0];
+
+fn plot([constant, shadows, none]: [&[[f64; 2]]; 3]) -> Drawing {
+    let [left, top, across, down] = AXES;
+    let mut out = Drawing::new(600, 460);
+    let place = |[x, y]: [f64; 2]| [left + (x - 1.0) * across, top + (-1.0 - y) * down];
+    let thin = Pen::new(0.8, [215; 3]);
+    for k in 0..=4 {
+        let (from, to) = (place([1.0 + f64::from(k), -1.0]), place([1.0 + f64::from(k), -7.0]));
+        out.stroke(from, to, thin);
+        out.letters([to[0] - 12.0, to[1] + 20.0], 9.0, &format!("10^{}", 1 + k), BLACK);
     }
-    out.letters([LEFT + 186.0, 372.0], 9.0, "links", BLACK);
+    for k in 0..=6 {
+        let (from, to) = (place([1.0, -1.0 - f64::from(k)]), place([5.0, -1.0 - f64::from(k)]));
+        out.stroke(from, to, thin);
+        out.letters([from[0] - 52.0, from[1] + 4.0], 9.0, &format!("10^-{}", 1 + k), BLACK);
+    }
+    out.letters([left + 200.0, 440.0], 9.0, "links", BLACK);
     out.letters([14.0, 22.0], 9.0, "error of wall means (RMS, relative)", BLACK);
-    // The order that is expected, through the middle point.
-    let [x, y] = points[points.len() / 2];
-    let line = |at: f64| place([at, y - 0.5 * (at - x)]);
-    out.dashes(line(2.1), line(4.9), 5.0, Pen::new(1.2, GREY));
-    out.letters([LEFT + 300.0, TOP + 132.0], 9.0, "order 1/2", GREY);
-    for pair in points.windows(2) {
-        out.stroke(place(pair[0]), place(pair[1]), Pen::new(1.4, BLUE));
+    // The orders that are expected, through the last points.
+    for (points, order, name) in [(constant, 0.5, "order 1/2"), (none, 1.0, "order 1")] {
+        let [x, y] = points[points.len() - 1];
+        let line = |at: f64| place([at, y - order * (at - x)]);
+        out.dashes(line(1.5), line(4.7), 5.0, Pen::new(1.0, GREY));
+        let [x, y] = line(4.7);
+        out.letters([x + 6.0, y + 6.0], 8.0, name, GREY);
     }
-    points.iter().for_each(|&p| out.disc(place(p), 3.4, BLUE));
+    for (points, colour, name) in
+        [(constant, ORANGE, "constant"), (shadows, PINK, "gradients"), (none, BLUE, "no shadows")]
+    {
+        for pair in points.windows(2) {
+            out.stroke(place(pair[0]), place(pair[1]), Pen::new(1.4, colour));
+        }
+        points.iter().for_each(|&p| out.disc(place(p), 3.2, colour));
+        let [x, y] = place(points[points.len() - 1]);
+        out.letters([x - 16.0, y - 9.0], 8.0, name, colour);
+    }
     out
 }

@@ -39,6 +39,7 @@ struct Report<'a> {
 struct Options {
     epsilon: f64,
     min_length_m: f64,
+    constant: bool,
     residual: f64,
     update: String,
     fps: f64,
@@ -81,6 +82,7 @@ impl Run<'_> {
         Ok(FlatOptions {
             epsilon: self.args.epsilon,
             min_length_m: self.args.min_length,
+            constant: self.args.constant,
             update,
             events: self.args.events.is_some() || self.args.print == Some(FlatPrint::Events),
             ..FlatOptions::default()
@@ -122,6 +124,7 @@ impl Run<'_> {
             options: Options {
                 epsilon: self.args.epsilon,
                 min_length_m: self.args.min_length,
+                constant: self.args.constant,
                 residual: FlatOptions::default().residual,
                 update: UpdateChoice::of(self.args.update).name(),
                 fps: self.args.fps,

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use glam::DVec2;
+
 use crate::element::{ElementId, ElementKey};
 use crate::event::{Lookahead, Tick};
 use crate::pair::{
@@ -78,6 +80,8 @@ pub(super) struct FlatPlaced<'a> {
     pub(super) epsilon: f64,
     /// Elements up to this length are not refined, m.
     pub(super) min_length_m: f64,
+    /// Links carry no gradients.
+    pub(super) constant: bool,
     pub(super) lookahead: Option<Lookahead>,
 }
 
@@ -210,6 +214,25 @@ fn passing(verdict: Verdict, margin: Margin) -> Judgement {
     Judgement { verdict, carried: Carried::default(), margin, segments: 0 }
 }
 
+/// How what arrives varies over both ends: the difference of their halves, exact, past all blockers.
+fn gradients(ends: &Ends, blockers: &[Segment]) -> Gradients {
+    let slope = |of: &Segment, other: &Segment| {
+        let half = |k: u32| {
+            let shaft = Shaft::new(&of.half(k), other);
+            shaft.map_or(0.0, |shaft| match blockers {
+                [] => shaft.exchange(),
+                _ => shaft.exchange_past(blockers).0,
+            })
+        };
+        let (first, second) = (half(0), half(1));
+        let both = first + second;
+        // Means of the halves are a radius apart.
+        let relative = if both > 0.0 { 2.0 * (second - first) / both } else { 0.0 };
+        (DVec2::new(relative, 0.0), 1.0)
+    };
+    Gradients::new(slope(&ends.a, &ends.b), slope(&ends.b, &ends.a))
+}
+
 impl FlatPlaced<'_> {
     fn are_elements(&self, a: ElementId, b: ElementId) -> bool {
         self.forest.is_element(a) && self.forest.is_element(b)
@@ -284,7 +307,10 @@ impl FlatPlaced<'_> {
         let carried = Carried {
             exchange_area_m2: exchange as f32,
             visibility: (visibility * 65_535.0).round() as u16,
-            gradients: Gradients::default(),
+            gradients: match self.constant {
+                true => Gradients::default(),
+                false => gradients(ends, &blockers),
+            },
         };
         Judgement { verdict: Verdict::Link, carried, margin, segments }
     }

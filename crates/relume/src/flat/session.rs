@@ -24,6 +24,8 @@ pub struct FlatOptions {
     pub epsilon: f64,
     /// Elements up to this length are not refined, m. Default 0.02.
     pub min_length_m: f64,
+    /// Whether elements are constant, as in the paper; otherwise links carry gradients. Default false.
+    pub constant: bool,
     /// Residual of the solver, relative to the mean radiosity, in (0, 1). Default 1e-5.
     pub residual: f64,
     /// How the pair tree follows the motion. [`Update::Certificate`] is not there yet.
@@ -37,6 +39,7 @@ impl Default for FlatOptions {
         FlatOptions {
             epsilon: 0.05,
             min_length_m: 0.02,
+            constant: false,
             residual: 1e-5,
             update: Update::Reinspect,
             events: false,
@@ -199,6 +202,7 @@ impl FlatSession {
             before: before.as_ref(),
             epsilon: self.options.epsilon,
             min_length_m: self.options.min_length_m,
+            constant: self.options.constant,
             lookahead,
         };
         let walls: Vec<u32> = (0..self.scene.walls().len() as u32).collect();
@@ -509,6 +513,10 @@ impl Surfaces for LitPlane<'_> {
             // The second axis is that of the symmetry: anything but 0.
             moment: [(length * length / 12.0) as f32, 0.0, 1.0],
         }
+    }
+
+    fn source_moment(&self) -> f32 {
+        1.0 / 3.0
     }
 
     fn lit(&self, facet: u32) -> &Lit {

@@ -291,15 +291,17 @@ fn plot([constant, shadows, none]: [&[[f64; 2]]; 3]) -> Drawing {
         let [x, y] = line(4.7);
         out.letters([x + 6.0, y + 6.0], 8.0, name, GREY);
     }
-    for (points, colour, name) in
-        [(constant, ORANGE, "constant"), (shadows, PINK, "gradients"), (none, BLUE, "no shadows")]
-    {
+    for (points, colour, name, below) in [
+        (constant, ORANGE, "constant", -9.0),
+        (shadows, PINK, "gradients", 18.0),
+        (none, BLUE, "no shadows", -9.0),
+    ] {
         for pair in points.windows(2) {
             out.stroke(place(pair[0]), place(pair[1]), Pen::new(1.4, colour));
         }
         points.iter().for_each(|&p| out.disc(place(p), 3.2, colour));
         let [x, y] = place(points[points.len() - 1]);
-        out.letters([x - 16.0, y - 9.0], 8.0, name, colour);
+        out.letters([x - 16.0, y + below], 8.0, name, colour);
     }
     out
 }

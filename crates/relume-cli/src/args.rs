@@ -90,6 +90,106 @@ pub(crate) enum Command {
     /// whatever else the machine does hits both alike: go by the ratios.
     #[command(after_help = "Example:  relume bench --demo room --frames 0-9 --json bench.json")]
     Bench(BenchArgs),
+    /// Solve a scene in the plane: what does not change along one direction, that direction integrated
+    /// out.
+    ///
+    /// SCENE is text, a line for each thing: `segment NAME X0 Y0 X1 Y1 [reflectance R] [emit M]
+    /// [two-sided]`, its front on the left from start to end; `polygon NAME X Y X Y X Y ...`, closed,
+    /// its fronts outside if its corners go clockwise; `body NAME`, to which the lines below
+    /// belong, with lines `at TIME X Y [DEGREES]` for where it is when. Metres, seconds; # begins a
+    /// comment. Without -o the report goes to stdout.
+    #[command(
+        after_help = "Example:  relume flat gutter.flat -o out --epsilon 0.1\n          relume flat figure 0.4 -o docs/figures"
+    )]
+    Flat(FlatArgs),
+}
+
+/// `relume flat`
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct FlatArgs {
+    #[command(subcommand)]
+    pub(crate) command: Option<FlatCommand>,
+    /// The scene, a text file.
+    #[arg(value_name = "SCENE", required = true)]
+    pub(crate) scene: Option<PathBuf>,
+    /// Directory for report.json and a drawing of each frame (SVG); made if missing.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Frames, inclusive: 0-24, 0-24x6 or 3,7 [default: the whole animation].
+    #[arg(long, value_name = "FRAMES")]
+    pub(crate) frames: Option<FrameSpec>,
+    /// Frames a second.
+    #[arg(long, value_name = "FPS", default_value = "24", value_parser = parse_fps, allow_negative_numbers = true)]
+    pub(crate) fps: f64,
+    /// Largest form factor of a link.
+    #[arg(long, value_name = "EPS", default_value = "0.05", allow_negative_numbers = true)]
+    pub(crate) epsilon: f64,
+    /// Elements up to this length are not refined, m.
+    #[arg(long, value_name = "M", default_value = "0.02", allow_negative_numbers = true)]
+    pub(crate) min_length: f64,
+    /// Elements are constant, as in the paper; otherwise links carry gradients.
+    #[arg(long)]
+    pub(crate) constant: bool,
+    /// How the links follow the motion: `reinspect`, `scratch` (the same links) or
+    /// `extrapolate[=N]`.
+    #[arg(long, value_name = "STRATEGY", default_value = "reinspect")]
+    pub(crate) update: UpdateFlag,
+    /// Compare every frame with one built from scratch instead; exit with 1 where they differ.
+    #[arg(long)]
+    pub(crate) verify: bool,
+    /// Write every link event to this file (CSV).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) events: Option<PathBuf>,
+    /// What to print.
+    #[arg(long, value_enum, value_name = "WHAT", conflicts_with = "verify")]
+    pub(crate) print: Option<FlatPrint>,
+}
+
+/// `relume flat --print`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FlatPrint {
+    /// The report, JSON: what is printed if there is no -o.
+    Report,
+    /// A line for each frame: counts, and the first digits of the hash.
+    Frames,
+    /// Mean radiosity of each wall in the last frame, W/m2.
+    Walls,
+    /// The link events, CSV.
+    Events,
+}
+
+/// `relume flat ...`
+#[derive(Debug, Subcommand)]
+pub(crate) enum FlatCommand {
+    /// Draw one of the paper's figures, as SVG and PNG.
+    Figure {
+        /// Which.
+        #[arg(value_enum)]
+        figure: FlatFigure,
+        /// Directory for the files; made if missing.
+        #[arg(short, long, value_name = "DIR", default_value = ".")]
+        output: PathBuf,
+    },
+}
+
+/// `relume flat figure`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FlatFigure {
+    /// Two walls at 45 degrees: the element hierarchy, and the links.
+    #[value(name = "0.1")]
+    Hierarchy,
+    /// Links that something comes between are kept, and restored.
+    #[value(name = "0.2")]
+    Occlusion,
+    /// Links are demoted as something approaches.
+    #[value(name = "0.3")]
+    Demotion,
+    /// A gutter that a patch approaches; also in motion (APNG), links coloured by what happens.
+    #[value(name = "0.4")]
+    Gutter,
+    /// Error against the number of links.
+    Convergence,
 }
 
 /// `relume demo`

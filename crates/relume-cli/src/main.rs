@@ -9,6 +9,7 @@ mod events;
 mod factors;
 mod failure;
 mod figures;
+mod flat;
 mod frames;
 mod info;
 mod interrupt;
@@ -48,6 +49,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Bench(args) => interrupt::listen().and_then(|()| bench::bench(&args)),
         Command::Factors(args) => interrupt::listen().and_then(|()| factors::factors(&args)),
         Command::Probe(args) => interrupt::listen().and_then(|()| probe::probe(&args)),
+        Command::Flat(args) => interrupt::listen().and_then(|()| flat::flat(&args)),
         Command::Solve(args) => interrupt::listen().and_then(|()| run::solve(args)),
         Command::Render(args) => interrupt::listen().and_then(|()| run::render(args)),
         Command::Demo(args) => interrupt::listen().and_then(|()| run::demo(args)),

@@ -2,5 +2,6 @@
 //!
 //! Nothing here is ever written back into the solution.
 
+pub mod drawing;
 pub mod export;
 pub mod picture;

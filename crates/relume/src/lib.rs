@@ -13,12 +13,14 @@
 //! | [`pair`] | the pair tree, oracles and verdicts |
 //! | [`solver`] | gather, push, pull, residual |
 //! | [`session`] | owns all state; runs the phases of a frame; snapshots out |
+//! | [`flat`] | the plane: another space for the same pairs, events and solver |
 
 // Tests may measure and compare with whatever the platform offers: what they compute decides nothing.
 #![cfg_attr(test, allow(clippy::disallowed_methods, clippy::disallowed_types))]
 
 pub mod element;
 pub mod event;
+pub mod flat;
 pub mod geometry;
 pub mod pair;
 pub mod scene;

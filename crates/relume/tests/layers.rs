@@ -7,8 +7,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms of the engine, from the ground up. A room may use those before it.
-const ROOMS: [&str; 8] =
-    ["geometry", "scene", "element", "transport", "event", "pair", "solver", "session"];
+const ROOMS: [&str; 9] =
+    ["geometry", "scene", "element", "transport", "event", "pair", "solver", "session", "flat"];
 
 /// The crates from the ground up, with the names they have in source text.
 const CRATES: [(&str, &str); 3] =

@@ -29,11 +29,18 @@ pub struct Event {
 
 /// The events of the last step, with names.
 pub(super) fn named(scene: &Scene, solved: &Solved) -> Vec<Event> {
+    let whole = |facet| name_of(scene, &solved.forest, ElementKey { facet, path: 1 });
+    with_names(&solved.events, &whole)
+}
+
+/// Events with names, from those of the facets.
+pub(crate) fn with_names(
+    events: &[crate::pair::LinkEvent],
+    whole: &dyn Fn(u32) -> ElementName,
+) -> Vec<Event> {
     let mut facets: BTreeMap<u32, ElementName> = BTreeMap::new();
-    let mut name = |key: ElementKey| {
-        let whole = || name_of(scene, &solved.forest, ElementKey { facet: key.facet, path: 1 });
-        facets.entry(key.facet).or_insert_with(whole).at(key.path)
-    };
+    let mut name =
+        |key: ElementKey| facets.entry(key.facet).or_insert_with(|| whole(key.facet)).at(key.path);
     let numbers = |c: Carried| (c.exchange_area_m2, c.visibility());
     let event = |e: &crate::pair::LinkEvent| Event {
         kind: e.kind,
@@ -42,5 +49,5 @@ pub(super) fn named(scene: &Scene, solved: &Solved) -> Vec<Event> {
         before: e.before.map(numbers),
         after: e.after.map(numbers),
     };
-    solved.events.iter().map(event).collect()
+    events.iter().map(event).collect()
 }

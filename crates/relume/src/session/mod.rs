@@ -35,6 +35,11 @@ pub use options::{Options, Oracle, Update};
 pub use report::{Energy, FrameReport, PairCounts, RowSumError, Seconds};
 pub use snapshot::{Leaf, Snapshot};
 
+// Flatland's session shares these.
+pub(crate) use events::with_names;
+pub(crate) use surfaces::{Receivers, apply_edits, links_of};
+pub(crate) use tally::balance_of;
+
 use coarse::Coarse;
 
 /// Why a frame could not be computed.
@@ -268,7 +273,7 @@ pub struct Memory {
 }
 
 /// Wall-clock time of the phases; it labels reports and decides nothing.
-struct Clock {
+pub(crate) struct Clock {
     start: Instant,
     lap: Instant,
 }
@@ -276,20 +281,20 @@ struct Clock {
 // The session times its phases for the report; no result uses it.
 #[allow(clippy::disallowed_methods)]
 impl Clock {
-    fn start() -> Clock {
+    pub(crate) fn start() -> Clock {
         let now = Instant::now();
         Clock { start: now, lap: now }
     }
 
     /// Seconds since the last lap.
-    fn lap(&mut self) -> f64 {
+    pub(crate) fn lap(&mut self) -> f64 {
         let now = Instant::now();
         let seconds = (now - self.lap).as_secs_f64();
         self.lap = now;
         seconds
     }
 
-    fn total(&self) -> f64 {
+    pub(crate) fn total(&self) -> f64 {
         self.start.elapsed().as_secs_f64()
     }
 }

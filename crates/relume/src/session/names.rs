@@ -60,7 +60,7 @@ fn steps(path: u32) -> Vec<u8> {
 
 impl ElementName {
     /// The element at a path below this facet.
-    pub(super) fn at(&self, below: u32) -> ElementName {
+    pub(crate) fn at(&self, below: u32) -> ElementName {
         let mut out = self.clone();
         if let ElementName::Element { path, .. } = &mut out {
             *path = steps(below);

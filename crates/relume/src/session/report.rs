@@ -126,7 +126,7 @@ pub struct Seconds {
 
 impl FrameReport {
     /// Takes over the counts of an update.
-    pub(super) fn count(&mut self, work: &Work) {
+    pub(crate) fn count(&mut self, work: &Work) {
         self.visited = work.visited;
         self.examined = work.examined;
         self.followed = work.followed;
@@ -146,7 +146,7 @@ impl FrameReport {
     }
 
     /// The report of a frame in which nothing changed: the state as it was, and no work.
-    pub(super) fn of_a_still_frame(&self, label: FrameReport) -> FrameReport {
+    pub(crate) fn of_a_still_frame(&self, label: FrameReport) -> FrameReport {
         FrameReport {
             elements: self.elements,
             leaves: self.leaves,

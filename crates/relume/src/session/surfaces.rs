@@ -102,16 +102,40 @@ impl Surfaces for LitForest<'_> {
     }
 }
 
+/// Who receives over links: all that turning pairs into links asks of a hierarchy.
+pub(crate) trait Receivers {
+    /// Room for elements: ids are below this.
+    fn room(&self) -> usize;
+    /// Whether light is gathered there: an element, not a light.
+    fn receives(&self, id: ElementId) -> bool;
+    /// Area, m2.
+    fn receiving_area_m2(&self, id: ElementId) -> f64;
+}
+
+impl Receivers for Forest {
+    fn room(&self) -> usize {
+        self.len()
+    }
+
+    fn receives(&self, id: ElementId) -> bool {
+        self.kind(id) == Kind::Element
+    }
+
+    fn receiving_area_m2(&self, id: ElementId) -> f64 {
+        self.area_m2(id)
+    }
+}
+
 /// Both directions of a link: (receiver, link), for the ends that receive. Links of visibility 0
 /// carry nothing.
-fn directions(forest: &Forest, link: &pair::Link) -> impl Iterator<Item = (u32, Link)> {
+fn directions(forest: &impl Receivers, link: &pair::Link) -> impl Iterator<Item = (u32, Link)> {
     let carried = link.carried;
     let exchange = carried.exchange_area_past_occluders_m2();
     let g = carried.gradients;
     let one = |receiver: ElementId, source: ElementId, over_receiver, over_source| {
-        let receives = forest.kind(receiver) == Kind::Element && exchange > 0.0;
+        let receives = forest.receives(receiver) && exchange > 0.0;
         receives.then(|| {
-            let coupling = exchange / forest.area_m2(receiver) as f32;
+            let coupling = exchange / forest.receiving_area_m2(receiver) as f32;
             (receiver.0, Link { source: source.0, coupling, over_receiver, over_source })
         })
     };
@@ -121,8 +145,8 @@ fn directions(forest: &Forest, link: &pair::Link) -> impl Iterator<Item = (u32, 
 }
 
 /// All links of a tree, by receiver.
-pub(super) fn links_of(forest: &Forest, tree: &PairTree) -> Links {
-    let mut builder = LinksBuilder::new(forest.len());
+pub(crate) fn links_of(forest: &impl Receivers, tree: &PairTree) -> Links {
+    let mut builder = LinksBuilder::new(forest.room());
     for link in tree.links() {
         directions(forest, &link).for_each(|(receiver, _)| builder.count(receiver));
     }
@@ -134,8 +158,8 @@ pub(super) fn links_of(forest: &Forest, tree: &PairTree) -> Links {
 }
 
 /// Sets both directions of a pair to what it carries now; returns the receivers concerned.
-pub(super) fn set_pair(links: &mut Links, forest: &Forest, pair: &pair::Link) {
-    links.extend(forest.len());
+pub(super) fn set_pair(links: &mut Links, forest: &impl Receivers, pair: &pair::Link) {
+    links.extend(forest.room());
     if pair.carried.exchange_area_past_occluders_m2() > 0.0 {
         directions(forest, pair).for_each(|(receiver, link)| links.set(receiver, link));
     } else {
@@ -150,13 +174,13 @@ pub(super) fn remove_pair(links: &mut Links, a: ElementId, b: ElementId) {
 }
 
 /// Carries edits of a tree over to its links; returns the receivers concerned, ascending.
-pub(super) fn apply_edits(
+pub(crate) fn apply_edits(
     links: &mut Links,
-    forest: &Forest,
+    forest: &impl Receivers,
     tree: &PairTree,
     edits: &[Edit],
 ) -> Vec<u32> {
-    links.extend(forest.len());
+    links.extend(forest.room());
     let mut receivers = Vec::with_capacity(2 * edits.len());
     for edit in edits {
         let (a, b) = match *edit {
@@ -172,7 +196,7 @@ pub(super) fn apply_edits(
                 (a, b)
             }
         };
-        receivers.extend([a, b].iter().filter(|&&e| forest.kind(e) == Kind::Element).map(|e| e.0));
+        receivers.extend([a, b].iter().filter(|&&e| forest.receives(e)).map(|e| e.0));
     }
     links.tidy();
     receivers.sort_unstable();

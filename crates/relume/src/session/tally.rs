@@ -3,7 +3,7 @@
 use crate::element::{ElementId, Forest, Kind};
 use crate::pair::PairTree;
 use crate::scene::{BodyId, LightKind, Scene};
-use crate::solver::{Surfaces, row_sums};
+use crate::solver::{Links, Radiosity, Surfaces, row_sums};
 
 use super::Solved;
 use super::report::{Energy, FrameReport, PairCounts, RowSumError};
@@ -49,27 +49,43 @@ pub(super) fn dynamic_links(
 fn balance(scene: &Scene, solved: &Solved) -> (RowSumError, Energy) {
     let forest = &solved.forest;
     let surfaces = LitForest::new(scene, forest);
+    let present = |facet: &ElementId| {
+        let patch = forest.patch(*facet).expect("has a patch");
+        solved.view.is_present(scene.patches[patch.0 as usize].body)
+    };
+    let facets = forest.facets().iter().copied().filter(present);
+    let is_surface = |id: u32| forest.kind(ElementId(id)) == Kind::Element;
+    let lit = (&solved.links, &solved.radiosity);
+    let (rows, mut energy) = balance_of(&surfaces, lit, facets, &is_surface);
+    let lights = lights_w(scene, solved);
+    energy.emitted_w += lights.0;
+    energy.escaped_w += lights.0 - lights.1;
+    (rows, energy)
+}
+
+/// Row sums and energies of some facets.
+pub(crate) fn balance_of(
+    surfaces: &impl Surfaces,
+    (links, radiosity): (&Links, &Radiosity),
+    facets: impl Iterator<Item = ElementId>,
+    is_surface: &dyn Fn(u32) -> bool,
+) -> (RowSumError, Energy) {
     let mut rows = RowSumError::default();
     let mut energy = Energy::default();
     let mut area = 0.0;
-    let is_surface = |id: u32| forest.kind(ElementId(id)) == Kind::Element;
     let mut sums = Vec::new();
-    for facet in forest.facets() {
-        let patch = &scene.patches[forest.patch(*facet).expect("has a patch").0 as usize];
-        if !solved.view.is_present(patch.body) {
-            continue;
-        }
+    for facet in facets {
         let lit = surfaces.lit(facet.0);
         sums.clear();
-        row_sums(&surfaces, &solved.links, &is_surface, facet.0, &mut |_, sum| sums.push(sum));
+        row_sums(surfaces, links, is_surface, facet.0, &mut |_, sum| sums.push(sum));
         let mut next = sums.iter();
-        solved.radiosity.irradiances(&surfaces, facet.0, &mut |id, h| {
-            let a = forest.area_m2(ElementId(id));
+        radiosity.irradiances(surfaces, facet.0, &mut |id, h| {
+            let a = surfaces.area_m2(id);
             let off = f64::from(*next.next().expect("the same leaves")) - 1.0;
             rows.rms += a * off * off;
             rows.max = rows.max.max(off.abs());
             area += a;
-            let b = solved.radiosity.radiosity(id);
+            let b = radiosity.radiosity(id);
             for c in 0..3 {
                 energy.emitted_w += a * f64::from(lit.exitance[c]);
                 energy.absorbed_w += a * f64::from((1.0 - lit.reflectance[c]) * h.mean[c].max(0.0));
@@ -78,9 +94,6 @@ fn balance(scene: &Scene, solved: &Solved) -> (RowSumError, Energy) {
         });
     }
     rows.rms = if area > 0.0 { (rows.rms / area).sqrt() } else { 0.0 };
-    let lights = lights_w(scene, solved);
-    energy.emitted_w += lights.0;
-    energy.escaped_w += lights.0 - lights.1;
     (rows, energy)
 }
 

@@ -18,7 +18,10 @@ pub(super) fn gather_some<S: Simd>(
     for (&id, h) in receivers.iter().zip(out) {
         *h = match links.of(id) {
             [] => Linear::default(),
-            list => gather_one(simd, radiosity, list, 1.0 / surfaces.place(id).radius),
+            list => {
+                let scales = (1.0 / surfaces.place(id).radius, surfaces.source_moment());
+                gather_one(simd, radiosity, list, scales)
+            }
         };
     }
 }
@@ -27,7 +30,12 @@ pub(super) fn gather_some<S: Simd>(
 ///
 /// Four lanes at a time: red, green, blue and one of no meaning, the number next in memory.
 #[inline(always)]
-fn gather_one<S: Simd>(simd: S, radiosity: &Field, list: &[Link], per_radius: f32) -> Linear {
+fn gather_one<S: Simd>(
+    simd: S,
+    radiosity: &Field,
+    list: &[Link],
+    (per_radius, source_moment): (f32, f32),
+) -> Linear {
     let zero = f32x4::splat(simd, 0.0);
     let (mut mean, mut gx, mut gy) = (zero, zero, zero);
     for link in list {
@@ -36,7 +44,7 @@ fn gather_one<S: Simd>(simd: S, radiosity: &Field, list: &[Link], per_radius: f3
         let arriving = lanes(0) * link.coupling;
         let [su, sv] = link.source_gradient();
         let uneven = lanes(3) * su + lanes(6) * sv;
-        mean += arriving + uneven * (link.coupling * SOURCE_MOMENT);
+        mean += arriving + uneven * (link.coupling * source_moment);
         let [ru, rv] = link.receiver_gradient();
         gx += arriving * ru;
         gy += arriving * rv;
@@ -48,6 +56,3 @@ fn gather_one<S: Simd>(simd: S, radiosity: &Field, list: &[Link], per_radius: f3
     };
     Linear { mean: three(mean, 1.0), gradient: [three(gx, per_radius), three(gy, per_radius)] }
 }
-
-/// Mean of x^2 / radius^2 over an element, for the product of two gradients: 1/6 for a square.
-const SOURCE_MOMENT: f32 = 1.0 / 6.0;

@@ -46,6 +46,10 @@ pub trait Surfaces: Sync {
     fn place(&self, id: u32) -> Place;
     /// What a facet is made of.
     fn lit(&self, facet: u32) -> &Lit;
+    /// Mean of x^2 / radius^2 over an element, for the product of two gradients: 1/6 for a square.
+    fn source_moment(&self) -> f32 {
+        1.0 / 6.0
+    }
 }
 
 pub(super) fn for_each_below(surfaces: &impl Surfaces, id: u32, visit: &mut dyn FnMut(u32)) {

@@ -1,0 +1,97 @@
+//! `relume flat`: reports, comparison with cold builds, figures, messages.
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use common::{json, relume, text};
+use tempfile::TempDir;
+
+fn scene(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)
+}
+
+#[test]
+fn a_scene_gives_a_report_and_drawings() {
+    let dir = TempDir::new().unwrap();
+    let (out, events) = (dir.path().join("out"), dir.path().join("events.csv"));
+    let room = scene("room.flat");
+    let arguments = ["flat", text(&room), "-o", text(&out), "--events", text(&events)];
+    relume(&[&arguments[..], &["--frames", "0-24x12", "--epsilon", "0.1"]].concat()).succeeds();
+    let report = json(&out.join("report.json"));
+    assert_eq!(report["schema"], "relume-flat/1");
+    assert_eq!(report["segments"], 8);
+    let frames = report["frames"].as_array().unwrap();
+    assert_eq!(frames.len(), 3);
+    assert_eq!(frames[1]["moved"][0], "lamp");
+    assert!(frames[2]["examined"].as_u64() < frames[0]["examined"].as_u64());
+    let svg = fs::read_to_string(out.join("frame-0024.svg")).unwrap();
+    assert!(svg.starts_with("<svg") && svg.contains("#e23c8e"), "no links are drawn");
+    let events = fs::read_to_string(events).unwrap();
+    assert!(events.lines().any(|line| line.starts_with("24,demoted,")), "{events}");
+}
+
+#[test]
+fn every_scene_that_ships_agrees_with_cold_builds() {
+    for name in ["triangle", "duct", "wedge", "screen", "approach", "gutter", "room"] {
+        let file = scene(&format!("{name}.flat"));
+        let ran = relume(&["flat", text(&file), "--verify", "--fps", "5", "--epsilon", "0.1"]);
+        ran.says(&["equal: links bit for bit"]);
+    }
+    // What is extrapolated is not a function of the instant, and that is found out.
+    let gutter = scene("gutter.flat");
+    relume(&["flat", text(&gutter), "--verify", "--update", "extrapolate"]).fails(1, &["differs"]);
+}
+
+#[test]
+fn the_figures_kept_are_those_the_command_draws() {
+    let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/figures");
+    let dir = TempDir::new().unwrap();
+    for figure in ["0.1", "0.2", "0.3", "0.4"] {
+        let ran = relume(&["flat", "figure", figure, "-o", text(dir.path())]).succeeds();
+        for name in ran.out.lines() {
+            let (new, old) = (dir.path().join(name), kept.join(name));
+            let bytes = |path: &Path| fs::read(path).unwrap_or_default();
+            let same = name.ends_with(".png") || bytes(&new) == bytes(&old);
+            assert!(same, "draw it anew: relume flat figure {figure} -o docs/figures");
+            assert!(old.exists() && bytes(&new).len() > 1000, "{name}");
+        }
+    }
+}
+
+/// Runs what the tutorial says, in the directory of the scenes, and compares what it prints.
+#[test]
+fn the_tutorial_is_right() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let tutorial = fs::read_to_string(root.join("../../docs/tutorial.md")).unwrap();
+    let mut blocks = 0;
+    for block in tutorial.split("```console\n").skip(1) {
+        let block = block.split("```").next().unwrap();
+        let (command, expected) = block.split_once('\n').unwrap();
+        let words = command.strip_prefix("$ relume ").expect("a command").split_whitespace();
+        let ran = std::process::Command::new(env!("CARGO_BIN_EXE_relume"))
+            .args(words)
+            .current_dir(root.join("scenes"))
+            .output()
+            .unwrap();
+        assert_eq!(String::from_utf8(ran.stdout).unwrap(), expected, "{command}");
+        blocks += 1;
+    }
+    assert!(blocks >= 8, "{blocks}");
+}
+
+#[test]
+fn messages_say_where_and_what() {
+    let dir = TempDir::new().unwrap();
+    let file = dir.path().join("wrong.flat");
+    fs::write(&file, "segment floor 0 0 1 0\nsegment wall 0 1\n").unwrap();
+    relume(&["flat", text(&file)]).fails(1, &["line 2", "`wall`", "x0 y0 x1 y1"]);
+    let gutter = scene("gutter.flat");
+    let with = |more: &[&str]| relume(&[&["flat", text(&gutter)], more].concat());
+    with(&["--epsilon", "2"]).fails(2, &["between 0 and 1"]);
+    with(&["--update", "certificate"]).fails(2, &["use reinspect"]);
+    with(&["--frames", "9999"]).fails(2, &["outside the animation"]);
+    relume(&["flat"]).fails(2, &["<SCENE>"]);
+    relume(&["flat", "figure", "0.9"]).fails(2, &["0.1", "0.4"]);
+}

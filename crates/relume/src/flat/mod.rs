@@ -1,0 +1,26 @@
+//! Flatland: scenes that do not change along one direction, with that direction integrated out.
+//!
+//! Surfaces become segments in the plane, elements halves of halves of them, and what two segments
+//! exchange has a closed form, occlusion included (Hottel's crossed strings). Pair tree, verdict
+//! bookkeeping, events, extrapolation, hash and solver are those of space: this room hands them another
+//! [`Hierarchy`](crate::pair::Hierarchy), another [`Judge`](crate::pair::Judge) and other
+//! [`Surfaces`](crate::solver::Surfaces), and knows nothing of glTF, polygons or pictures.
+//!
+//! All quantities are per metre of the direction that was integrated out: an "area" is a length, m2 for
+//! each metre of depth.
+
+mod forest;
+mod judge;
+mod plane;
+mod scene;
+mod session;
+mod strings;
+mod text;
+
+pub use forest::FlatForest;
+pub use judge::PlaneView;
+pub use plane::{PlanePose, Segment};
+pub use scene::{Body, BodyIndex, FlatScene, Key, Material, Motion, SceneError, Wall, WallIndex};
+pub use session::{FlatElement, FlatLink, FlatOptions, FlatSession, OptionError, RadiosityGap};
+pub use strings::{Shaft, exchange, visible_exchange};
+pub use text::{TextError, parse};

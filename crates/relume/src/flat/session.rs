@@ -1,0 +1,525 @@
+//! The session of the plane: owns all state, runs the phases of a frame.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use crate::element::{ElementId, ElementKey};
+use crate::event::{Lookahead, Ticks};
+use crate::pair::{Carried, LinkEvent, PairHash, PairTree, Record, update};
+use crate::session::{
+    Clock, ElementName, Event, FrameReport, PairCounts, Receivers, Update, apply_edits, balance_of,
+    links_of, with_names,
+};
+use crate::solver::{Dirty, Links, Lit, Place, Radiosity, Stop, Surfaces};
+
+use super::forest::FlatForest;
+use super::judge::{FlatPlaced, PlaneView};
+use super::plane::Segment;
+use super::scene::{FlatScene, SceneError};
+
+/// How a scene in the plane is solved.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FlatOptions {
+    /// Largest form factor of a link, in (0, 1). Default 0.05.
+    pub epsilon: f64,
+    /// Elements up to this length are not refined, m. Default 0.02.
+    pub min_length_m: f64,
+    /// Whether elements are constant, as in the paper; otherwise links carry gradients. Default false.
+    pub constant: bool,
+    /// Residual of the solver, relative to the mean radiosity, in (0, 1). Default 1e-5.
+    pub residual: f64,
+    /// How the pair tree follows the motion. [`Update::Certificate`] is not there yet.
+    pub update: Update,
+    /// Whether every step keeps the events of its links, for [`FlatSession::events`].
+    pub events: bool,
+}
+
+impl Default for FlatOptions {
+    fn default() -> FlatOptions {
+        FlatOptions {
+            epsilon: 0.05,
+            min_length_m: 0.02,
+            constant: false,
+            residual: 1e-5,
+            update: Update::Reinspect,
+            events: false,
+        }
+    }
+}
+
+/// An option out of its range, or a scene that cannot be solved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OptionError {
+    /// A threshold out of range.
+    #[error("{0} is {1}: it must lie between 0 and 1")]
+    Range(&'static str, f64),
+    /// A length that is none.
+    #[error("the smallest length is {0} m: it must not be negative")]
+    Length(f64),
+    /// A strategy that the plane does not have.
+    #[error("certificates are not there in the plane yet: use reinspect, which has the same links")]
+    Certificate,
+    /// Extrapolation over too many frames.
+    #[error("extrapolate={0}: frames ahead must be 1 to 255")]
+    Frames(u32),
+    /// The scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+}
+
+impl FlatOptions {
+    fn check(&self) -> Result<(), OptionError> {
+        for (name, value) in [("epsilon", self.epsilon), ("the residual", self.residual)] {
+            if !(value > 0.0 && value < 1.0) {
+                return Err(OptionError::Range(name, value));
+            }
+        }
+        if !(self.min_length_m >= 0.0 && self.min_length_m.is_finite()) {
+            return Err(OptionError::Length(self.min_length_m));
+        }
+        match self.update {
+            Update::Certificate => Err(OptionError::Certificate),
+            Update::Extrapolate { frames, .. } if !(1..=255).contains(&frames) => {
+                Err(OptionError::Frames(frames))
+            }
+            Update::Extrapolate { error: Some(error), .. } if !(error > 0.0 && error < 1.0) => {
+                Err(OptionError::Range("the error of extrapolation", error))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A link of the plane; it carries light both ways.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlatLink {
+    /// First end.
+    pub a: ElementId,
+    /// Second end.
+    pub b: ElementId,
+    /// Exchange area without occlusion (m2 for each metre of depth) and visibility.
+    pub carried: Carried,
+}
+
+/// An element of the plane as pictures need it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlatElement {
+    /// Its id in the present solution.
+    pub id: ElementId,
+    /// Where it is in the world.
+    pub place: Segment,
+    /// Levels below its facet.
+    pub level: u32,
+    /// Whether it has no children.
+    pub is_leaf: bool,
+    /// Radiosity, W/m2.
+    pub radiosity: [f32; 3],
+}
+
+/// By how much the radiosities of two solutions differ.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RadiosityGap {
+    /// Largest difference of a leaf's radiosity, W/m2.
+    pub largest: f64,
+    /// What the residuals of both allow, W/m2.
+    pub allowed: f64,
+}
+
+/// One scene in the plane being solved, frame by frame.
+pub struct FlatSession {
+    scene: Arc<FlatScene>,
+    options: FlatOptions,
+    seed: FlatForest,
+    solved: Option<Solved>,
+}
+
+struct Solved {
+    time_s: f64,
+    forest: FlatForest,
+    view: PlaneView,
+    ticks: Ticks,
+    tree: PairTree,
+    hash: PairHash,
+    links: Links,
+    radiosity: Radiosity,
+    events: Vec<LinkEvent>,
+    report: FrameReport,
+}
+
+/// Share of the pairs' room that may be vacant.
+const VACANT_PAIRS: usize = 16;
+
+impl FlatSession {
+    /// Prepares a scene for solving.
+    ///
+    /// # Errors
+    /// If an option is out of its range or the scene has nothing to solve.
+    pub fn new(scene: Arc<FlatScene>, options: FlatOptions) -> Result<FlatSession, OptionError> {
+        options.check()?;
+        scene.check()?;
+        let seed = FlatForest::new(&scene);
+        Ok(FlatSession { scene, options, seed, solved: None })
+    }
+
+    /// The scene being solved.
+    pub fn scene(&self) -> &FlatScene {
+        &self.scene
+    }
+
+    /// Brings the solution to `time_s`; `frame` only labels the report. Any time may follow any other:
+    /// the links are those of a cold build at `time_s`, bit for bit, unless they are extrapolated.
+    pub fn step(&mut self, frame: u32, time_s: f64) -> FrameReport {
+        let last = self.solved.take().filter(|_| self.options.update != Update::Scratch);
+        let label = FrameReport { frame, time_s, ..FrameReport::default() };
+        let view = PlaneView::new(&self.scene, time_s);
+        let solved = match last {
+            Some(last) if last.view == view => {
+                let report = last.report.of_a_still_frame(label);
+                Solved { time_s, report, events: Vec::new(), ..last }
+            }
+            last => rayon::scope(|_| self.advance(last, view, label)),
+        };
+        let report = solved.report.clone();
+        self.solved = Some(solved);
+        report
+    }
+
+    fn advance(&self, last: Option<Solved>, view: PlaneView, mut report: FrameReport) -> Solved {
+        let mut clock = Clock::start();
+        let cold = last.is_none();
+        let mut solved = last.unwrap_or_else(|| self.blank(report.time_s));
+        let before = (!cold).then(|| std::mem::take(&mut solved.view));
+        solved.view = view;
+        if let Some(before) = &before {
+            report.moved = self.moved(before, &solved.view);
+        }
+        let lookahead = if cold { None } else { self.look_ahead(&mut solved, report.time_s) };
+        report.seconds.moving = clock.lap();
+        let mut placed = FlatPlaced {
+            scene: &self.scene,
+            forest: &mut solved.forest,
+            now: &solved.view,
+            before: before.as_ref(),
+            epsilon: self.options.epsilon,
+            min_length_m: self.options.min_length_m,
+            constant: self.options.constant,
+            lookahead,
+        };
+        let walls: Vec<u32> = (0..self.scene.walls().len() as u32).collect();
+        let record = Record { edits: !cold, events: !cold && self.options.events };
+        let tree = (&mut solved.tree, &mut solved.hash);
+        let changes = update(tree, &mut placed, &walls, (record, &[]), &|_, _, _| true)
+            .expect("no limit was set");
+        solved.events = changes.events;
+        report.seconds.evaluate = clock.lap();
+        let dirty = self.edit_links(&mut solved, &changes.edits, cold, &mut report);
+        report.seconds.judge = clock.lap();
+        let lit = LitPlane::new(&self.scene, &solved.forest);
+        if lit.is_dark() {
+            solved.radiosity = Radiosity::new(&lit);
+        } else {
+            let stop = Stop::Residual(self.options.residual);
+            solved.radiosity.solve(&lit, &solved.links, dirty, stop);
+        }
+        report.seconds.solve = clock.lap();
+        if solved.tree.vacant_len() * VACANT_PAIRS > solved.tree.len() {
+            solved.tree.compact();
+        }
+        solved.time_s = report.time_s;
+        report.count(&changes.work);
+        if cold {
+            // There is nothing that they moved against.
+            report.dynamic_links = 0;
+        }
+        self.tally(&mut report, &solved);
+        report.seconds.total = clock.total();
+        solved.report = report;
+        solved
+    }
+
+    fn blank(&self, time_s: f64) -> Solved {
+        Solved {
+            time_s,
+            forest: self.seed.clone(),
+            view: PlaneView::default(),
+            ticks: Ticks::default(),
+            tree: PairTree::new(FlatForest::ROOT),
+            hash: PairHash::default(),
+            links: Links::default(),
+            radiosity: Radiosity::default(),
+            events: Vec::new(),
+            report: FrameReport::default(),
+        }
+    }
+
+    fn moved(&self, before: &PlaneView, now: &PlaneView) -> Vec<String> {
+        let poses = before.poses().iter().zip(now.poses());
+        let moved = poses.zip(self.scene.bodies()).filter(|((one, two), _)| one != two);
+        moved.map(|(_, body)| body.name.clone()).collect()
+    }
+
+    /// What the paper's strategy extrapolates with.
+    fn look_ahead(&self, solved: &mut Solved, time_s: f64) -> Option<Lookahead> {
+        let Update::Extrapolate { frames, error } = self.options.update else { return None };
+        if solved.ticks.go(solved.time_s, time_s) {
+            solved.tree.forget_predictions();
+        }
+        let frame_s = solved.ticks.length_s();
+        solved.ticks.runs().then_some(Lookahead { now_s: time_s, frame_s, frames, error })
+    }
+
+    fn edit_links(
+        &self,
+        solved: &mut Solved,
+        edits: &[crate::pair::Edit],
+        cold: bool,
+        report: &mut FrameReport,
+    ) -> Dirty {
+        let Solved { links, forest, tree, radiosity, .. } = solved;
+        let receivers = match cold {
+            true => {
+                *links = links_of(forest, tree);
+                None
+            }
+            false => Some(apply_edits(links, forest, tree, edits)),
+        };
+        report.elements_reaped = forest.reap();
+        let parents = forest.take_changed();
+        let lit = LitPlane::new(&self.scene, forest);
+        let Some(mut receivers) = receivers else {
+            *radiosity = Radiosity::new(&lit);
+            return Dirty::All;
+        };
+        radiosity.extend(forest.len());
+        parents.iter().for_each(|&parent| radiosity.inherit(&lit, parent));
+        receivers.retain(|&id| forest.is_element(ElementId(id)));
+        Dirty::Some { receivers, parents }
+    }
+
+    fn tally(&self, report: &mut FrameReport, solved: &Solved) {
+        let counts = solved.tree.counts();
+        report.hash = solved.hash.to_string();
+        report.links = counts.active;
+        report.pairs =
+            PairCounts { active: counts.active, refined: counts.refined, culled: counts.culled };
+        report.elements = solved.forest.element_count();
+        report.leaves = solved.forest.leaf_count();
+        report.sweeps = solved.radiosity.sweeps;
+        report.gathers = solved.radiosity.gathers;
+        report.residual = solved.radiosity.residual;
+        let surfaces = LitPlane::new(&self.scene, &solved.forest);
+        let facets = solved.forest.facets().iter().copied();
+        let lit = (&solved.links, &solved.radiosity);
+        let (rows, energy) = balance_of(&surfaces, lit, facets, &|_| true);
+        (report.row_sum_error, report.energy) = (Some(rows), Some(energy));
+    }
+
+    fn now(&self) -> &Solved {
+        self.solved.as_ref().expect("a step comes before a look at the solution")
+    }
+
+    /// The pair tree of the present solution, with the forest its elements are in.
+    ///
+    /// # Panics
+    /// Before the first [`FlatSession::step`].
+    pub fn pairs(&self) -> (&PairTree, &FlatForest) {
+        (&self.now().tree, &self.now().forest)
+    }
+
+    /// Where everything is in the present solution.
+    ///
+    /// # Panics
+    /// Before the first [`FlatSession::step`].
+    pub fn view(&self) -> &PlaneView {
+        &self.now().view
+    }
+
+    /// All links, in the order of their names.
+    ///
+    /// # Panics
+    /// Before the first [`FlatSession::step`].
+    pub fn links(&self) -> Vec<FlatLink> {
+        let solved = self.now();
+        let link = |l: crate::pair::Link| FlatLink { a: l.a, b: l.b, carried: l.carried };
+        let mut out: Vec<FlatLink> = solved.tree.links().map(link).collect();
+        out.sort_by_key(|l| (solved.forest.key(l.a), solved.forest.key(l.b)));
+        out
+    }
+
+    /// All elements, parents before children, in the order of their names.
+    ///
+    /// # Panics
+    /// Before the first [`FlatSession::step`].
+    pub fn elements(&self) -> Vec<FlatElement> {
+        let Solved { forest, view, radiosity, .. } = self.now();
+        let element = |id: ElementId| FlatElement {
+            id,
+            place: view.place(forest, id),
+            level: forest.level(id),
+            is_leaf: forest.children(id).is_empty(),
+            radiosity: radiosity.radiosity(id.0),
+        };
+        forest.elements().into_iter().map(element).collect()
+    }
+
+    /// Radiosity of an element, W/m2.
+    ///
+    /// # Panics
+    /// Before the first [`FlatSession::step`].
+    pub fn radiosity(&self, id: ElementId) -> [f32; 3] {
+        self.now().radiosity.radiosity(id.0)
+    }
+
+    /// The events that led to the present solution, with names, if [`FlatOptions::events`] asks for them.
+    ///
+    /// # Panics
+    /// Before the first [`FlatSession::step`].
+    pub fn events(&self) -> Vec<Event> {
+        with_names(&self.now().events, &|facet| self.facet_name(ElementId(facet)))
+    }
+
+    /// The same as the engine records them.
+    ///
+    /// # Panics
+    /// Before the first [`FlatSession::step`].
+    pub fn link_events(&self) -> &[LinkEvent] {
+        &self.now().events
+    }
+
+    /// Where the element of a name is in the world, whether it exists or not.
+    ///
+    /// # Panics
+    /// Before the first [`FlatSession::step`].
+    pub fn place_of(&self, key: ElementKey) -> Segment {
+        let whole = self.now().view.place(&self.now().forest, ElementId(key.facet));
+        let levels = (31 - key.path.leading_zeros()) / 2;
+        (0..levels).rev().fold(whole, |s, level| s.half(key.path >> (2 * level) & 1))
+    }
+
+    /// The name of an element.
+    ///
+    /// # Panics
+    /// Before the first [`FlatSession::step`].
+    pub fn name(&self, id: ElementId) -> ElementName {
+        let key = self.now().forest.key(id);
+        self.facet_name(ElementId(key.facet)).at(key.path)
+    }
+
+    fn facet_name(&self, facet: ElementId) -> ElementName {
+        let (wall, back) = self.seed.wall(facet);
+        let wall = &self.scene.walls()[wall.0 as usize];
+        let body = &self.scene.bodies()[wall.body.0 as usize];
+        let surface = if back { format!("{} back", wall.name) } else { wall.name.clone() };
+        let (body, path) = (body.name.clone(), Vec::new());
+        ElementName::Element { body, surface, patch: None, facet: None, path }
+    }
+
+    /// How far the radiosities of two solutions of the same elements are from each other.
+    ///
+    /// # Panics
+    /// Before the first [`FlatSession::step`] of either, or if their elements differ.
+    pub fn radiosity_gap(&self, other: &FlatSession) -> RadiosityGap {
+        let (ours, theirs) = (self.elements(), other.elements());
+        assert_eq!(ours.len(), theirs.len(), "different elements");
+        let mut gap = RadiosityGap::default();
+        let (mut flux, mut area) = (0.0, 0.0);
+        for (one, two) in ours.iter().zip(&theirs).filter(|(one, _)| one.is_leaf) {
+            for c in 0..3 {
+                let (x, y) = (f64::from(one.radiosity[c]), f64::from(two.radiosity[c]));
+                gap.largest = gap.largest.max((x - y).abs());
+                flux += one.place.length() * x / 3.0;
+            }
+            area += one.place.length();
+        }
+        let brightest = self.scene.walls().iter().flat_map(|w| w.material.reflectance);
+        let rho = brightest.fold(0.0, f64::max);
+        let residuals = self.now().report.residual + other.now().report.residual;
+        gap.allowed = residuals * (flux / area) / (1.0 - rho);
+        gap
+    }
+}
+
+impl Receivers for FlatForest {
+    fn room(&self) -> usize {
+        self.len()
+    }
+
+    fn receives(&self, id: ElementId) -> bool {
+        self.is_element(id)
+    }
+
+    fn receiving_area_m2(&self, id: ElementId) -> f64 {
+        self.length(id)
+    }
+}
+
+/// The forest of the plane as the solver sees it: an area is a length, and nothing varies across.
+struct LitPlane<'a> {
+    forest: &'a FlatForest,
+    lit: Vec<Lit>,
+}
+
+impl<'a> LitPlane<'a> {
+    fn new(scene: &FlatScene, forest: &'a FlatForest) -> LitPlane<'a> {
+        let single = |v: [f64; 3]| v.map(|x| x as f32);
+        let of = |wall: &super::scene::Wall| Lit {
+            reflectance: single(wall.material.reflectance),
+            exitance: single(wall.material.exitance),
+        };
+        LitPlane { forest, lit: scene.walls().iter().map(of).collect() }
+    }
+
+    fn is_dark(&self) -> bool {
+        self.lit.iter().all(|lit| lit.exitance == [0.0; 3])
+    }
+}
+
+impl Surfaces for LitPlane<'_> {
+    fn len(&self) -> usize {
+        self.forest.len()
+    }
+
+    fn facets(&self) -> &[ElementId] {
+        self.forest.facets()
+    }
+
+    fn facet_of(&self, id: u32) -> u32 {
+        self.forest.facet(ElementId(id)).0
+    }
+
+    fn parent(&self, id: u32) -> Option<u32> {
+        self.forest.parent(ElementId(id)).map(|parent| parent.0)
+    }
+
+    fn children(&self, id: u32) -> Range<u32> {
+        self.forest.children(ElementId(id))
+    }
+
+    fn area_m2(&self, id: u32) -> f64 {
+        self.forest.length(ElementId(id))
+    }
+
+    fn place(&self, id: u32) -> Place {
+        let id = ElementId(id);
+        if !self.forest.is_element(id) {
+            return Place { centroid: [0.0; 2], radius: 1.0, moment: [1.0, 0.0, 1.0] };
+        }
+        let length = self.forest.length(id);
+        let whole = self.forest.local(self.forest.facet(id));
+        let middle = (self.forest.local(id).centre() - whole.start).length();
+        Place {
+            centroid: [middle as f32, 0.0],
+            radius: (0.5 * length) as f32,
+            // The second axis is that of the symmetry: anything but 0.
+            moment: [(length * length / 12.0) as f32, 0.0, 1.0],
+        }
+    }
+
+    fn source_moment(&self) -> f32 {
+        1.0 / 3.0
+    }
+
+    fn lit(&self, facet: u32) -> &Lit {
+        &self.lit[self.forest.wall(ElementId(facet)).0.0 as usize]
+    }
+}

@@ -1,0 +1,247 @@
+//! Links that follow the motion of many bodies, against links built anew: bit for bit.
+
+use std::sync::Arc;
+
+use glam::DVec2;
+use relume::flat::{FlatOptions, FlatScene, FlatSession, Key, Material, Motion, Segment, parse};
+use relume::pair::{EventKind, State};
+use relume::session::Update;
+
+/// Numbers that look random; the same in every run (SplitMix64).
+struct Dice(u64);
+
+impl Dice {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let x = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((x ^ (x >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn within(&mut self, lo: f64, hi: f64) -> f64 {
+        lo + (hi - lo) * self.next()
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.next() * n as f64) as usize
+    }
+}
+
+/// A room with bodies of all shapes that fly about, through each other and through the walls; some
+/// rest for a while, some for good.
+fn random_scene(dice: &mut Dice, bodies: usize, duration_s: f64) -> FlatScene {
+    let mut scene = FlatScene::new();
+    scene.body("room", Motion::default()).unwrap();
+    let room = [(0., 0.), (4., 0.), (4., 3.), (0., 3.)].map(DVec2::from);
+    scene.polygon("wall", &room, Material::grey(0.6)).unwrap();
+    for k in 0..bodies {
+        let keys = match dice.below(4) {
+            0 => 1,
+            n => 2 + 2 * n,
+        };
+        let mut place = DVec2::new(dice.within(0.3, 3.7), dice.within(0.3, 2.7));
+        let mut angle = dice.within(0.0, 6.0);
+        let mut key = |n: usize, dice: &mut Dice| {
+            if n > 0 && dice.next() < 0.7 {
+                place = DVec2::new(dice.within(-0.2, 4.2), dice.within(-0.2, 3.2));
+                angle += dice.within(-2.0, 2.0) * f64::from(u8::from(dice.next() < 0.5));
+            }
+            Key { time_s: duration_s * n as f64 / keys as f64, place, angle }
+        };
+        let keys = (0..keys).map(|n| key(n, dice)).collect();
+        scene.body(&format!("body{k}"), Motion::new(keys)).unwrap();
+        let size = dice.within(0.1, 0.5);
+        let mut material = Material::grey(dice.within(0.1, 0.8));
+        if k % 4 == 0 {
+            material = material.emitting(5.0);
+        }
+        let corners = 2 + dice.below(4);
+        if corners == 2 {
+            let ends = (DVec2::new(-size, 0.0), DVec2::new(size, 0.0));
+            material.two_sided = dice.next() < 0.5;
+            scene.wall("sheet", Segment::new(ends.0, ends.1), material).unwrap();
+        } else {
+            let corner =
+                |k| DVec2::from_angle(-std::f64::consts::TAU * k as f64 / corners as f64) * size;
+            let corners: Vec<DVec2> = (0..corners).map(corner).collect();
+            scene.polygon("side", &corners, material).unwrap();
+        }
+    }
+    scene
+}
+
+fn options(epsilon: f64, update: Update) -> FlatOptions {
+    FlatOptions { epsilon, min_length_m: 0.1, update, events: true, ..FlatOptions::default() }
+}
+
+/// Goes through the frames of a scene, some of them there and back, and compares with cold builds.
+fn check_frames(seed: u64, bodies: usize, frames: u32) -> u64 {
+    let mut dice = Dice(seed);
+    let scene = Arc::new(random_scene(&mut dice, bodies, f64::from(frames)));
+    let epsilon = dice.within(0.05, 0.3);
+    let session = |update| FlatSession::new(scene.clone(), options(epsilon, update)).unwrap();
+    let (mut warm, mut cold) = (session(Update::Reinspect), session(Update::Scratch));
+    let mut events = 0;
+    for frame in 0..frames {
+        // Now and then somewhere else.
+        let time_s =
+            if dice.next() < 0.05 { dice.within(0.0, f64::from(frames)) } else { f64::from(frame) };
+        let (followed, built) = (warm.step(frame, time_s), cold.step(frame, time_s));
+        let of = |r: &relume::session::FrameReport| {
+            (r.hash.clone(), r.links, r.pairs.refined, r.pairs.culled, r.elements, r.leaves)
+        };
+        assert_eq!(of(&followed), of(&built), "seed {seed}, frame {frame} at {time_s}");
+        let gap = warm.radiosity_gap(&cold);
+        assert!(gap.largest <= gap.allowed + 1e-5, "seed {seed}, frame {frame}: {gap:?}");
+        events += warm.link_events().len() as u64;
+        if frame % 50 == 0 {
+            audit(&warm);
+        }
+    }
+    events
+}
+
+/// Coverage of the pair tree, and the bounds of what links carry.
+fn audit(session: &FlatSession) {
+    let (tree, forest) = session.pairs();
+    for link in session.links() {
+        let x = f64::from(link.carried.exchange_area_m2);
+        let shorter = forest.length(link.a).min(forest.length(link.b));
+        assert!(x >= 0.0 && x <= shorter * (1.0 + 1e-6));
+    }
+    let all: f64 = forest.facets().iter().map(|&f| forest.length(f)).sum();
+    let product = |a, b| forest.length(a) * forest.length(b);
+    let mut covered = 0.0;
+    let mut stack = vec![relume::pair::PairTree::ROOT];
+    while let Some(pair) = stack.pop() {
+        let (a, b) = tree.ends(pair);
+        match tree.state(pair) {
+            // A facet with itself counts once, all others in both orders.
+            State::Active | State::Culled(_) => {
+                covered += if a == b { product(a, b) } else { 2.0 * product(a, b) };
+            }
+            _ => stack.extend(tree.children(pair).map(relume::pair::PairId)),
+        }
+    }
+    assert!((covered - all * all).abs() < 1e-9 * all * all, "{covered} {}", all * all);
+    for id in forest.elements() {
+        let children: f64 =
+            forest.children(id).map(|c| forest.length(relume::element::ElementId(c))).sum();
+        assert!(forest.children(id).is_empty() || (children - forest.length(id)).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn links_that_follow_random_motion_are_those_of_a_cold_build() {
+    let mut events = 0;
+    for seed in 0..12 {
+        events += check_frames(seed, 2 + seed as usize % 9, 200);
+    }
+    assert!(events > 100_000, "{events}: too quiet to show anything");
+}
+
+#[test]
+#[ignore = "tens of thousands of frames: some minutes"]
+fn links_follow_random_motion_for_tens_of_thousands_of_frames() {
+    for seed in 100..200 {
+        check_frames(seed, 3 + seed as usize % 14, 400);
+    }
+}
+
+/// A gutter and a patch that comes down on it.
+const GUTTER: &str = "body gutter\nsegment floor 0 0 1 0 emit 1\nsegment wall 0 1 0 0\n\
+    body patch\nat 0 0.9 0.9\nat 10 0.25 0.25\nsegment patch 0.15 -0.15 -0.15 0.15\n";
+
+fn gutter(update: Update) -> FlatSession {
+    let scene = Arc::new(parse(GUTTER).unwrap());
+    FlatSession::new(scene, FlatOptions { epsilon: 0.1, ..options(0.1, update) }).unwrap()
+}
+
+#[test]
+fn what_comes_nearer_is_demoted_and_promoted_on_the_way_back() {
+    let mut session = gutter(Update::Reinspect);
+    let count = |session: &FlatSession, kind| {
+        session.link_events().iter().filter(|e| e.kind == kind).count() as u64
+    };
+    let there = session.step(0, 0.0);
+    assert!(session.link_events().is_empty());
+    let near = session.step(1, 10.0);
+    assert!(near.demoted > 0 && near.elements > there.elements && near.links > there.links);
+    assert!(count(&session, EventKind::Demoted) == near.demoted);
+    assert!(near.occlusion_changed > 0 && near.visibility_only > 0);
+    let back = session.step(2, 0.0);
+    assert!(back.promoted > 0 && count(&session, EventKind::Promoted) > 0);
+    assert_eq!((back.hash, back.elements), (there.hash, there.elements));
+}
+
+#[test]
+fn a_hidden_link_is_kept_and_restored() {
+    let text = "segment one 0 0 1 0\nsegment two 1 1 0 1 emit 1\n\
+        body screen\nat 0 5 0.5\nat 1 0.5 0.5\nsegment screen -0.8 0 0.8 0\n";
+    let scene = Arc::new(parse(text).unwrap());
+    // One link between the two walls.
+    let coarse = FlatOptions { epsilon: 0.9, ..options(0.9, Update::Reinspect) };
+    let mut session = FlatSession::new(scene, coarse).unwrap();
+    let visibility = |s: &FlatSession| {
+        let (_, forest) = s.pairs();
+        let of = |id| forest.wall(id).0.0;
+        let link = s.links().into_iter().find(|l| of(l.a) + of(l.b) == 1).expect("it is kept");
+        link.carried.visibility()
+    };
+    session.step(0, 0.0);
+    assert_eq!(visibility(&session), 1.0);
+    let hidden = session.step(1, 1.0);
+    assert_eq!(visibility(&session), 0.0);
+    assert!(session.link_events().iter().any(|e| e.kind == EventKind::Occluded));
+    assert_eq!(hidden.visibility_only, 1, "the pair of the two walls, and no other");
+    session.step(2, 0.0);
+    assert_eq!(visibility(&session), 1.0);
+    assert!(session.link_events().iter().any(|e| e.kind == EventKind::Revealed));
+}
+
+#[test]
+fn pairs_within_a_body_that_moves_alone_are_left_alone() {
+    let text = "body gutter\nat 0 0 0\nat 1 3 1 70\nsegment floor 0 0 1 0 emit 1\n\
+        segment wall 0 1 0 0\nsegment post 0.4 0 0.4 0.3 two-sided\n";
+    let scene = Arc::new(parse(text).unwrap());
+    let mut session = FlatSession::new(scene, options(0.1, Update::Reinspect)).unwrap();
+    let before = session.step(0, 0.0);
+    let after = session.step(1, 0.7);
+    assert_eq!(after.moved, ["gutter"]);
+    assert_eq!((after.examined, after.hash), (0, before.hash));
+}
+
+#[test]
+fn extrapolated_links_stay_close() {
+    let (mut followed, mut line) =
+        (gutter(Update::Reinspect), gutter(Update::Extrapolate { frames: 7, error: None }));
+    let mut extrapolated = 0;
+    for frame in 0..60 {
+        let time_s = f64::from(frame) / 6.0;
+        followed.step(frame, time_s);
+        extrapolated += line.step(frame, time_s).extrapolated;
+        let sum = |s: &FlatSession| -> f64 {
+            s.links().iter().map(|l| f64::from(l.carried.exchange_area_past_occluders_m2())).sum()
+        };
+        let (exact, guess) = (sum(&followed), sum(&line));
+        assert!((exact - guess).abs() < 0.05 * exact, "frame {frame}: {exact} {guess}");
+    }
+    assert!(extrapolated > 1000, "{extrapolated}");
+}
+
+#[test]
+fn energy_is_kept_in_a_closed_room() {
+    let text = "polygon room 0 0 2 0 2 1 0 1 reflectance 0.7\n\
+        body lamp\nat 0 0.5 0.8\nat 1 1.5 0.8\npolygon lamp 0 0 0 0.05 0.3 0.05 0.3 0 emit 10\n";
+    let scene = Arc::new(parse(text).unwrap());
+    let fine = FlatOptions { epsilon: 0.02, min_length_m: 0.01, ..FlatOptions::default() };
+    let mut session = FlatSession::new(scene, fine).unwrap();
+    for frame in 0..3 {
+        let report = session.step(frame, 0.5 * f64::from(frame));
+        let (energy, rows) = (report.energy.unwrap(), report.row_sum_error.unwrap());
+        assert!(energy.emitted_w > 0.0);
+        assert!(energy.escaped_w.abs() < 5e-3 * energy.emitted_w, "{energy:?}");
+        // An exact patch row, shared out over leaves that inherit constants.
+        assert!(rows.rms < 0.1, "{rows:?}");
+    }
+}

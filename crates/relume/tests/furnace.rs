@@ -134,7 +134,7 @@ fn within_a_thousandth_at_every_frame() {
     for frame in 0..=8 {
         let (o, _) = run("default", &mut session, frame);
         assert!(o.patch < 1e-3, "frame {frame}: {o:?}");
-        assert!(o.mean.abs() < 3e-4, "a bias at frame {frame}: {o:?}");
+        assert!(o.mean.abs() < 4e-4, "a bias at frame {frame}: {o:?}");
     }
 }
 

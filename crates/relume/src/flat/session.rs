@@ -262,7 +262,7 @@ impl FlatSession {
     fn look_ahead(&self, solved: &mut Solved, time_s: f64) -> Option<Lookahead> {
         let Update::Extrapolate { frames, error } = self.options.update else { return None };
         if solved.ticks.go(solved.time_s, time_s) {
-            solved.tree.forget_predictions();
+            solved.tree.forget_histories();
         }
         let frame_s = solved.ticks.length_s();
         solved.ticks.runs().then_some(Lookahead { now_s: time_s, frame_s, frames, error })

@@ -50,6 +50,11 @@ impl Aabb {
         (self.lo + self.hi) * 0.5
     }
 
+    /// Distance to another box, metres; 0 where they meet.
+    pub fn distance(&self, other: &Aabb) -> f64 {
+        (self.lo - other.hi).max(other.lo - self.hi).max(DVec3::ZERO).length()
+    }
+
     /// Edge lengths, metres.
     #[inline]
     pub fn extent(&self) -> DVec3 {

@@ -10,7 +10,7 @@ use super::kernel::{G, Simd};
 use super::point::{EdgeBundles, form_factor_from_point};
 use super::visibility::Visibility;
 use crate::element::WorldElement;
-use crate::geometry::{ConvexPolygon, Plane};
+use crate::geometry::{Aabb, ConvexPolygon, Plane};
 
 /// Fragments after which what is left is taken as it is: a guard, never met with few occluders.
 const FRAGMENTS_MAX: usize = 256;
@@ -44,7 +44,7 @@ impl Polygons {
 }
 
 /// Visibility of `a` and `b` past convex occluders, all in one frame: from 2 x 2 Gauss points in
-/// each of `cells` x `cells` parts of the smaller end.
+/// each of `cells` x `cells` parts of the end that is better to look from.
 pub(super) fn clipped_visibility(
     simd: Simd,
     a: &WorldElement,
@@ -53,7 +53,7 @@ pub(super) fn clipped_visibility(
     cells: u32,
 ) -> Visibility {
     let slack = a.rounding_m + b.rounding_m;
-    let a_looks = a.area <= b.area;
+    let a_looks = looks_best(a, b, occluders);
     let (small, large) = if a_looks { (a, b) } else { (b, a) };
     let frame = TargetFrame::of(large);
     let facing = ConvexPolygon::new(&large.corners[..large.len]).clipped(&small.plane, slack);
@@ -85,6 +85,18 @@ pub(super) fn clipped_visibility(
     let (of_small, of_large) = sums.spreads(value);
     let (spread_a, spread_b) = if a_looks { (of_small, of_large) } else { (of_large, of_small) };
     Visibility { value, gradient_a, gradient_b, spread_a, spread_b, segments: side * side }
+}
+
+/// Whether the first end is the one to look from.
+///
+/// As a point of an end moves over it, a shadow on the other end moves by as much, times the distance of
+/// the occluder from the other by that from the end: the end is best on which that is little against
+/// the size of the other. What nearly touches an end is to be looked at from the other.
+fn looks_best(a: &WorldElement, b: &WorldElement, occluders: &Polygons) -> bool {
+    let around = Aabb::of(occluders.iter().flatten().copied());
+    let (by_a, by_b) =
+        (a.radius * around.distance(&b.bounds), b.radius * around.distance(&a.bounds));
+    if by_a == by_b { a.area <= b.area } else { by_a < by_b }
 }
 
 /// Form factor from a point to the part of a convex polygon (wholly in front of the point's tangent

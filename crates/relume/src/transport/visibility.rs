@@ -307,7 +307,7 @@ pub fn visibility(
 pub const CLIPPED_MAX: usize = 12;
 
 /// Visibility of a pair by clipping, exact from 2 x 2 points in each of `cells` x `cells` parts of
-/// its smaller end (each counts as a segment), if at most `most` polygons stand in its shaft;
+/// the end that is farther from what blocks (each counts as a segment), if at most `most` polygons stand in its shaft;
 /// `None` if there are more.
 pub fn exact_visibility(
     simd: Simd,

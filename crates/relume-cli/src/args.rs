@@ -899,7 +899,7 @@ mod tests {
         assert_eq!(of("extrapolate", None).unwrap().name(), "extrapolate=7");
         let stated = of("extrapolate", Some(0.01)).unwrap();
         assert_eq!(stated.name(), "extrapolate --error 0.01");
-        assert_eq!(stated.update(), Some(Update::Extrapolate { frames: 64, error: Some(0.01) }));
+        assert_eq!(stated.update(), Some(Update::Extrapolate { frames: 4, error: Some(0.01) }));
         assert_eq!(of("reinspect", Some(0.01)).unwrap().update(), None);
         for wrong in ["", "predict", "extrapolate=", "extrapolate=0", "extrapolate=256"] {
             assert!(of(wrong, None).is_err(), "{wrong}");

@@ -405,7 +405,7 @@ impl Placed<'_> {
             visibility(self.simd, shaft, blockers, key, 6)
         } else {
             // The error of n x n points on a function with kinks falls as 1 / n^2.
-            let spread = if shaft.a.area <= shaft.b.area { v.spread_a } else { v.spread_b };
+            let spread = if v.from_a { v.spread_a } else { v.spread_b };
             let cells = match stake * spread.max(UNSEEN) {
                 s if s <= CLOSER => return v,
                 s if s <= 4.0 * CLOSER => 2,

@@ -84,7 +84,15 @@ pub(super) fn clipped_visibility(
         if a_looks { (over_small, over_large) } else { (over_large, over_small) };
     let (of_small, of_large) = sums.spreads(value);
     let (spread_a, spread_b) = if a_looks { (of_small, of_large) } else { (of_large, of_small) };
-    Visibility { value, gradient_a, gradient_b, spread_a, spread_b, segments: side * side }
+    Visibility {
+        value,
+        gradient_a,
+        gradient_b,
+        spread_a,
+        spread_b,
+        from_a: a_looks,
+        segments: side * side,
+    }
 }
 
 /// Whether the first end is the one to look from.

@@ -95,7 +95,10 @@ pub(super) fn clipped_visibility(
     }
 }
 
-/// Whether the first end is the one to look from.
+/// How many times as much shadows move over the other end for the larger to be looked from.
+const MUCH: f64 = 8.0;
+
+/// Whether the first end is the one to look from: the smaller, unless shadows move much more for it.
 ///
 /// As a point of an end moves over it, a shadow on the other end moves by as much, times the distance of
 /// the occluder from the other by that from the end: the end is best on which that is little against
@@ -104,7 +107,10 @@ fn looks_best(a: &WorldElement, b: &WorldElement, occluders: &Polygons) -> bool 
     let around = Aabb::of(occluders.iter().flatten().copied());
     let (by_a, by_b) =
         (a.radius * around.distance(&b.bounds), b.radius * around.distance(&a.bounds));
-    if by_a == by_b { a.area <= b.area } else { by_a < by_b }
+    match a.area <= b.area {
+        true => by_a <= MUCH * by_b,
+        false => by_b > MUCH * by_a,
+    }
 }
 
 /// Form factor from a point to the part of a convex polygon (wholly in front of the point's tangent

@@ -96,7 +96,7 @@ pub(super) fn clipped_visibility(
 }
 
 /// How many times as much shadows move over the other end for the larger to be looked from.
-const MUCH: f64 = 8.0;
+const MUCH: f64 = 16.0;
 
 /// Whether the first end is the one to look from: the smaller, unless shadows move much more for it.
 ///

@@ -170,10 +170,13 @@ impl FlatSession {
     /// the links are those of a cold build at `time_s`, bit for bit, unless they are extrapolated.
     pub fn step(&mut self, frame: u32, time_s: f64) -> FrameReport {
         let last = self.solved.take().filter(|_| self.options.update != Update::Scratch);
+        let settled = |last: &Solved| last.tree.live_count() == 0;
+        // What was extrapolated cannot be taken along when time jumps or goes back.
+        let last = last.filter(|l| settled(l) || l.ticks.goes_on(l.time_s, time_s));
         let label = FrameReport { frame, time_s, ..FrameReport::default() };
         let view = PlaneView::new(&self.scene, time_s);
         let solved = match last {
-            Some(last) if last.view == view => {
+            Some(last) if settled(&last) && last.view == view => {
                 let report = last.report.of_a_still_frame(label);
                 Solved { time_s, report, events: Vec::new(), ..last }
             }

@@ -1,6 +1,6 @@
-//! Partial visibility by clipping: exact from each of a few points of the smaller end.
+//! Partial visibility by clipping: exact from each of a few points of one end, the looker.
 //!
-//! Seen from a point, an occluding polygon hides a pyramid. What is left of the larger end after
+//! Seen from a point, an occluding polygon hides a pyramid. What is left of the other end after
 //! all pyramids are cut off is a set of convex fragments, whose form factors are known in closed
 //! form. Overlapping occluders need no special care.
 
@@ -54,22 +54,22 @@ pub(super) fn clipped_visibility(
 ) -> Visibility {
     let slack = a.rounding_m + b.rounding_m;
     let a_looks = looks_best(a, b, occluders);
-    let (small, large) = if a_looks { (a, b) } else { (b, a) };
-    let frame = TargetFrame::of(large);
-    let facing = ConvexPolygon::new(&large.corners[..large.len]).clipped(&small.plane, slack);
+    let (looker, other) = if a_looks { (a, b) } else { (b, a) };
+    let frame = TargetFrame::of(other);
+    let facing = ConvexPolygon::new(&other.corners[..other.len]).clipped(&looker.plane, slack);
     let target = frame.flat(facing.corners());
-    let between = Occluders::between(occluders.iter(), small, large, &frame, slack);
-    let normal = frame.direction(small.plane.normal);
+    let between = Occluders::between(occluders.iter(), looker, other, &frame, slack);
+    let normal = frame.direction(looker.plane.normal);
     let mut looks = Looks { sums: Sums::default(), edges: EdgeBundles::default(), seen: vec![] };
     let mut cutter = Cutter::default();
     let side = 2 * cells;
     let at = |k: u32| (f64::from(k / 2) + G[k as usize & 1]) / f64::from(cells);
     for k in 0..side * side {
-        let point = small.point(at(k % side), at(k / side));
-        if large.plane.distance(point) > 0.0 && target.len() >= 3 {
+        let point = looker.point(at(k % side), at(k / side));
+        if other.plane.distance(point) > 0.0 && target.len() >= 3 {
             let from = frame.place(point);
             cutter.cut(from, &target, &between);
-            looks.push(from, small.offset(point), &target, &cutter);
+            looks.push(from, looker.offset(point), &target, &cutter);
             if looks.edges.len() >= EDGES_AT_ONCE {
                 looks.evaluate(simd, normal);
             }
@@ -77,13 +77,13 @@ pub(super) fn clipped_visibility(
     }
     looks.evaluate(simd, normal);
     let sums = looks.sums;
-    let over_small = gradient(small, sums.at_small, sums.at_small_clear, sums.all, sums.clear);
-    let over_large = gradient(large, sums.at_large, sums.at_large_clear, sums.all, sums.clear);
+    let over_looker = gradient(looker, sums.at_looker, sums.at_looker_clear, sums.all, sums.clear);
+    let over_other = gradient(other, sums.at_other, sums.at_other_clear, sums.all, sums.clear);
     let value = if sums.all > 0.0 { (sums.clear / sums.all).clamp(0.0, 1.0) } else { 0.0 };
     let (gradient_a, gradient_b) =
-        if a_looks { (over_small, over_large) } else { (over_large, over_small) };
-    let (of_small, of_large) = sums.spreads(value);
-    let (spread_a, spread_b) = if a_looks { (of_small, of_large) } else { (of_large, of_small) };
+        if a_looks { (over_looker, over_other) } else { (over_other, over_looker) };
+    let (of_looker, of_other) = sums.spreads(value);
+    let (spread_a, spread_b) = if a_looks { (of_looker, of_other) } else { (of_other, of_looker) };
     Visibility {
         value,
         gradient_a,
@@ -224,14 +224,14 @@ impl Occluders {
     /// The parts of occluders in front of both ends' planes.
     fn between<'a>(
         occluders: impl Iterator<Item = &'a [DVec3]>,
-        small: &WorldElement,
-        large: &WorldElement,
+        looker: &WorldElement,
+        other: &WorldElement,
         frame: &TargetFrame,
         slack: f64,
     ) -> Occluders {
-        let from = frame.place(small.centre);
+        let from = frame.place(looker.centre);
         let raised = |p: &Plane| Plane { normal: p.normal, offset: p.offset + slack };
-        let planes = [raised(&small.plane), raised(&large.plane)];
+        let planes = [raised(&looker.plane), raised(&other.plane)];
         let mut out = Occluders::default();
         let (mut part, mut rest) = (Vec::new(), Vec::new());
         for occluder in occluders {
@@ -287,7 +287,7 @@ fn keep_front(polygon: &mut Vec<DVec3>, scratch: &mut Vec<DVec3>, plane: &Plane)
     std::mem::swap(polygon, scratch);
 }
 
-/// What points of the smaller end see, with form factors evaluated many edges at a time.
+/// What points of the looker see, with form factors evaluated many edges at a time.
 struct Looks {
     sums: Sums,
     edges: EdgeBundles,
@@ -348,14 +348,14 @@ impl Looks {
                 sums.finish_point(whole, clear_of_point);
                 (whole, clear_of_point) = (f, 0.0);
                 sums.all += f;
-                sums.at_small += seen.at * f;
-                sums.at_large += seen.centroid * f;
+                sums.at_looker += seen.at * f;
+                sums.at_other += seen.centroid * f;
             }
             if seen.what != (What::Target { clear: false }) {
                 clear_of_point += f;
                 sums.clear += f;
-                sums.at_small_clear += seen.at * f;
-                sums.at_large_clear += seen.centroid * f;
+                sums.at_looker_clear += seen.at * f;
+                sums.at_other_clear += seen.centroid * f;
             }
         }
         self.sums.finish_point(whole, clear_of_point);
@@ -369,10 +369,10 @@ impl Looks {
 struct Sums {
     all: f64,
     clear: f64,
-    at_small: DVec2,
-    at_small_clear: DVec2,
-    at_large: DVec2,
-    at_large_clear: DVec2,
+    at_looker: DVec2,
+    at_looker_clear: DVec2,
+    at_other: DVec2,
+    at_other_clear: DVec2,
     /// Sum over the points of their clear part squared over all.
     clear2: f64,
 }
@@ -382,8 +382,8 @@ impl Sums {
         self.clear2 += clear * clear / all.max(f64::MIN_POSITIVE);
     }
 
-    /// Standard deviations of visibility over the smaller end (between its points) and over the
-    /// larger (within what each point sees: there it is 0 or 1).
+    /// Standard deviations of visibility over the looker (between its points) and over the
+    /// other end (within what each point sees: there it is 0 or 1).
     fn spreads(&self, value: f64) -> (f64, f64) {
         if self.all <= 0.0 {
             return (0.0, 0.0);

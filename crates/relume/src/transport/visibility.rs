@@ -310,8 +310,8 @@ pub fn visibility(
 pub const CLIPPED_MAX: usize = 12;
 
 /// Visibility of a pair by clipping, exact from 2 x 2 points in each of `cells` x `cells` parts of
-/// the end that is farther from what blocks (each counts as a segment), if at most `most` polygons stand in its shaft;
-/// `None` if there are more.
+/// one end: the smaller, unless what blocks is very near it. Each point counts as a segment.
+/// `None` if more than `most` polygons stand in the shaft.
 pub fn exact_visibility(
     simd: Simd,
     shaft: &Shaft<'_>,

@@ -230,6 +230,29 @@ fn extrapolated_links_stay_close() {
 }
 
 #[test]
+fn what_was_extrapolated_does_not_outlast_a_rest_or_a_jump() {
+    let text = "body floor\nsegment floor 0 0 4 0 emit 1\n\
+        body patch\nat 0 1 2\nat 1 3 0.6\nat 2 3 0.6\nsegment patch 0.5 0 0 0\n";
+    let scene = Arc::new(parse(text).unwrap());
+    let session = |update| FlatSession::new(scene.clone(), options(0.05, update)).unwrap();
+    let cold = |time_s| session(Update::Scratch).step(0, time_s).hash;
+    let goes = || {
+        let mut session = session(Update::Extrapolate { frames: 7, error: None });
+        let mut step = |frame: u32| session.step(frame, f64::from(frame) / 12.0);
+        let extrapolated = (0..=11).map(|frame| step(frame).extrapolated).sum::<u64>();
+        assert!(extrapolated > 100, "{extrapolated}");
+        session
+    };
+    let mut rests = goes();
+    // The last frame that moves, and frames enough for every link to be evaluated again.
+    let hash = (12..24).map(|frame| rests.step(frame, f64::from(frame) / 12.0).hash).last();
+    assert_eq!(hash.unwrap(), cold(23.0 / 12.0));
+    for time_s in [0.0, 11.0 / 12.0, 0.5, 2.0] {
+        assert_eq!(goes().step(12, time_s).hash, cold(time_s), "a jump to {time_s} s");
+    }
+}
+
+#[test]
 fn energy_is_kept_in_a_closed_room() {
     let text = "polygon room 0 0 2 0 2 1 0 1 reflectance 0.7\n\
         body lamp\nat 0 0.5 0.8\nat 1 1.5 0.8\npolygon lamp 0 0 0 0.05 0.3 0.05 0.3 0 emit 10\n";

@@ -98,6 +98,15 @@ impl Clip {
         Clip { scene: Arc::new(self.scene.without_light()), ..self }
     }
 
+    /// A session for another form of the clip's scene that has solved nothing yet.
+    pub(crate) fn session_of(
+        &self,
+        scene: Scene,
+        update: UpdateChoice,
+    ) -> Result<Session, Failure> {
+        Session::new(Arc::new(scene), self.options(update, false)?).map_err(Failure::new)
+    }
+
     /// Says on stderr what is doubtful about the scene, unless the user wants quiet.
     pub(crate) fn warn(&self) {
         if !self.flags.quiet {

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use relume::scene::Scene;
-use relume::session::{self, Closure, Factors, FrameReport, Grouping};
+use relume::session::{self, Closure, Factors, FrameReport, Grouping, PartFactors};
 use relume_picture::export::{self, Npz, WholeFile, probe, write_atomically};
 use serde::Serialize;
 
@@ -209,7 +209,9 @@ fn frames(
     progress: &Progress,
     table: &mut Table,
 ) -> Result<Vec<Frame>, Failure> {
-    let mut session = clip.session(args.update, false)?;
+    let joined = clip.scene.joined();
+    let mut sums = PartFactors::new(&clip.scene, &joined, things.grouping.clone());
+    let mut session = clip.session_of(joined.scene, args.update)?;
     let mut before: Option<Factors> = None;
     let mut out: Vec<Frame> = Vec::new();
     for (done, &frame) in clip.frames.iter().enumerate() {
@@ -223,7 +225,7 @@ fn frames(
         let report =
             session.step(frame, clip.time_of(frame)).map_err(|error| step_failure(error, ""))?;
         let summing = now();
-        let mut factors = session.factors(&things.grouping);
+        let mut factors = sums.factors(&session);
         let (sums, escapes) = row_sums(&factors, things);
         factors.close(closure(args.closure)).map_err(|open| not_closed(frame, &open, things))?;
         let seconds_summing = summing.elapsed().as_secs_f64();

@@ -287,8 +287,13 @@ impl WorldElement {
     pub fn new(view: &WorldView, forest: &Forest, id: ElementId, in_body: bool) -> WorldElement {
         debug_assert_eq!(forest.kind(id), Kind::Element);
         let patch = view.patch(forest.patch(id).expect("an element has a patch"));
+        WorldElement::of_shape(patch, &forest.shape(id), in_body)
+    }
+
+    /// Places a shape of a patch as if it were an element of it.
+    #[inline]
+    pub fn of_shape(patch: &WorldPatch, shape: &Shape, in_body: bool) -> WorldElement {
         let frame = if in_body { &patch.local } else { &patch.world };
-        let shape = forest.shape(id);
         let place = |p: DVec2| frame.point(p);
         let corners = shape.corners.map(place);
         let centre = place(shape.centroid());

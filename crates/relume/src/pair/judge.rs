@@ -9,7 +9,7 @@ use crate::event::{Foresight, Lookahead, Tick};
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
 use crate::scene::{BodyId, LightKind, PatchId};
 use crate::transport::{
-    CLIPPED_MAX, Exchange, Meeting, SEGMENTS, SegmentBundle, Shaft, Simd, Visibility,
+    CLIPPED_MAX, Exchange, Looker, Meeting, SEGMENTS, SegmentBundle, Shaft, Simd, Visibility,
     exact_visibility, exchange, light_at, light_exchange, light_visibility, meeting, visibility,
 };
 
@@ -342,7 +342,7 @@ impl Placed<'_> {
                 way = Margin::between(brings.max(limit), brings.min(limit));
             }
         }
-        let v = exact_visibility(self.simd, shaft, &blockers, 1, most)
+        let v = exact_visibility(self.simd, shaft, &blockers, (Looker::Best, 1), most)
             .unwrap_or_else(|| visibility(self.simd, shaft, &blockers, key, 4));
         let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
         else {
@@ -412,7 +412,8 @@ impl Placed<'_> {
                 s if s <= 16.0 * CLOSER => 4,
                 _ => 8,
             };
-            exact_visibility(self.simd, shaft, blockers, cells, blockers.len()).unwrap_or(v)
+            let from = (Looker::Best, cells);
+            exact_visibility(self.simd, shaft, blockers, from, blockers.len()).unwrap_or(v)
         };
         Visibility { segments: v.segments + again.segments, ..again }
     }

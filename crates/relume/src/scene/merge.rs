@@ -11,6 +11,8 @@ use super::flatten::{FLATNESS, area_vector, flatten};
 pub(super) struct Merged {
     /// Convex loops, counter-clockwise from the front, in the order of their first triangles.
     pub(super) polygons: Vec<Vec<DVec3>>,
+    /// The polygon that each triangle is in; `None` for those left out.
+    pub(super) polygon_of: Vec<Option<u32>>,
     /// Triangles left out because they have no area relative to their longest side.
     pub(super) degenerate: usize,
 }
@@ -32,12 +34,24 @@ pub(super) fn merge(points: &[DVec3], triangles: &[[u32; 3]]) -> Merged {
     let mut polygons: Vec<(u32, Vec<DVec3>)> = Vec::new();
     for (normal, region) in &regions {
         match mesh.convex_outline(region) {
-            Some(outline) => polygons.push((region[0], outline)),
+            Some(outline) => {
+                region.iter().for_each(|&t| mesh.join_triangles(region[0], t));
+                polygons.push((region[0], outline));
+            }
             None => mesh.cut_convex(*normal, region, &mut polygons),
         }
     }
     polygons.sort_by_key(|p| p.0);
-    Merged { polygons: polygons.into_iter().map(|p| p.1).collect(), degenerate }
+    let firsts: Vec<u32> = polygons.iter().map(|p| mesh.joined_with(p.0)).collect();
+    let mut number = vec![NONE; kept.len()];
+    (0..).zip(&firsts).for_each(|(k, &first)| number[first as usize] = k);
+    let mut next = 0..kept.len() as u32;
+    let of_kept = |t: &[u32; 3]| {
+        let t = is_flat(&t).then(|| next.next().expect("as many as were kept"))?;
+        Some(number[mesh.joined_with(t) as usize])
+    };
+    let polygon_of = triangles.iter().map(of_kept).collect();
+    Merged { polygons: polygons.into_iter().map(|p| p.1).collect(), polygon_of, degenerate }
 }
 
 /// For each point the first index with the same position (0 and -0 are the same).
@@ -80,6 +94,8 @@ struct Mesh<'a> {
     previous: Vec<u32>,
     /// Region of a triangle.
     region: Vec<u32>,
+    /// A triangle of the same polygon, from which others may lead on; the last leads to itself.
+    joined: Vec<u32>,
 }
 
 impl<'a> Mesh<'a> {
@@ -89,7 +105,24 @@ impl<'a> Mesh<'a> {
         let next: Vec<u32> = (0..n).map(|h| if h % 3 == 2 { h - 2 } else { h + 1 }).collect();
         let previous = (0..n).map(|h| if h % 3 == 0 { h + 2 } else { h - 1 }).collect();
         let twin = twins(&start, &next);
-        Mesh { points, start, twin, next, previous, region: vec![NONE; triangles.len()] }
+        let region = vec![NONE; triangles.len()];
+        let joined = (0..triangles.len() as u32).collect();
+        Mesh { points, start, twin, next, previous, region, joined }
+    }
+
+    /// The triangle that stands for all that are joined with this one.
+    fn joined_with(&self, mut triangle: u32) -> u32 {
+        while self.joined[triangle as usize] != triangle {
+            triangle = self.joined[triangle as usize];
+        }
+        triangle
+    }
+
+    fn join_triangles(&mut self, one: u32, other: u32) {
+        let (one, other) = (self.joined_with(one), self.joined_with(other));
+        // Paths stay short: everything leads straight to a region's first where it can.
+        let (first, last) = (one.min(other), one.max(other));
+        self.joined[last as usize] = first;
     }
 
     fn from(&self, h: u32) -> DVec3 {
@@ -234,6 +267,7 @@ impl<'a> Mesh<'a> {
         }
         self.join(into_a, out_of_a);
         self.join(into_b, out_of_b);
+        self.join_triangles(h / 3, t / 3);
         removed.append(&mut run);
     }
 

@@ -19,6 +19,7 @@ mod error;
 mod flatten;
 mod import;
 mod inside;
+mod join;
 mod merge;
 mod motion;
 mod names;
@@ -30,6 +31,7 @@ pub use check::check;
 pub use drift::Drift;
 pub use error::SceneError;
 pub use import::{ImportOptions, import};
+pub use join::{Joined, Part};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
 
 /// Index of a [`Body`] in [`Scene::bodies`].

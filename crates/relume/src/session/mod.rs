@@ -27,7 +27,7 @@ mod tally;
 
 pub use compare::{Difference, RadiosityGap, Which, compare, radiosity_gap};
 pub use events::{Event, EventKind};
-pub use factors::{Closure, Factors, Grouping, Open};
+pub use factors::{Closure, Factors, Grouping, Open, PartFactors};
 pub use gather::Sensor;
 pub use lossy::{Missed, RadiosityError, missed, radiosity_error};
 pub use names::ElementName;

@@ -43,17 +43,31 @@ impl Polygons {
     }
 }
 
+/// The end of a pair that the other is looked at from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Looker {
+    /// The smaller, unless what blocks is very near it.
+    Best,
+    /// The first.
+    A,
+    /// The second.
+    B,
+}
+
 /// Visibility of `a` and `b` past convex occluders, all in one frame: from 2 x 2 Gauss points in
-/// each of `cells` x `cells` parts of the end that is better to look from.
+/// each of `cells` x `cells` parts of the looker; from its middle alone if `cells` is 0.
 pub(super) fn clipped_visibility(
     simd: Simd,
-    a: &WorldElement,
-    b: &WorldElement,
+    (a, b): (&WorldElement, &WorldElement),
     occluders: &Polygons,
-    cells: u32,
+    (looker, cells): (Looker, u32),
 ) -> Visibility {
     let slack = a.rounding_m + b.rounding_m;
-    let a_looks = looks_best(a, b, occluders);
+    let a_looks = match looker {
+        Looker::Best => looks_best(a, b, occluders),
+        Looker::A => true,
+        Looker::B => false,
+    };
     let (looker, other) = if a_looks { (a, b) } else { (b, a) };
     let frame = TargetFrame::of(other);
     let facing = ConvexPolygon::new(&other.corners[..other.len]).clipped(&looker.plane, slack);
@@ -62,8 +76,11 @@ pub(super) fn clipped_visibility(
     let normal = frame.direction(looker.plane.normal);
     let mut looks = Looks { sums: Sums::default(), edges: EdgeBundles::default(), seen: vec![] };
     let mut cutter = Cutter::default();
-    let side = 2 * cells;
-    let at = |k: u32| (f64::from(k / 2) + G[k as usize & 1]) / f64::from(cells);
+    let side = (2 * cells).max(1);
+    let at = |k: u32| match cells {
+        0 => 0.5,
+        _ => (f64::from(k / 2) + G[k as usize & 1]) / f64::from(cells),
+    };
     for k in 0..side * side {
         let point = looker.point(at(k % side), at(k / side));
         if other.plane.distance(point) > 0.0 && target.len() >= 3 {

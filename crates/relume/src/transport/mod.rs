@@ -9,7 +9,7 @@ mod point;
 mod segments;
 mod visibility;
 
-pub use clip::{FactorPast, form_factor_past, keep_in_front, visible_form_factor};
+pub use clip::{FactorPast, Looker, form_factor_past, keep_in_front, visible_form_factor};
 pub use exchange::{Exchange, Meeting, Variation, exchange, light_at, light_exchange, meeting};
 pub use kernel::Simd;
 pub use point::form_factor_from_point;

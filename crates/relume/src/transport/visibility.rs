@@ -5,7 +5,7 @@ use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, Wor
 use crate::geometry::{Aabb, Plane, Pose, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
-use super::clip::{Polygons, clipped_visibility};
+use super::clip::{Looker, Polygons, clipped_visibility};
 use super::kernel::Simd;
 use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use glam::{DVec2, DVec3};
@@ -209,6 +209,12 @@ impl<'a> Shaft<'a> {
         out
     }
 
+    /// Those of the blockers of a pair above that may block segments of this one.
+    pub fn those_that_block(&self, blockers: &[PatchId]) -> Vec<PatchId> {
+        let blocks = |patch: &PatchId| self.may_be_blocked_by(*patch, Test::Exact);
+        blockers.iter().copied().filter(blocks).collect()
+    }
+
     /// Whether anything at or below `id` may block segments of this pair or of one below it,
     /// what rides on `except` aside.
     pub fn is_entered_by(&self, id: ElementId, except: Option<BodyId>) -> bool {
@@ -310,13 +316,13 @@ pub fn visibility(
 pub const CLIPPED_MAX: usize = 12;
 
 /// Visibility of a pair by clipping, exact from 2 x 2 points in each of `cells` x `cells` parts of
-/// one end: the smaller, unless what blocks is very near it. Each point counts as a segment.
-/// `None` if more than `most` polygons stand in the shaft.
+/// the looker, or from its middle alone if `cells` is 0. Each point counts as a segment. `None` if more
+/// than `most` polygons stand in the shaft.
 pub fn exact_visibility(
     simd: Simd,
     shaft: &Shaft<'_>,
     blockers: &[PatchId],
-    cells: u32,
+    (looker, cells): (Looker, u32),
     most: usize,
 ) -> Option<Visibility> {
     if blockers.is_empty() {
@@ -339,7 +345,7 @@ pub fn exact_visibility(
             _ => occluders.push(corners),
         }
     }
-    Some(clipped_visibility(simd, a, b, &occluders, cells))
+    Some(clipped_visibility(simd, (a, b), &occluders, (looker, cells)))
 }
 
 /// Visibility of a punctual light (the second end of the shaft) from an element; `segments` come
@@ -514,7 +520,9 @@ mod tests {
         let trace = |k| visibility(Simd::detect(), &shaft, &blockers, key(k), 6).value;
         let traced = (1..=16).map(trace).sum::<f64>() / 16.0;
         let clipped =
-            exact_visibility(Simd::detect(), &shaft, &blockers, 8, CLIPPED_MAX).unwrap().value;
+            exact_visibility(Simd::detect(), &shaft, &blockers, (Looker::Best, 8), CLIPPED_MAX)
+                .unwrap()
+                .value;
         assert!((traced - clipped).abs() < 0.04, "{traced} {clipped}");
         clipped
     }

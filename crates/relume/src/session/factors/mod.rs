@@ -1,92 +1,20 @@
 //! Form factors between a user's own things, summed from links of mixed levels.
 
-use std::collections::BTreeSet;
-
-use rayon::prelude::*;
-
-use crate::scene::{Patch, PatchId, Scene};
+use crate::pair::Link;
+use crate::scene::Scene;
 
 use super::{Session, Solved};
 
-/// The things between which form factors are summed: for each patch its group, if it is in any.
-///
-/// Light that reaches a patch of no group counts as escaped.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Grouping {
-    /// A name for each group; unique.
-    pub names: Vec<String>,
-    /// Group of each patch, an index of `names`; indexed by `PatchId`.
-    pub of_patch: Vec<Option<u32>>,
-}
+mod fragments;
+mod grouping;
+mod parts;
+mod sum;
 
-impl Grouping {
-    /// Each body of a scene, by name. The second sides of double-sided polygons are a group of their
-    /// own, with `back` behind the name: the inside of a box that was exported double-sided.
-    pub fn by_body(scene: &Scene) -> Grouping {
-        let names = scene.bodies.iter().map(|b| b.name.as_str());
-        Grouping::by_sides(scene, names.collect(), |patch| patch.body.0)
-    }
+pub use grouping::Grouping;
+pub use parts::PartFactors;
 
-    /// Each surface of a scene, by name; second sides as in [`Grouping::by_body`].
-    pub fn by_surface(scene: &Scene) -> Grouping {
-        let names = scene.surfaces.iter().map(|s| s.name.as_str());
-        Grouping::by_sides(scene, names.collect(), |patch| patch.surface.0)
-    }
-
-    fn by_sides(scene: &Scene, names: Vec<&str>, group: impl Fn(&Patch) -> u32) -> Grouping {
-        let mut taken: BTreeSet<String> = names.iter().map(|name| (*name).to_owned()).collect();
-        let mut both = Vec::with_capacity(2 * names.len());
-        for name in names {
-            let numbered = (2..).map(|n| format!("{name} back {n}"));
-            let back = std::iter::once(format!("{name} back"))
-                .chain(numbered)
-                .find(|back| !taken.contains(back))
-                .unwrap_or_else(|| unreachable!("there are more numbers than names"));
-            taken.insert(back.clone());
-            both.extend([name.to_owned(), back]);
-        }
-        Grouping::new(scene, both, |k, patch| {
-            2 * group(patch) + u32::from(patch.twin.is_some_and(|front| front.0 < k))
-        })
-    }
-
-    /// Each patch of a scene: named after its surface, with its number there from 0 on; the second
-    /// side of a double-sided polygon has the number of the first and `back` behind it.
-    pub fn by_patch(scene: &Scene) -> Grouping {
-        let mut next = vec![0; scene.surfaces.len()];
-        let mut names: Vec<String> = Vec::with_capacity(scene.patches.len());
-        for (k, patch) in scene.patches.iter().enumerate() {
-            let name = match patch.twin {
-                Some(front) if (front.0 as usize) < k => {
-                    format!("{} back", names[front.0 as usize])
-                }
-                _ => {
-                    let surface = patch.surface.0 as usize;
-                    next[surface] += 1;
-                    format!("{}/{}", scene.surfaces[surface].name, next[surface] - 1)
-                }
-            };
-            names.push(name);
-        }
-        Grouping::new(scene, names, |k, _| k)
-    }
-
-    /// Leaves out groups that hold no patch, or none that is no obstruction.
-    fn new(scene: &Scene, names: Vec<String>, group: impl Fn(u32, &Patch) -> u32) -> Grouping {
-        let all = (0..).zip(&scene.patches);
-        let groups: Vec<Option<u32>> = all
-            .map(|(k, p)| (!scene.obstructions.contains(&p.surface)).then(|| group(k, p)))
-            .collect();
-        let mut number = vec![None; names.len()];
-        groups.iter().flatten().for_each(|&g| number[g as usize] = Some(0));
-        (0..).zip(number.iter_mut().flatten()).for_each(|(k, n)| *n = k);
-        let kept = names.into_iter().zip(&number).filter(|(_, n)| n.is_some());
-        Grouping {
-            names: kept.map(|(name, _)| name).collect(),
-            of_patch: groups.into_iter().map(|g| number[g? as usize]).collect(),
-        }
-    }
-}
+use fragments::{Fragments, Spread};
+use sum::{Fixed, Sign, mirrored, plus};
 
 /// What is done to form factors so that rows sum to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -293,151 +221,27 @@ impl Session {
     pub fn factors(&self, grouping: &Grouping) -> Factors {
         let solved = self.solved.as_ref().expect("a step comes before a look at the factors");
         assert_eq!(grouping.of_patch.len(), self.scene.patches.len());
-        let groups = grouping.names.len();
-        let mut area_m2 = vec![0.0; groups];
-        for (patch, group) in self.scene.patches.iter().zip(&grouping.of_patch) {
-            if let Some(group) = group
-                && solved.view.is_present(patch.body)
-            {
-                area_m2[*group as usize] += patch.area_m2();
-            }
-        }
+        let fragments = Fragments::whole(&solved.forest, grouping);
         let fixed = Fixed::of(self.scene.area_m2());
-        let upper = merged(groups, &contributions(solved, grouping, &fixed));
-        mirrored(area_m2, &upper, &fixed)
+        let links: Vec<Link> = solved.tree.links().collect();
+        let spread = Spread::new(solved, self.simd, &fragments);
+        let none = vec![Vec::new(); grouping.names.len()];
+        let upper = plus(&none, &links, &spread, (&fixed, Sign::Plus));
+        mirrored(areas(solved, &self.scene, grouping), &upper, &fixed)
     }
 }
 
-/// Exchange areas as whole numbers, so that their sums do not depend on an order: X V in 65,535ths,
-/// times a power of two that leaves room for the sum over the whole scene.
-struct Fixed {
-    scale: f64,
-}
-
-impl Fixed {
-    const VISIBLE: f64 = 65_535.0;
-
-    fn of(area_m2: f64) -> Fixed {
-        let mut scale = 1.0;
-        // Rows of links that err may sum to more than 1: a factor of 8 to spare.
-        let room = (1_u64 << 60) as f64;
-        while area_m2 * Fixed::VISIBLE * scale > room {
-            scale *= 0.5;
-        }
-        while area_m2 * Fixed::VISIBLE * scale * 2.0 < room {
-            scale *= 2.0;
-        }
-        Fixed { scale }
-    }
-
-    fn whole(&self, link: &crate::pair::Link) -> u64 {
-        let x = f64::from(link.carried.exchange_area_m2) * f64::from(link.carried.visibility);
-        (x * self.scale).round() as u64
-    }
-
-    fn area_m2(&self, whole: u64) -> f64 {
-        whole as f64 / (Fixed::VISIBLE * self.scale)
-    }
-}
-
-/// Numbers of (row, column) with row <= column, bucketed by row.
-struct Buckets {
-    starts: Vec<usize>,
-    entries: Vec<(u32, u64)>,
-}
-
-/// What every link adds; light within a group counts in both directions.
-fn contributions(solved: &Solved, grouping: &Grouping, fixed: &Fixed) -> Buckets {
-    let group = |id| {
-        let patch: PatchId = solved.forest.patch(id)?;
-        grouping.of_patch[patch.0 as usize]
-    };
-    let ends = |link: &crate::pair::Link| {
-        let (a, b) = (group(link.a)?, group(link.b)?);
-        (link.carried.visibility > 0).then_some((a.min(b), a.max(b)))
-    };
-    let mut starts = vec![0; grouping.names.len() + 1];
-    let links = solved.tree.links();
-    for (row, _) in links.clone().filter_map(|link| ends(&link)) {
-        starts[row as usize + 1] += 1;
-    }
-    for row in 1..starts.len() {
-        starts[row] += starts[row - 1];
-    }
-    let mut next = starts.clone();
-    let mut entries = vec![(0, 0); *starts.last().expect("one more than rows")];
-    for link in links {
-        if let Some((row, column)) = ends(&link) {
-            let both = if row == column { 2 } else { 1 };
-            entries[next[row as usize]] = (column, both * fixed.whole(&link));
-            next[row as usize] += 1;
+/// Area of each group, m2: of its patches that are present.
+fn areas(solved: &Solved, scene: &Scene, grouping: &Grouping) -> Vec<f64> {
+    let mut areas = vec![0.0; grouping.names.len()];
+    for (patch, group) in scene.patches.iter().zip(&grouping.of_patch) {
+        if let Some(group) = group
+            && solved.view.is_present(patch.body)
+        {
+            areas[*group as usize] += patch.area_m2();
         }
     }
-    Buckets { starts, entries }
-}
-
-/// Rows that one task sums.
-const ROWS_AT_ONCE: usize = 64;
-
-/// Sums of the entries of each row by column, ascending, without zeros.
-fn merged(groups: usize, buckets: &Buckets) -> Vec<Vec<(u32, u64)>> {
-    let rows: Vec<usize> = (0..groups).collect();
-    let sum_rows = |rows: &[usize]| {
-        let mut sums = vec![0_u64; groups];
-        let mut touched = Vec::new();
-        let mut sum_row = |row: usize| {
-            for &(column, value) in &buckets.entries[buckets.starts[row]..buckets.starts[row + 1]] {
-                if sums[column as usize] == 0 && value > 0 {
-                    touched.push(column);
-                }
-                sums[column as usize] += value;
-            }
-            touched.sort_unstable();
-            let out: Vec<(u32, u64)> =
-                touched.iter().map(|&c| (c, std::mem::take(&mut sums[c as usize]))).collect();
-            touched.clear();
-            out
-        };
-        rows.iter().map(|&row| sum_row(row)).collect::<Vec<_>>()
-    };
-    rows.par_chunks(ROWS_AT_ONCE).flat_map_iter(sum_rows).collect()
-}
-
-/// Both triangles of a symmetric matrix whose upper one is given.
-fn mirrored(area_m2: Vec<f64>, upper: &[Vec<(u32, u64)>], fixed: &Fixed) -> Factors {
-    let groups = area_m2.len();
-    let mut offsets = vec![0; groups + 1];
-    for (row, entries) in upper.iter().enumerate() {
-        for &(column, _) in entries {
-            offsets[row + 1] += 1;
-            if column as usize != row {
-                offsets[column as usize + 1] += 1;
-            }
-        }
-    }
-    for row in 1..=groups {
-        offsets[row] += offsets[row - 1];
-    }
-    let mut next = offsets.clone();
-    let mut columns = vec![0; offsets[groups]];
-    let mut exchange_m2 = vec![0.0; offsets[groups]];
-    let mut put = |row: usize, column: u32, value: f64| {
-        (columns[next[row]], exchange_m2[next[row]]) = (column, value);
-        next[row] += 1;
-    };
-    // Row by row, so that columns ascend: what is left of the diagonal comes from rows above.
-    for (row, entries) in upper.iter().enumerate() {
-        for &(column, whole) in entries {
-            let value = fixed.area_m2(whole);
-            put(row, column, value);
-            if column as usize != row {
-                put(column as usize, row as u32, value);
-            }
-        }
-    }
-    let inverse = |a: &f64| if *a > 0.0 { 1.0 / a } else { 0.0 };
-    let left = area_m2.iter().map(inverse).collect();
-    Factors { area_m2, offsets, columns, exchange_m2, left, right: vec![1.0; groups] }
+    areas
 }
 
 #[cfg(test)]

@@ -1,0 +1,212 @@
+//! Coplanar neighbouring patches joined into larger ones, of which the old ones are parts: a wall of
+//! 400 named cells is one patch to be solved.
+//!
+//! For form factors, where all surfaces weigh the same: what joins may differ in name, surface,
+//! material and (where nothing moves) body. Must not know elements or what is asked of the parts.
+
+use std::collections::{BTreeMap, HashMap};
+
+use glam::{DVec2, DVec3};
+
+use super::flatten::{flatten, seen_from_behind};
+use super::merge::merge;
+use super::{BodyId, Patch, PatchId, Scene};
+
+/// A scene with fewer, larger patches, and where those of the scene it was made of are.
+#[derive(Clone, Debug)]
+pub struct Joined {
+    /// The scene to be solved. Names, surfaces and materials are those of the first patch of several.
+    pub scene: Scene,
+    /// The parts of each of its patches, by `PatchId`: they tile it, up to rounding.
+    pub parts: Vec<Vec<Part>>,
+}
+
+/// A part of a joined patch.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// The patch of the first scene that it is, or is a triangle of.
+    pub patch: PatchId,
+    /// Corners in the frame of the joined patch, counter-clockwise, metres.
+    pub corners: Vec<DVec2>,
+}
+
+/// Corners closer together than this share of a group's coordinates are one: a few roundings of
+/// 32-bit numbers.
+const WELDED: f64 = 1e-6;
+
+impl Scene {
+    /// Joins coplanar patches that share whole sides, face the same way and move together into
+    /// convex polygons. A patch without such neighbours stays as it is, bit for bit.
+    pub fn joined(&self) -> Joined {
+        let mut joins = Joins { of_patch: vec![None; self.patches.len()], polygons: Vec::new() };
+        for members in self.groups().values() {
+            joins.add(self, members);
+        }
+        joins.scene(self)
+    }
+
+    /// Fronts of patches by what they move with and whether they are two-sided or mere obstructions.
+    fn groups(&self) -> BTreeMap<(Option<BodyId>, bool, bool), Vec<PatchId>> {
+        let mut groups: BTreeMap<_, Vec<PatchId>> = BTreeMap::new();
+        for (id, patch) in (0..).map(PatchId).zip(&self.patches) {
+            if patch.twin.is_none_or(|twin| twin > id) {
+                let carrier = self.moves(patch.body).then_some(patch.body);
+                let obstructs = self.obstructions.contains(&patch.surface);
+                groups.entry((carrier, patch.twin.is_some(), obstructs)).or_default().push(id);
+            }
+        }
+        groups
+    }
+}
+
+/// Polygons that several patches make up.
+struct Joins {
+    /// The polygon that a patch is a part of, or that its first triangle is in.
+    of_patch: Vec<Option<usize>>,
+    polygons: Vec<Polygon>,
+}
+
+struct Polygon {
+    outline: Vec<DVec3>,
+    /// Loops in the body's frame, by the patch they are of.
+    parts: Vec<(PatchId, Vec<DVec3>)>,
+}
+
+impl Joins {
+    fn add(&mut self, scene: &Scene, members: &[PatchId]) {
+        let loops: Vec<Vec<DVec3>> = members
+            .iter()
+            .map(|id| scene.patches[id.0 as usize].corners_in_body().collect())
+            .collect();
+        let (points, welded) = weld(&loops);
+        let mut triangles: Vec<[u32; 3]> = Vec::new();
+        let mut of: Vec<usize> = Vec::new();
+        for (k, corners) in welded.iter().enumerate() {
+            let mut sorted = corners.clone();
+            sorted.sort_unstable();
+            sorted.dedup();
+            if sorted.len() == corners.len() {
+                for i in 1..corners.len() - 1 {
+                    triangles.push([corners[0], corners[i], corners[i + 1]]);
+                    of.push(k);
+                }
+            }
+        }
+        let merged = merge(&points, &triangles);
+        let mut within: Vec<BTreeMap<usize, Vec<usize>>> =
+            vec![BTreeMap::new(); merged.polygons.len()];
+        let mut whole = vec![true; loops.len()];
+        let mut first = vec![None; loops.len()];
+        for (t, polygon) in merged.polygon_of.iter().enumerate() {
+            let Some(polygon) = *polygon else {
+                whole[of[t]] = false;
+                continue;
+            };
+            within[polygon as usize].entry(of[t]).or_default().push(t);
+            whole[of[t]] &= *first[of[t]].get_or_insert(polygon) == polygon;
+        }
+        // What has lost a triangle, or would share one with a polygon that is no better, stays alone.
+        for (outline, parts) in merged.polygons.into_iter().zip(within) {
+            if parts.len() < 2 || !parts.keys().all(|&k| whole[k]) || flatten(&outline).is_err() {
+                continue;
+            }
+            for &k in parts.keys() {
+                self.of_patch[members[k].0 as usize] = Some(self.polygons.len());
+            }
+            let parts = parts.keys().map(|&k| (members[k], loops[k].clone())).collect();
+            self.polygons.push(Polygon { outline, parts });
+        }
+    }
+
+    fn scene(self, scene: &Scene) -> Joined {
+        let mut out = Joined { scene: scene.clone(), parts: Vec::new() };
+        out.scene.patches.clear();
+        let mut done = vec![false; self.polygons.len()];
+        for body in 0..scene.bodies.len() {
+            let start = out.scene.patches.len() as u32;
+            for (id, patch) in scene.patches_of(BodyId(body as u32)) {
+                let front = patch.twin.map_or(id, |twin| twin.min(id));
+                match self.of_patch[front.0 as usize] {
+                    None => out.keep(scene, id),
+                    Some(k) if !std::mem::replace(&mut done[k], true) => {
+                        out.put(patch, &self.polygons[k]);
+                    }
+                    Some(_) => {}
+                }
+            }
+            out.scene.bodies[body].patches = start..out.scene.patches.len() as u32;
+        }
+        out
+    }
+}
+
+impl Joined {
+    fn keep(&mut self, scene: &Scene, id: PatchId) {
+        let patch = &scene.patches[id.0 as usize];
+        let next = self.scene.patches.len() as u32;
+        let twin = patch.twin.map(|twin| PatchId(if twin > id { next + 1 } else { next - 1 }));
+        self.scene.patches.push(Patch { twin, ..patch.clone() });
+        self.parts.push(vec![Part { patch: id, corners: patch.corners.clone() }]);
+    }
+
+    /// A joined polygon, and its other side where it has one.
+    fn put(&mut self, first: &Patch, polygon: &Polygon) {
+        let (frame, corners) = flatten(&polygon.outline).expect("it was tried");
+        let place = |p: &DVec3| {
+            let d = *p - frame.origin;
+            DVec2::new(d.dot(frame.u), d.dot(frame.v))
+        };
+        let part = |(patch, outline): &(PatchId, Vec<DVec3>)| Part {
+            patch: *patch,
+            corners: outline.iter().map(place).collect(),
+        };
+        let parts: Vec<Part> = polygon.parts.iter().map(part).collect();
+        let front = PatchId(self.scene.patches.len() as u32);
+        let back = PatchId(front.0 + 1);
+        if first.twin.is_some() {
+            let (behind, seen) = seen_from_behind(&frame, &corners);
+            let turned = |part: &Part| Part {
+                patch: PatchId(part.patch.0 + 1),
+                corners: part.corners.iter().rev().map(|c| DVec2::new(c.y, c.x)).collect(),
+            };
+            let backs = parts.iter().map(turned).collect();
+            self.scene.patches.push(Patch { frame, corners, twin: Some(back), ..first.clone() });
+            self.scene.patches.push(Patch {
+                frame: behind,
+                corners: seen,
+                twin: Some(front),
+                ..first.clone()
+            });
+            self.parts.extend([parts, backs]);
+        } else {
+            self.scene.patches.push(Patch { frame, corners, ..first.clone() });
+            self.parts.push(parts);
+        }
+    }
+}
+
+/// One index for all corners at one place, in the order they come in.
+fn weld(loops: &[Vec<DVec3>]) -> (Vec<DVec3>, Vec<Vec<u32>>) {
+    let reach = loops.iter().flatten().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+    let near = (WELDED * reach).max(f64::MIN_POSITIVE);
+    // Coordinates are at most 1e6 of these, so that all numbers of cells are exact.
+    let cell = |p: DVec3| (p / near).floor().to_array().map(|x| x as i64);
+    let mut points: Vec<DVec3> = Vec::new();
+    let mut at: HashMap<[i64; 3], u32> = HashMap::new();
+    let mut index = |p: &DVec3| {
+        let [x, y, z] = cell(*p);
+        let around =
+            (-1..=1).flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [i, j, k])));
+        let found = around
+            .filter_map(|[i, j, k]| at.get(&[x + i, y + j, z + k]).copied())
+            .find(|&k| points[k as usize].distance(*p) <= near);
+        found.unwrap_or_else(|| {
+            let new = points.len() as u32;
+            points.push(*p);
+            at.insert([x, y, z], new);
+            new
+        })
+    };
+    let welded = loops.iter().map(|l| l.iter().map(&mut index).collect()).collect();
+    (points, welded)
+}

@@ -141,6 +141,8 @@ struct Fixed {
     patch_roots: Vec<ElementId>,
     body_roots: Vec<ElementId>,
     facets: Vec<ElementId>,
+    /// For each patch the convex solid whose face it is; `NONE` if it is none's.
+    solids: Vec<u32>,
 }
 
 /// Where elements went when the forest was put together: those that stayed keep their order.
@@ -184,6 +186,7 @@ impl Forest {
             fixed: Arc::new(Fixed {
                 patch_roots: vec![ElementId(NONE); scene.patches.len()],
                 body_roots: vec![ElementId(NONE); scene.bodies.len()],
+                solids: scene.solids().into_iter().map(|s| s.unwrap_or(NONE)).collect(),
                 ..Fixed::default()
             }),
             vacant: [Vec::new(), Vec::new()],
@@ -519,6 +522,12 @@ impl Forest {
     /// The root node of a patch.
     pub fn patch_root(&self, patch: PatchId) -> ElementId {
         self.fixed.patch_roots[patch.0 as usize]
+    }
+
+    /// The convex solid whose face a patch is, if it is one's.
+    pub fn solid(&self, patch: PatchId) -> Option<u32> {
+        let solid = self.fixed.solids[patch.0 as usize];
+        (solid != NONE).then_some(solid)
     }
 
     /// The cluster of a body.

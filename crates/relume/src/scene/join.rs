@@ -4,12 +4,13 @@
 //! For form factors, where all surfaces weigh the same: what joins may differ in name, surface,
 //! material and (where nothing moves) body. Must not know elements or what is asked of the parts.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 
 use super::flatten::{flatten, seen_from_behind};
 use super::merge::merge;
+use super::weld::Weld;
 use super::{BodyId, Patch, PatchId, Scene};
 
 /// A scene with fewer, larger patches, and where those of the scene it was made of are.
@@ -78,7 +79,10 @@ impl Joins {
             .iter()
             .map(|id| scene.patches[id.0 as usize].corners_in_body().collect())
             .collect();
-        let (points, welded) = weld(&loops);
+        let reach = loops.iter().flatten().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+        let mut weld = Weld::new(WELDED * reach);
+        let mut number = |corners: &Vec<DVec3>| corners.iter().map(|&c| weld.vertex(c)).collect();
+        let welded: Vec<Vec<u32>> = loops.iter().map(&mut number).collect();
         let mut triangles: Vec<[u32; 3]> = Vec::new();
         let mut of: Vec<usize> = Vec::new();
         for (k, corners) in welded.iter().enumerate() {
@@ -92,7 +96,7 @@ impl Joins {
                 }
             }
         }
-        let merged = merge(&points, &triangles);
+        let merged = merge(&weld.points, &triangles);
         let mut within: Vec<BTreeMap<usize, Vec<usize>>> =
             vec![BTreeMap::new(); merged.polygons.len()];
         let mut whole = vec![true; loops.len()];
@@ -185,28 +189,5 @@ impl Joined {
     }
 }
 
-/// One index for all corners at one place, in the order they come in.
-fn weld(loops: &[Vec<DVec3>]) -> (Vec<DVec3>, Vec<Vec<u32>>) {
-    let reach = loops.iter().flatten().map(|p| p.abs().max_element()).fold(0.0, f64::max);
-    let near = (WELDED * reach).max(f64::MIN_POSITIVE);
-    // Coordinates are at most 1e6 of these, so that all numbers of cells are exact.
-    let cell = |p: DVec3| (p / near).floor().to_array().map(|x| x as i64);
-    let mut points: Vec<DVec3> = Vec::new();
-    let mut at: HashMap<[i64; 3], u32> = HashMap::new();
-    let mut index = |p: &DVec3| {
-        let [x, y, z] = cell(*p);
-        let around =
-            (-1..=1).flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [i, j, k])));
-        let found = around
-            .filter_map(|[i, j, k]| at.get(&[x + i, y + j, z + k]).copied())
-            .find(|&k| points[k as usize].distance(*p) <= near);
-        found.unwrap_or_else(|| {
-            let new = points.len() as u32;
-            points.push(*p);
-            at.insert([x, y, z], new);
-            new
-        })
-    };
-    let welded = loops.iter().map(|l| l.iter().map(&mut index).collect()).collect();
-    (points, welded)
-}
+#[cfg(test)]
+mod tests;

@@ -24,7 +24,9 @@ mod merge;
 mod motion;
 mod names;
 mod rigid;
+mod solid;
 mod view3d;
+mod weld;
 
 pub use builder::SceneBuilder;
 pub use check::check;

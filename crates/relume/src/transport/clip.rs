@@ -27,12 +27,42 @@ const EDGES_AT_ONCE: usize = 512;
 pub(super) struct Polygons {
     corners: Vec<DVec3>,
     ends: Vec<usize>,
+    /// Unit normals, and the convex solids whose faces they are.
+    faces: Vec<(DVec3, Option<u32>)>,
 }
 
 impl Polygons {
-    pub(super) fn push(&mut self, corners: impl Iterator<Item = DVec3>) {
+    /// Adds a polygon with its unit normal and the convex solid whose face it is.
+    pub(super) fn push(
+        &mut self,
+        corners: impl Iterator<Item = DVec3>,
+        normal: DVec3,
+        solid: Option<u32>,
+    ) {
         self.corners.extend(corners);
         self.ends.push(self.corners.len());
+        self.faces.push((normal, solid));
+    }
+
+    /// Those that hide something from an end: where it is wholly in front of one face of a solid, it is
+    /// outside, and faces that it is wholly behind hide nothing that others do not.
+    fn facing<'a>(
+        &'a self,
+        looker: &'a WorldElement,
+        slack: f64,
+    ) -> impl Iterator<Item = &'a [DVec3]> + 'a {
+        let span = move |(corners, (normal, _)): (&[DVec3], &(DVec3, Option<u32>))| {
+            looker.span(&Plane::through(corners[0], *normal))
+        };
+        let all = || self.iter().zip(&self.faces);
+        let is_outside = move |solid: u32| {
+            all().any(|(corners, face)| face.1 == Some(solid) && span((corners, face)).0 > slack)
+        };
+        let hides = move |(corners, face): &(&[DVec3], &(DVec3, Option<u32>))| match face.1 {
+            Some(solid) => span((corners, face)).1 >= -slack || !is_outside(solid),
+            None => true,
+        };
+        all().filter(hides).map(|(corners, _)| corners)
     }
 
     fn iter(&self) -> impl Iterator<Item = &[DVec3]> {
@@ -72,7 +102,7 @@ pub(super) fn clipped_visibility(
     let frame = TargetFrame::of(other);
     let facing = ConvexPolygon::new(&other.corners[..other.len]).clipped(&looker.plane, slack);
     let target = frame.flat(facing.corners());
-    let between = Occluders::between(occluders.iter(), looker, other, &frame, slack);
+    let between = Occluders::between(occluders.facing(looker, slack), looker, other, &frame, slack);
     let normal = frame.direction(looker.plane.normal);
     let mut looks = Looks { sums: Sums::default(), edges: EdgeBundles::default(), seen: vec![] };
     let mut cutter = Cutter::default();
@@ -673,9 +703,9 @@ mod tests {
     fn visibility(a: &WorldElement, b: &WorldElement, occluders: &[Vec<DVec3>]) -> Visibility {
         let mut polygons = Polygons::default();
         for occluder in occluders {
-            polygons.push(occluder.iter().copied());
+            polygons.push(occluder.iter().copied(), DVec3::Z, None);
         }
-        clipped_visibility(Simd::detect(), a, b, &polygons, 1)
+        clipped_visibility(Simd::detect(), (a, b), &polygons, (Looker::Best, 1))
     }
 
     #[test]

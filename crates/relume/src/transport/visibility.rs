@@ -336,13 +336,15 @@ pub fn exact_visibility(
     for &patch in blockers {
         // Everything in one frame: that of the pair's body if it has one of its own.
         let (rides, lifted) = shaft.lifted(patch);
-        let corners = lifted.corners();
+        let (corners, normal) = (lifted.corners(), lifted.polygon.plane.normal);
+        let solid = shaft.forest.solid(patch);
         match shaft.own {
             Some((own, _, _)) if !rides => {
                 let pose = shaft.view.poses()[own.0 as usize].unwrap_or(Pose::IDENTITY);
-                occluders.push(corners.map(|c| pose.inverse_point(c)));
+                let normal = pose.rotation.transpose() * normal;
+                occluders.push(corners.map(|c| pose.inverse_point(c)), normal, solid);
             }
-            _ => occluders.push(corners),
+            _ => occluders.push(corners, normal, solid),
         }
     }
     Some(clipped_visibility(simd, (a, b), &occluders, (looker, cells)))

@@ -66,6 +66,33 @@ pub(crate) fn turn(b: &mut SceneBuilder, node: NodeId, axis: DVec3, angle: f64) 
     );
 }
 
+/// The sides of a cuboid in `n` x `n` cells each, side by side.
+pub(crate) fn cells_of_cuboid(lo: DVec3, hi: DVec3, n: usize, inward: bool) -> Vec<Vec<DVec3>> {
+    let mut out = Vec::new();
+    for axis in 0..3 {
+        let (s, t) = ((axis + 1) % 3, (axis + 2) % 3);
+        for (side, end) in [lo, hi].into_iter().enumerate() {
+            for k in 0..n * n {
+                let at = |i: usize, j: usize| {
+                    let share = |k: usize| k as f64 / n as f64;
+                    let mut p = lo;
+                    p[axis] = end[axis];
+                    p[s] += (hi[s] - lo[s]) * share(i);
+                    p[t] += (hi[t] - lo[t]) * share(j);
+                    p
+                };
+                let (i, j) = (k % n, k / n);
+                let mut cell = vec![at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                if (side == 0) != inward {
+                    cell.reverse();
+                }
+                out.push(cell);
+            }
+        }
+    }
+    out
+}
+
 /// Adds plates of one material that do not move; each name is a surface, its polygons in a list.
 pub(crate) fn plates(b: &mut SceneBuilder, material: MaterialId, plates: &[(&str, &[Vec<DVec3>])]) {
     for (name, polygons) in plates {

@@ -4,10 +4,9 @@
 //! corner of another polygon lies on them, so that one long wall may meet several short ones. Must
 //! not know what is wrong with anything.
 
-use std::collections::BTreeMap;
-
 use glam::DVec3;
 
+use crate::scene::weld::Weld;
 use crate::scene::{BodyId, PatchId, Scene};
 
 /// Share of the scene's diagonal below which two corners are one.
@@ -43,8 +42,7 @@ impl Topology {
     /// The polygons present at `time_s`.
     pub(super) fn of(scene: &Scene, time_s: f64) -> Topology {
         let diagonal = scene.bounds(time_s).map_or(0.0, |(min, max)| min.distance(max));
-        let mut weld =
-            Weld { tolerance: WELD * diagonal, points: Vec::new(), cells: BTreeMap::new() };
+        let mut weld = Weld::new(WELD * diagonal);
         let mut polygons = Vec::new();
         for body in (0..scene.bodies.len() as u32).map(BodyId) {
             let Some(pose) = scene.pose(body, time_s) else { continue };
@@ -61,39 +59,6 @@ impl Topology {
         let sides = matched(&weld.points, weld.tolerance, sides_of(&polygons));
         let component = components(polygons.len(), &sides);
         Topology { points: weld.points, polygons, sides, component }
-    }
-}
-
-/// Gives points the number of the first one within a tolerance.
-struct Weld {
-    tolerance: f64,
-    points: Vec<DVec3>,
-    cells: BTreeMap<[i64; 3], Vec<u32>>,
-}
-
-impl Weld {
-    fn vertex(&mut self, p: DVec3) -> u32 {
-        // Large cells, so that a point seldom has to look into a neighbouring one.
-        let size = (1024.0 * self.tolerance).max(f64::MIN_POSITIVE);
-        let cell = |q: DVec3| (q / size).floor().to_array().map(|x| x as i64);
-        let reach = DVec3::splat(self.tolerance);
-        let (low, high) = (cell(p - reach), cell(p + reach));
-        for x in low[0]..=high[0] {
-            for y in low[1]..=high[1] {
-                for z in low[2]..=high[2] {
-                    let near = self.cells.get(&[x, y, z]).into_iter().flatten();
-                    for &v in near {
-                        if self.points[v as usize].distance(p) <= self.tolerance {
-                            return v;
-                        }
-                    }
-                }
-            }
-        }
-        let v = self.points.len() as u32;
-        self.points.push(p);
-        self.cells.entry(cell(p)).or_default().push(v);
-        v
     }
 }
 

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use common::{at_tolerance, form_factor_oracle, leaf_area, sliding, solved, turn, v};
 use glam::{DQuat, DVec3};
 use relume::scene::{Scene, SceneBuilder};
-use relume::session::{Energy, FrameReport, Options, Session};
+use relume::session::{Energy, FrameReport, Options, Session, Snapshot};
 
 const M: [f64; 3] = [1.0, 0.3, 2.0];
 /// An error of the row sums makes rho / (1 - rho) times that of B: 1, 4 and 1/4.
@@ -44,11 +44,13 @@ struct Off {
     rms: f64,
     /// Largest error of a leaf.
     max: f64,
+    /// Share of the area where leaves are further off than 1e-3.
+    beyond: f64,
 }
 
 impl std::fmt::Display for Off {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Off { patch, bright, mean, rms, max } = self;
+        let Off { patch, bright, mean, rms, max, .. } = self;
         write!(
             f,
             "patch means {patch:.1e} (rho 0.8: {bright:.1e}), mean {mean:+.1e}, RMS {rms:.1e}, max {max:.1e}"
@@ -58,7 +60,10 @@ impl std::fmt::Display for Off {
 
 /// Compares the radiosities of all patches that `counts` lets through.
 fn off(session: &Session, counts: impl Fn(&str, DVec3) -> bool) -> Off {
-    let snapshot = session.snapshot();
+    off_in(&session.snapshot(), counts)
+}
+
+fn off_in(snapshot: &Snapshot, counts: impl Fn(&str, DVec3) -> bool) -> Off {
     let mut out = Off::default();
     let (mut total, mut squares, mut first) = (0.0, 0.0, 0.0);
     for (k, patch) in snapshot.scene.patches.iter().enumerate() {
@@ -76,6 +81,7 @@ fn off(session: &Session, counts: impl Fn(&str, DVec3) -> bool) -> Off {
             sums[1] += a * error(1);
             squares += a * error(0).powi(2);
             out.max = out.max.max(error(0).abs());
+            out.beyond += if error(0).abs() > 1e-3 { a } else { 0.0 };
         }
         out.patch = out.patch.max((sums[0] / area).abs());
         out.bright = out.bright.max((sums[1] / area).abs());
@@ -84,6 +90,7 @@ fn off(session: &Session, counts: impl Fn(&str, DVec3) -> bool) -> Off {
     }
     out.rms = (squares / total).sqrt();
     out.mean = first / total;
+    out.beyond /= total;
     out
 }
 
@@ -125,6 +132,21 @@ fn near_enough_at_every_frame() {
         assert!(o.patch < 1e-3 && o.bright < 6e-3, "frame {frame}: {o:?}");
         assert!(o.mean.abs() < 5e-4 && o.rms < 0.01 && o.max < 0.1, "frame {frame}: {o:?}");
         assert!(report.row_sum_error.unwrap().rms < 0.02, "frame {frame}: {report:?}");
+    }
+}
+
+#[test]
+fn every_leaf_is_near_enough_when_it_is_reconstructed() {
+    let mut session = Session::new(Arc::new(furnace(0.2)), Options::default()).unwrap();
+    for frame in 0..=8 {
+        session.step(frame, f64::from(frame) / 8.0).unwrap();
+        let o = off_in(&session.reconstruction(), everything);
+        println!(
+            "reconstructed frame {frame}: {o}, {:.2} % of the area further off than 1e-3",
+            100.0 * o.beyond
+        );
+        assert!(o.rms < 7e-4 && o.max < 6e-3 && o.beyond < 0.05, "frame {frame}: {o:?}");
+        assert!(o.patch < 1e-3, "frame {frame}: {o:?}");
     }
 }
 

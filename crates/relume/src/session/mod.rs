@@ -20,6 +20,8 @@ mod gather;
 mod lossy;
 mod names;
 mod options;
+mod pieces;
+mod reconstruct;
 mod report;
 mod snapshot;
 mod surfaces;
@@ -208,7 +210,20 @@ impl Session {
     /// Before the first [`Session::step`].
     pub fn snapshot(&self) -> Snapshot {
         let solved = self.solved.as_ref().expect("a step comes before a snapshot");
-        snapshot::take(&self.scene, solved)
+        snapshot::take(&self.scene, solved, None)
+    }
+
+    /// The present solution with the irradiance of every leaf found anew from the links above it: along
+    /// edges between surfaces, where leaves of [`Session::snapshot`] inherit lines through steep
+    /// curves, some ten times as accurate.
+    ///
+    /// Cost: several times that of a frame with a moving light.
+    ///
+    /// # Panics
+    /// Before the first [`Session::step`].
+    pub fn reconstruction(&self) -> Snapshot {
+        let solved = self.solved.as_ref().expect("a step comes before a snapshot");
+        snapshot::take(&self.scene, solved, Some(&reconstruct::corrections(self, solved)))
     }
 
     /// The pair tree of the present solution, with the forest its elements are in.

@@ -313,6 +313,11 @@ impl Radiosity {
         self.radiosity.get(id).mean
     }
 
+    /// Radiosity of an element with its gradient per radius, W/m2.
+    pub fn linear(&self, id: u32) -> Linear {
+        self.radiosity.get(id)
+    }
+
     /// Calls `visit` with the irradiance (mean, and gradient per metre) of each leaf of a facet,
     /// children in order.
     pub fn irradiances(

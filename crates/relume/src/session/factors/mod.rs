@@ -3,6 +3,7 @@
 use crate::pair::Link;
 use crate::scene::Scene;
 
+use super::pieces::Sharing;
 use super::{Session, Solved};
 
 mod fragments;
@@ -224,7 +225,7 @@ impl Session {
         let fragments = Fragments::whole(&solved.forest, grouping);
         let fixed = Fixed::of(self.scene.area_m2());
         let links: Vec<Link> = solved.tree.links().collect();
-        let spread = Spread::new(solved, self.simd, &fragments);
+        let spread = Spread { sharing: Sharing::new(self, solved), fragments: &fragments };
         let none = vec![Vec::new(); grouping.names.len()];
         let upper = plus(&none, &links, &spread, (&fixed, Sign::Plus));
         mirrored(areas(solved, &self.scene, grouping), &upper, &fixed)

@@ -11,6 +11,8 @@ use crate::pair::Link;
 use crate::scene::{BodyId, Joined, Part, Scene};
 
 use super::fragments::{Fragments, Spread};
+use crate::session::pieces::Sharing;
+
 use super::sum::{Fixed, Sign, Upper, mirrored, plus};
 use super::{Factors, Grouping, Session, Solved, areas};
 
@@ -71,7 +73,7 @@ impl PartFactors {
         assert_eq!(self.parts.len(), session.scene.patches.len());
         let fixed = Fixed::of(session.scene.area_m2());
         let fragments = Fragments::of_parts(&solved.forest, &self.parts, &self.grouping);
-        let spread = Spread::new(solved, session.simd, &fragments);
+        let spread = Spread { sharing: Sharing::new(session, solved), fragments: &fragments };
         let movers = Movers::of(&session.scene, solved);
         let (rest, moving): (Vec<Link>, Vec<Link>) = {
             let links: Vec<Link> = solved.tree.links().collect();
@@ -86,13 +88,8 @@ impl PartFactors {
             Some(before) => {
                 let (gone, new) = differences(&before.links, &rest);
                 // Where a link rested there was no mover, but there may be one now.
-                let through = &movers.moves[..];
-                let of_old = Spread {
-                    forest: &before.forest,
-                    fragments: &before.fragments,
-                    through,
-                    ..spread
-                };
+                let sharing = spread.sharing.of_forest(&before.forest, &movers.moves);
+                let of_old = Spread { sharing, fragments: &before.fragments };
                 let sums = plus(&before.sums, &gone, &of_old, (&fixed, Sign::Minus));
                 plus(&sums, &new, &spread, (&fixed, Sign::Plus))
             }

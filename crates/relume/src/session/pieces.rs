@@ -1,0 +1,300 @@
+//! How what a link carries falls on pieces of its ends.
+//!
+//! Without occlusion as the kernel falls on them, past occluders as each piece sees the whole of the other
+//! end. A pure query about links, elements and poses; must not know what the pieces are for.
+
+use glam::DVec3;
+
+use crate::element::{ElementId, Forest, Shape, WorldElement, WorldPatch, WorldView};
+use crate::pair::Link;
+use crate::scene::{BodyId, PatchId};
+use crate::transport::{Looker, Meeting, Shaft, Simd, exact_visibility, exchange, meeting};
+
+use super::{Session, Solved};
+
+/// What is needed to share out what links carry.
+#[derive(Clone, Copy)]
+pub(super) struct Sharing<'a> {
+    forest: &'a Forest,
+    view: &'a WorldView,
+    simd: Simd,
+    /// See [`CLOSER`].
+    closer: f64,
+    /// Bodies that are looked through, if any.
+    through: &'a [bool],
+}
+
+/// A link's end, or a piece of one, with its place for light within one body and in the world.
+#[derive(Clone, Copy)]
+struct Place {
+    own: WorldElement,
+    world: WorldElement,
+}
+
+/// A link whose ends are cut.
+struct Cut {
+    ends: (End, End),
+    /// The body that both ends ride on.
+    body: Option<BodyId>,
+    patches: (PatchId, PatchId),
+}
+
+struct End {
+    whole: Place,
+    /// One if it is not cut.
+    pieces: Vec<Place>,
+}
+
+/// What a piece sees of the other end.
+struct Look {
+    value: f64,
+    /// Middle and radius of the piece, metres.
+    from: (DVec3, f64),
+    is_near: bool,
+    is_clear: bool,
+}
+
+/// (sum of the radii / distance)^2 above which two fragments are not points.
+const POINTS: f64 = 0.01;
+
+/// Occluding polygons up to which pieces of partly hidden links are looked at by clipping.
+const CLIPPED_MAX: usize = 96;
+
+/// Form factor of a piece to the other end times the spread of visibility over the piece above
+/// which it is looked at from more points, as a share of the tolerance.
+const CLOSER: f64 = 2.5e-3;
+
+/// Pieces are side by side if their middles are closer than this share of their radii.
+const BESIDE: f64 = 1.01;
+
+/// How far apart in their order pieces are asked whether they are side by side.
+const AROUND: usize = 32;
+
+/// Spread of visibility that four points which agree may have overlooked.
+const UNSEEN: f64 = 0.05;
+
+/// The same where what blocks is nearer than this many radii of the piece.
+const NEAR: f64 = 2.0;
+
+/// See [`NEAR`].
+const UNSEEN_NEAR: f64 = 0.25;
+
+/// Steps in which shares are fitted to what every piece sees.
+const FITS: usize = 8;
+
+/// Visibility of a pair of pieces relative to that of the link from which fitting starts, at least:
+/// what seems hidden may have to take what others cannot.
+const SEEN_MIN: f64 = 1e-3;
+
+impl<'a> Sharing<'a> {
+    pub(super) fn new(session: &Session, solved: &'a Solved) -> Sharing<'a> {
+        let (simd, closer) = (session.simd, CLOSER * session.options.tolerance);
+        Sharing { forest: &solved.forest, view: &solved.view, simd, closer, through: &[] }
+    }
+
+    /// The same for links that end in another forest of the scene, looking through some bodies.
+    pub(super) fn of_forest(self, forest: &'a Forest, through: &'a [bool]) -> Sharing<'a> {
+        Sharing { forest, through, ..self }
+    }
+
+    /// An element within its patch.
+    pub(super) fn shape(&self, id: ElementId) -> Shape {
+        self.forest.shape(id)
+    }
+
+    /// Both ends of a link in the world.
+    pub(super) fn whole(&self, link: &Link) -> (WorldElement, WorldElement) {
+        let place = |id| WorldElement::new(self.view, self.forest, id, false);
+        (place(link.a), place(link.b))
+    }
+
+    /// Exchange area past occluders of each pair of pieces of both ends, m2, the pieces of the second
+    /// end running fastest; an end in one piece is whole. `None` where they exchange nothing.
+    pub(super) fn shares(&self, link: &Link, (a, b): (&[Shape], &[Shape])) -> Option<Vec<f64>> {
+        let cut = self.cut(link, (a, b));
+        let mut shares = self.unoccluded(&cut, f64::from(link.carried.exchange_area_m2))?;
+        // Where a link seems to be clear or hidden, some of its pieces may not be.
+        let blockers = self.blockers(&cut);
+        if !blockers.is_empty() {
+            let v = f64::from(link.carried.visibility) / 65_535.0;
+            self.hide(&cut, v, &blockers, &mut shares);
+        }
+        Some(shares)
+    }
+
+    fn cut(&self, link: &Link, (a, b): (&[Shape], &[Shape])) -> Cut {
+        let patch = |id| self.forest.patch(id).expect("elements have patches");
+        let patches = (patch(link.a), patch(link.b));
+        let (on_a, on_b) = (self.view.patch(patches.0), self.view.patch(patches.1));
+        let body = (on_a.body == on_b.body).then_some(on_a.body);
+        let end = |id, shapes: &[Shape], on: &WorldPatch| {
+            let place = |shape: &Shape| {
+                let world = WorldElement::of_shape(on, shape, false);
+                let own = match body {
+                    Some(_) => WorldElement::of_shape(on, shape, true),
+                    None => world,
+                };
+                Place { own, world }
+            };
+            End { whole: place(&self.forest.shape(id)), pieces: shapes.iter().map(place).collect() }
+        };
+        Cut { ends: (end(link.a, a, on_a), end(link.b, b, on_b)), body, patches }
+    }
+
+    /// Exchange area of each pair of pieces without occlusion, m2: as the kernel falls on them, with
+    /// the link's as the sum.
+    fn unoccluded(&self, cut: &Cut, exchange_area_m2: f64) -> Option<Vec<f64>> {
+        let (one, other) = (&cut.ends.0.pieces, &cut.ends.1.pieces);
+        let pairs = one.iter().flat_map(|p| other.iter().map(move |q| (&p.own, &q.own)));
+        let mut shares: Vec<f64> = pairs.map(|(p, q)| self.exchange(p, q)).collect();
+        let sum: f64 = shares.iter().sum();
+        shares.iter_mut().for_each(|share| *share *= exchange_area_m2 / sum);
+        (sum > 0.0).then_some(shares)
+    }
+
+    /// Takes away from the shares of pieces what occluders hide: each piece is looked at with the
+    /// whole of the other end, and shares are fitted to what all of them see.
+    fn hide(&self, cut: &Cut, v: f64, blockers: &[PatchId], shares: &mut [f64]) {
+        let (one, other) = (&cut.ends.0, &cut.ends.1);
+        let columns = other.pieces.len();
+        let of_row = |k: usize| shares[k * columns..][..columns].iter().sum::<f64>();
+        let of_column = |k: usize| shares.iter().skip(k).step_by(columns).sum::<f64>();
+        let look = |ends: (&Place, &Place), looker: Looker, points: u32| {
+            let shaft = self.shaft(cut, ends);
+            let blockers = shaft.those_that_block(blockers);
+            let v = exact_visibility(self.simd, &shaft, &blockers, (looker, points), CLIPPED_MAX)?;
+            let from = match looker {
+                Looker::B => &ends.1.world,
+                _ => &ends.0.world,
+            };
+            let distance = |&patch: &PatchId| {
+                self.view.fixed_box(self.forest.patch_root(patch)).distance(&from.bounds)
+            };
+            let is_near = blockers.iter().any(|patch| distance(patch) < NEAR * from.radius);
+            let from = (from.centre, from.radius);
+            Some(Look { value: v.value, from, is_near, is_clear: blockers.is_empty() })
+        };
+        let a_sees = self.seen_from(&one.pieces, &of_row, &|p, points| {
+            look((p, &other.whole), Looker::A, points)
+        });
+        let b_sees = self.seen_from(&other.pieces, &of_column, &|q, points| {
+            look((&one.whole, q), Looker::B, points)
+        });
+        let (Some(a_sees), Some(b_sees)) = (a_sees, b_sees) else {
+            // Too many polygons to clip by.
+            return shares.iter_mut().for_each(|share| *share *= v);
+        };
+        let wanted = |sees: &Vec<f64>, of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            sees.iter().enumerate().map(|(k, v)| v * of(k)).collect()
+        };
+        let mut rows = a_sees.as_ref().map(|sees| wanted(sees, &of_row));
+        let mut down = b_sees.as_ref().map(|sees| wanted(sees, &of_column));
+        let sum = |wanted: &Option<Vec<f64>>| wanted.as_ref().map_or(0.0, |w| w.iter().sum());
+        match (sum(&rows), sum(&down)) {
+            (0.0, 0.0) => return shares.fill(0.0),
+            // What one end overlooks the other may see.
+            (0.0, _) => rows = None,
+            (_, 0.0) => down = None,
+            (one, other) => {
+                let scale = |wanted: &mut Option<Vec<f64>>, by: f64| {
+                    wanted.iter_mut().flatten().for_each(|w| *w *= by);
+                };
+                scale(&mut rows, 0.5 * (one + other) / one);
+                scale(&mut down, 0.5 * (one + other) / other);
+            }
+        }
+        for (k, share) in shares.iter_mut().enumerate() {
+            let a = a_sees.as_ref().map_or(v, |sees| sees[k / columns]);
+            let b = b_sees.as_ref().map_or(v, |sees| sees[k % columns]);
+            *share *= (a + b - v).clamp(SEEN_MIN, 1.0);
+        }
+        for _ in 0..FITS {
+            if let Some(rows) = &rows {
+                for (row, wanted) in shares.chunks_mut(columns).zip(rows) {
+                    let sum: f64 = row.iter().sum();
+                    if sum > 0.0 {
+                        row.iter_mut().for_each(|share| *share *= wanted / sum);
+                    }
+                }
+            }
+            if let Some(down) = &down {
+                for (k, wanted) in down.iter().enumerate() {
+                    let column = || (k..shares.len()).step_by(columns);
+                    let sum: f64 = column().map(|i| shares[i]).sum();
+                    if sum > 0.0 {
+                        column().for_each(|i| shares[i] *= wanted / sum);
+                    }
+                }
+            }
+        }
+    }
+
+    fn blockers(&self, cut: &Cut) -> Vec<PatchId> {
+        let shaft = self.shaft(cut, (&cut.ends.0.whole, &cut.ends.1.whole));
+        let mut narrowed = Vec::new();
+        shaft.narrow(&[Forest::ROOT.0], &mut narrowed);
+        let mut blockers = shaft.blockers(&narrowed);
+        if !self.through.is_empty() {
+            blockers.retain(|&patch| !self.through[self.view.patch(patch).body.0 as usize]);
+        }
+        blockers
+    }
+
+    /// Visibility of the other end from each piece of one; `Some(None)` where there is only one piece,
+    /// `None` where it is not to be had.
+    #[allow(clippy::option_option)]
+    fn seen_from(
+        &self,
+        pieces: &[Place],
+        exchange_area_m2: &dyn Fn(usize) -> f64,
+        look: &dyn Fn(&Place, u32) -> Option<Look>,
+    ) -> Option<Option<Vec<f64>>> {
+        if pieces.len() == 1 {
+            return Some(None);
+        }
+        let looks: Vec<Look> = pieces.iter().map(|place| look(place, 0)).collect::<Option<_>>()?;
+        let mut out = Vec::with_capacity(pieces.len());
+        for (k, (first, place)) in looks.iter().zip(pieces).enumerate() {
+            let factor = exchange_area_m2(k) / place.own.area;
+            let beside = |other: &&Look| {
+                let reach = BESIDE * (first.from.1 + other.from.1);
+                first.from.0.distance_squared(other.from.0) < reach * reach
+            };
+            let differs = |other: &Look| (first.value - other.value).abs();
+            let around = k.saturating_sub(AROUND)..(k + AROUND).min(looks.len());
+            let spread = looks[around].iter().filter(beside).map(differs).fold(0.0, f64::max);
+            let unseen = if first.is_near { UNSEEN_NEAR } else { UNSEEN };
+            // The error of n x n points on a function with kinks falls as 1 / n^2.
+            out.push(match factor * spread.max(unseen) {
+                _ if first.is_clear => first.value,
+                s if s <= self.closer => first.value,
+                s if s <= 4.0 * self.closer => look(place, 1)?.value,
+                s if s <= 16.0 * self.closer => look(place, 2)?.value,
+                s if s <= 64.0 * self.closer => look(place, 4)?.value,
+                _ => look(place, 8)?.value,
+            });
+        }
+        Some(Some(out))
+    }
+
+    fn shaft<'b>(&'b self, cut: &Cut, (a, b): (&'b Place, &'b Place)) -> Shaft<'b> {
+        let own = cut.body.map(|body| (body, &a.own, &b.own));
+        let (a, b) = (&a.world, &b.world);
+        Shaft { forest: self.forest, view: self.view, a, b, own, patches: cut.patches }
+    }
+
+    /// Without occlusion, m2.
+    fn exchange(&self, a: &WorldElement, b: &WorldElement) -> f64 {
+        let d = b.centre - a.centre;
+        let distance2 = d.length_squared();
+        let reach = a.radius + b.radius;
+        if reach * reach < POINTS * distance2 {
+            let cosines = d.dot(a.plane.normal).max(0.0) * (-d.dot(b.plane.normal)).max(0.0);
+            return a.area * b.area * cosines / (std::f64::consts::PI * distance2 * distance2);
+        }
+        match meeting(a, b) {
+            Meeting::Away => 0.0,
+            met => exchange(self.simd, a, b, met).area_m2,
+        }
+    }
+}

@@ -9,6 +9,8 @@
 //! All quantities are per metre of the direction that was integrated out: an "area" is a length, m2 for
 //! each metre of depth.
 
+mod certificate;
+mod drift;
 mod forest;
 mod judge;
 mod plane;

@@ -4,11 +4,11 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::element::{ElementId, ElementKey};
-use crate::event::{Lookahead, Ticks};
+use crate::event::Ticks;
 use crate::pair::{Carried, LinkEvent, PairHash, PairTree, Record, update};
 use crate::session::{
-    Clock, ElementName, Event, FrameReport, PairCounts, Receivers, Update, apply_edits, balance_of,
-    links_of, with_names,
+    Ahead, Clock, ElementName, Event, FrameReport, PairCounts, Receivers, Update, apply_edits,
+    balance_of, links_of, with_names,
 };
 use crate::solver::{Dirty, Links, Lit, Place, Radiosity, Stop, Surfaces};
 
@@ -28,7 +28,7 @@ pub struct FlatOptions {
     pub constant: bool,
     /// Residual of the solver, relative to the mean radiosity, in (0, 1). Default 1e-5.
     pub residual: f64,
-    /// How the pair tree follows the motion. [`Update::Certificate`] is not there yet.
+    /// How the pair tree follows the motion. Default [`Update::Certificate`].
     pub update: Update,
     /// Whether every step keeps the events of its links, for [`FlatSession::events`].
     pub events: bool,
@@ -41,7 +41,7 @@ impl Default for FlatOptions {
             min_length_m: 0.02,
             constant: false,
             residual: 1e-5,
-            update: Update::Reinspect,
+            update: Update::Certificate,
             events: false,
         }
     }
@@ -56,9 +56,6 @@ pub enum OptionError {
     /// A length that is none.
     #[error("the smallest length is {0} m: it must not be negative")]
     Length(f64),
-    /// A strategy that the plane does not have.
-    #[error("certificates are not there in the plane yet: use reinspect, which has the same links")]
-    Certificate,
     /// Extrapolation over too many frames.
     #[error("extrapolate={0}: frames ahead must be 1 to 255")]
     Frames(u32),
@@ -78,7 +75,6 @@ impl FlatOptions {
             return Err(OptionError::Length(self.min_length_m));
         }
         match self.update {
-            Update::Certificate => Err(OptionError::Certificate),
             Update::Extrapolate { frames, .. } if !(1..=255).contains(&frames) => {
                 Err(OptionError::Frames(frames))
             }
@@ -176,7 +172,12 @@ impl FlatSession {
         let label = FrameReport { frame, time_s, ..FrameReport::default() };
         let view = PlaneView::new(&self.scene, time_s);
         let solved = match last {
-            Some(last) if settled(&last) && last.view == view => {
+            Some(mut last) if settled(&last) && last.view == view => {
+                if time_s < last.time_s {
+                    // What was foreseen from a later time says nothing of an earlier one.
+                    last.ticks = Ticks::default();
+                    last.tree.forget_certificates();
+                }
                 let report = last.report.of_a_still_frame(label);
                 Solved { time_s, report, events: Vec::new(), ..last }
             }
@@ -196,8 +197,14 @@ impl FlatSession {
         if let Some(before) = &before {
             report.moved = self.moved(before, &solved.view);
         }
-        let lookahead = if cold { None } else { self.look_ahead(&mut solved, report.time_s) };
         report.seconds.moving = clock.lap();
+        let times_s = [solved.time_s, report.time_s];
+        let clocked = (&mut solved.ticks, &mut solved.tree);
+        let ahead = match cold {
+            true => Ahead::default(),
+            false => Ahead::new(self.options.update, &*self.scene, clocked, times_s, false),
+        };
+        report.seconds.predict = clock.lap();
         let mut placed = FlatPlaced {
             scene: &self.scene,
             forest: &mut solved.forest,
@@ -206,7 +213,8 @@ impl FlatSession {
             epsilon: self.options.epsilon,
             min_length_m: self.options.min_length_m,
             constant: self.options.constant,
-            lookahead,
+            ahead: ahead.foresight.as_ref(),
+            lookahead: ahead.lookahead,
         };
         let walls: Vec<u32> = (0..self.scene.walls().len() as u32).collect();
         let record = Record { edits: !cold, events: !cold && self.options.events };
@@ -259,16 +267,6 @@ impl FlatSession {
         let poses = before.poses().iter().zip(now.poses());
         let moved = poses.zip(self.scene.bodies()).filter(|((one, two), _)| one != two);
         moved.map(|(_, body)| body.name.clone()).collect()
-    }
-
-    /// What the paper's strategy extrapolates with.
-    fn look_ahead(&self, solved: &mut Solved, time_s: f64) -> Option<Lookahead> {
-        let Update::Extrapolate { frames, error } = self.options.update else { return None };
-        if solved.ticks.go(solved.time_s, time_s) {
-            solved.tree.forget_histories();
-        }
-        let frame_s = solved.ticks.length_s();
-        solved.ticks.runs().then_some(Lookahead { now_s: time_s, frame_s, frames, error })
     }
 
     fn edit_links(

@@ -11,6 +11,7 @@ use crate::solver::{Links, Radiosity};
 use crate::transport::Simd;
 
 mod advance;
+mod ahead;
 mod coarse;
 mod compact;
 mod compare;
@@ -36,6 +37,7 @@ pub use report::{Energy, FrameReport, PairCounts, RowSumError, Seconds};
 pub use snapshot::{Leaf, Snapshot};
 
 // Flatland's session shares these.
+pub(crate) use ahead::Ahead;
 pub(crate) use events::with_names;
 pub(crate) use surfaces::{Receivers, apply_edits, links_of};
 pub(crate) use tally::balance_of;

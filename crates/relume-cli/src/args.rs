@@ -9,6 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use relume::session::Update;
 use serde::{Deserialize, Serialize};
 
+use crate::failure::Failure;
 use crate::frames::FrameSpec;
 
 /// Largest picture side, pixels.
@@ -131,18 +132,22 @@ pub(crate) struct FlatArgs {
     /// Elements are constant, as in the paper; otherwise links carry gradients.
     #[arg(long)]
     pub(crate) constant: bool,
-    /// How the links follow the motion: `reinspect`, `scratch` (the same links) or
-    /// `extrapolate[=N]`.
-    #[arg(long, value_name = "STRATEGY", default_value = "reinspect")]
-    pub(crate) update: UpdateFlag,
-    /// Compare every frame with one built from scratch instead; exit with 1 where they differ.
-    #[arg(long)]
+    #[command(flatten)]
+    pub(crate) update: UpdateChoice,
+    /// Compare every frame with one built from scratch instead, as `relume verify` does in space; exit
+    /// with 1 where they differ.
+    #[arg(long, conflicts_with_all = ["output", "events", "print"])]
     pub(crate) verify: bool,
+    /// Measure what a frame costs instead, as `relume bench` does in space.
+    #[arg(long, conflicts_with_all = ["output", "events", "print", "verify"])]
+    pub(crate) bench: bool,
+    #[command(flatten)]
+    pub(crate) measure: MeasureFlags,
     /// Write every link event to this file (CSV).
     #[arg(long, value_name = "FILE")]
     pub(crate) events: Option<PathBuf>,
     /// What to print.
-    #[arg(long, value_enum, value_name = "WHAT", conflicts_with = "verify")]
+    #[arg(long, value_enum, value_name = "WHAT")]
     pub(crate) print: Option<FlatPrint>,
 }
 
@@ -524,6 +529,18 @@ pub(crate) struct BenchArgs {
     pub(crate) clip: ClipFlags,
     #[command(flatten)]
     pub(crate) update: UpdateChoice,
+    #[command(flatten)]
+    pub(crate) measure: MeasureFlags,
+    /// Draw no pictures; the row with them is left out.
+    #[arg(long)]
+    pub(crate) no_pictures: bool,
+    #[command(flatten)]
+    pub(crate) picture: PictureFlags,
+}
+
+/// What is measured against what, and where the numbers go.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct MeasureFlags {
     /// Build only every K-th frame from scratch beside the others: quicker, less exact.
     #[arg(long, value_name = "K", default_value = "1", value_parser = parse_every, allow_negative_numbers = true)]
     pub(crate) every: usize,
@@ -531,11 +548,6 @@ pub(crate) struct BenchArgs {
     /// missed events, error of radiosity. Takes the place of the other tables.
     #[arg(long, conflicts_with_all = ["every", "strategy", "error"])]
     pub(crate) compare: bool,
-    /// Draw no pictures; the row with them is left out.
-    #[arg(long)]
-    pub(crate) no_pictures: bool,
-    #[command(flatten)]
-    pub(crate) picture: PictureFlags,
     /// Also write all numbers to this file, frame by frame (`relume-bench/1`).
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
@@ -803,8 +815,20 @@ impl UpdateChoice {
         }
     }
 
-    /// What the engine is asked for; `None` if an error is stated without extrapolation.
-    pub(crate) fn update(self) -> Option<Update> {
+    /// What the engine is asked for.
+    ///
+    /// Fails if an error is stated without extrapolation.
+    pub(crate) fn asked_for(self) -> Result<Update, Failure> {
+        self.update().ok_or_else(|| {
+            Failure::usage(
+                "--error goes with --update extrapolate only: the other strategies have none",
+            )
+            .help("leave out --error, or add --update extrapolate")
+        })
+    }
+
+    /// The same; `None` if an error is stated without extrapolation.
+    fn update(self) -> Option<Update> {
         Some(match (self.strategy, self.error) {
             (UpdateFlag::Extrapolate { frames }, error) => {
                 let most = if error.is_some() { FRAMES_AHEAD_AT_MOST } else { FRAMES_AHEAD };

@@ -105,6 +105,11 @@ impl Clip {
         }
     }
 
+    /// The oracle, as on the command line.
+    pub(crate) fn oracle(&self) -> String {
+        self.flags.oracle.to_string()
+    }
+
     /// Time of a frame, seconds.
     pub(crate) fn time_of(&self, frame: u32) -> f64 {
         frames::time_of(frame, self.flags.fps)
@@ -119,12 +124,7 @@ impl Clip {
                 min_area_m2: min_area_m2.unwrap_or(self.scene.area_m2() * MIN_AREA_SHARE),
             },
         };
-        let update = update.update().ok_or_else(|| {
-            Failure::usage(
-                "--error goes with --update extrapolate only: the other strategies have none",
-            )
-            .help("leave out --error, or add --update extrapolate")
-        })?;
+        let update = update.asked_for()?;
         Ok(Options {
             tolerance: self.tolerance,
             oracle,

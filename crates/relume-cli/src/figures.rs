@@ -63,10 +63,12 @@ pub(crate) struct Held {
 pub(crate) struct Figures {
     /// Name of the scene.
     pub(crate) sequence: String,
-    /// Relative error of irradiance aimed at.
-    pub(crate) tolerance: f64,
+    /// Relative error of irradiance aimed at, where there is one.
+    pub(crate) tolerance: Option<f64>,
     /// The oracle, as on the command line.
     pub(crate) oracle: String,
+    /// Both in words.
+    pub(crate) settings: String,
     /// The update strategy, as on the command line.
     pub(crate) update: String,
     /// Threads used.
@@ -155,7 +157,8 @@ struct File<'a> {
     schema: &'static str,
     version: &'static str,
     scene: &'a str,
-    tolerance: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tolerance: Option<f64>,
     oracle: &'a str,
     update: &'a str,
     threads: usize,
@@ -234,10 +237,9 @@ impl Figures {
     fn write(&self, out: &mut String) -> fmt::Result {
         writeln!(
             out,
-            "{}: tolerance {}, oracle {}, update {}, {}\n",
+            "{}: {}, update {}, {}\n",
             self.sequence,
-            self.tolerance,
-            self.oracle,
+            self.settings,
             self.update,
             counted(self.threads, "thread")
         )?;
@@ -553,8 +555,9 @@ mod tests {
         let cold = Cold { seconds: 0.2, report: report(100, 200) };
         Figures {
             sequence: "room".into(),
-            tolerance: 0.02,
+            tolerance: Some(0.02),
             oracle: "error".into(),
+            settings: "tolerance 0.02, oracle error".into(),
             update: "reinspect".into(),
             threads: 2,
             first: frame(0.4, None),

@@ -21,6 +21,7 @@ mod resume;
 mod run;
 mod scene_file;
 mod sensors;
+mod sequence;
 mod strategies;
 mod verify;
 

@@ -36,12 +36,48 @@ fn a_scene_gives_a_report_and_drawings() {
 fn every_scene_that_ships_agrees_with_cold_builds() {
     for name in ["triangle", "duct", "wedge", "screen", "approach", "gutter", "room"] {
         let file = scene(&format!("{name}.flat"));
-        let ran = relume(&["flat", text(&file), "--verify", "--fps", "5", "--epsilon", "0.1"]);
-        ran.says(&["equal: links bit for bit"]);
+        for update in ["certificate", "reinspect"] {
+            let more = ["--verify", "--fps", "5", "--epsilon", "0.1", "--update", update];
+            let ran = relume(&[&["flat", text(&file)], &more[..]].concat());
+            ran.says(&["equal: links bit for bit"]);
+        }
     }
     // What is extrapolated is not a function of the instant, and that is found out.
     let gutter = scene("gutter.flat");
     relume(&["flat", text(&gutter), "--verify", "--update", "extrapolate"]).fails(1, &["differs"]);
+}
+
+#[test]
+fn the_bench_is_that_of_space() {
+    let dir = TempDir::new().unwrap();
+    let (room, numbers) = (scene("room.flat"), dir.path().join("bench.json"));
+    let bench = |more: &[&str]| {
+        let begin = ["flat", text(&room), "--bench", "--frames", "0-8", "--json", text(&numbers)];
+        relume(&[&begin, more].concat())
+    };
+    bench(&["--every", "2"]).says(&[
+        "room: oracle form-factor=0.05,0.02, update certificate, ",
+        "\nroom           8  ",
+        "\nfrom scratch  4 frames built both ways",
+        " of links with a moved end",
+        " bytes a pair (",
+    ]);
+    let value = json(&numbers);
+    assert_eq!(value["schema"], "relume-bench/1");
+    let frame = &value["frames"][0];
+    assert_eq!(frame["report"]["hash"], frame["from_scratch"]["report"]["hash"]);
+    assert!(frame["from_scratch"]["report"]["dynamic_links"].as_u64() > Some(0));
+    assert!(value["memory_each"]["pair_bytes"].as_f64().unwrap() > 0.0);
+    bench(&["--compare"]).says(&["room: oracle form-factor=0.05,0.02, ", "\ncertificate  "]);
+    let value = json(&numbers);
+    assert_eq!(value["schema"], "relume-strategies/1");
+    for exact in 0..3 {
+        let row = &value["strategies"][exact]["means"];
+        let missed = (row["missed_states"].as_f64(), row["missed_occlusions"].as_f64());
+        assert_eq!((row["equal_frames"].as_u64(), missed), (Some(8), (Some(0.0), Some(0.0))));
+    }
+    let judged = |k: usize| value["strategies"][k]["means"]["examined"].as_f64();
+    assert!(judged(2) < judged(1));
 }
 
 #[test]
@@ -90,7 +126,11 @@ fn messages_say_where_and_what() {
     let gutter = scene("gutter.flat");
     let with = |more: &[&str]| relume(&[&["flat", text(&gutter)], more].concat());
     with(&["--epsilon", "2"]).fails(2, &["between 0 and 1"]);
-    with(&["--update", "certificate"]).fails(2, &["use reinspect"]);
+    with(&["--update", "reinspect", "--error", "0.1"])
+        .fails(2, &["goes with --update extrapolate"]);
+    with(&["--compare"]).fails(2, &["add --bench"]);
+    with(&["--bench", "--verify"]).fails(2, &["cannot be used with"]);
+    with(&["--bench", "--frames", "3"]).fails(1, &["two frames or more"]);
     with(&["--frames", "9999"]).fails(2, &["outside the animation"]);
     relume(&["flat"]).fails(2, &["<SCENE>"]);
     relume(&["flat", "figure", "0.9"]).fails(2, &["0.1", "0.4"]);

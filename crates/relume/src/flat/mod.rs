@@ -23,6 +23,6 @@ pub use forest::FlatForest;
 pub use judge::PlaneView;
 pub use plane::{PlanePose, Segment};
 pub use scene::{Body, BodyIndex, FlatScene, Key, Material, Motion, SceneError, Wall, WallIndex};
-pub use session::{FlatElement, FlatLink, FlatOptions, FlatSession, OptionError, RadiosityGap};
+pub use session::{FlatElement, FlatLink, FlatOptions, FlatSession, OptionError};
 pub use strings::{Shaft, exchange, visible_exchange};
 pub use text::{TextError, parse};

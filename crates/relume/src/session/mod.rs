@@ -23,6 +23,7 @@ mod names;
 mod options;
 mod report;
 mod snapshot;
+mod solution;
 mod surfaces;
 mod tally;
 
@@ -35,6 +36,7 @@ pub use names::ElementName;
 pub use options::{Options, Oracle, Update};
 pub use report::{Energy, FrameReport, PairCounts, RowSumError, Seconds};
 pub use snapshot::{Leaf, Snapshot};
+pub use solution::Solution;
 
 // Flatland's session shares these.
 pub(crate) use ahead::Ahead;

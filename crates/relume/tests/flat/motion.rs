@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec2;
 use relume::flat::{FlatOptions, FlatScene, FlatSession, Key, Material, Motion, Segment, parse};
 use relume::pair::{EventKind, State};
-use relume::session::{FrameReport, Update};
+use relume::session::{FrameReport, Missed, Update, missed, radiosity_gap};
 
 /// Numbers that look random; the same in every run (SplitMix64).
 struct Dice(u64);
@@ -124,10 +124,10 @@ fn check_frames(seed: u64, bodies: usize, frames: u32, pace: f64) -> Walk {
         assert_eq!(of(two), of(built), "{place}");
         assert_eq!(of(one), of(built), "with certificates, {place}");
         // No event later than it is due.
+        assert_eq!(missed(&certain, &warm), Missed::default(), "{place}");
         assert_eq!((one.changed, one.segments), (two.changed, two.segments), "{place}");
         for followed in [&certain, &warm] {
-            let gap = followed.radiosity_gap(&cold);
-            assert!(gap.largest <= gap.allowed + 1e-5, "{place}: {gap:?}");
+            radiosity_gap(followed, &cold).unwrap_or_else(|e| panic!("{place}: {e}"));
         }
         walk += Walk {
             events: warm.link_events().len() as u64,

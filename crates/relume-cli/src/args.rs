@@ -103,6 +103,34 @@ pub(crate) enum Command {
         after_help = "Example:  relume flat gutter.flat -o out --epsilon 0.1\n          relume flat figure 0.4 -o docs/figures"
     )]
     Flat(FlatArgs),
+    /// Draw a figure of the paper that is of space, from the scenes that ship, as SVG and PNG.
+    ///
+    /// Those of the plane are drawn by `relume flat figure`.
+    #[command(after_help = "Example:  relume figure 0.5 -o docs/figures")]
+    Figure(FigureArgs),
+}
+
+/// `relume figure`
+#[derive(Debug, Args)]
+pub(crate) struct FigureArgs {
+    /// Which.
+    #[arg(value_enum)]
+    pub(crate) figure: Figure,
+    /// Directory for the files; made if missing.
+    #[arg(short, long, value_name = "DIR", default_value = ".")]
+    pub(crate) output: PathBuf,
+}
+
+/// The figures of space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Figure {
+    /// Two sequences with a moving light: pictures, the elements that are linked to the light, and the
+    /// same with links extrapolated.
+    #[value(name = "0.5")]
+    Sequences,
+    /// Times a frame, measured here, beside the paper's.
+    #[value(name = "table-0.1")]
+    Times,
 }
 
 /// `relume flat`
@@ -443,6 +471,21 @@ pub(crate) struct ClipFlags {
     pub(crate) quiet: bool,
 }
 
+impl Default for ClipFlags {
+    fn default() -> ClipFlags {
+        ClipFlags {
+            frames: None,
+            fps: 24.0,
+            animation: AnimationFlag { name: None },
+            tolerance: None,
+            oracle: OracleFlag::Error,
+            threads: None,
+            max_memory: None,
+            quiet: false,
+        }
+    }
+}
+
 /// How the links follow the motion.
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct UpdateChoice {
@@ -574,6 +617,18 @@ pub(crate) struct PictureFlags {
     /// Draw the outlines of the elements over the picture.
     #[arg(long)]
     pub(crate) mesh: bool,
+}
+
+impl Default for PictureFlags {
+    fn default() -> PictureFlags {
+        PictureFlags {
+            size: Size { width: 640, height: 480 },
+            shading: None,
+            camera: None,
+            exposure: ExposureFlag::Auto,
+            mesh: false,
+        }
+    }
 }
 
 /// Width and height in pixels.

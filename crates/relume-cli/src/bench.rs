@@ -10,7 +10,7 @@ use relume::session::Session;
 use relume_picture::export::{probe, write_atomically};
 use relume_picture::picture::{self, Exposure, Viewpoint};
 
-use crate::args::{BenchArgs, ExposureFlag, MeasureFlags, UpdateChoice, UpdateFlag};
+use crate::args::{BenchArgs, ExposureFlag, MeasureFlags, PictureFlags, UpdateChoice, UpdateFlag};
 use crate::clip::{self, Clip, fixed, now};
 use crate::failure::Failure;
 use crate::figures::{Cold, Figures, Held, Measured};
@@ -51,12 +51,20 @@ pub(crate) fn bench(args: &BenchArgs) -> Result<(), Failure> {
     let clip = Clip::open(&args.source, &args.clip)?;
     clip.warn();
     let plan = Plan::new(&args.measure, args.update, args.clip.quiet);
-    if args.no_pictures || plan.compare {
-        return measure(&plan, &clip, None);
-    }
-    let mut drawing = Drawing::new(args, &clip)?;
-    let draw = move |session: &Session, time_s| drawing.draw(session, time_s);
-    measure(&plan, &clip, Some(Box::new(draw)))
+    let draw = match args.no_pictures || plan.compare {
+        true => None,
+        false => Some(draw_and_drop(&args.picture, &clip)?),
+    };
+    measure(&plan, &clip, draw)
+}
+
+/// Pictures that are drawn, timed and thrown away.
+pub(crate) fn draw_and_drop<'a>(
+    flags: &'a PictureFlags,
+    clip: &'a Clip,
+) -> Result<Draw<'a, Session>, Failure> {
+    let mut drawing = Drawing::new(flags, clip)?;
+    Ok(Box::new(move |session: &Session, time_s| drawing.draw(session, time_s)))
 }
 
 /// Measures a sequence, and prints and writes what was found.
@@ -65,25 +73,16 @@ pub(crate) fn measure<'a, Q: Sequence>(
     sequence: &'a Q,
     draw: Option<Draw<'a, Q::Session>>,
 ) -> Result<(), Failure> {
-    if sequence.frames().len() < 2 {
-        return Err(Failure::new(
-            "a bench takes two frames or more: the first is built from scratch",
-        )
-        .help("ask for more with --frames; a scene in which nothing moves has frame 0 only"));
-    }
     if let Some(path) = plan.json {
         probe(path).map_err(|error| Failure::write(path, &error))?;
     }
     if plan.compare {
+        enough(sequence)?;
         return strategies::compare(plan, sequence);
     }
-    let mut bench = Bench::new(plan, sequence, draw)?;
-    let outcome = bench.frames();
-    bench.progress.clear();
-    let finished = outcome?;
-    let measured = bench.frames.len() + usize::from(bench.first.is_some());
+    let (figures, measured) = figures(plan, sequence, draw)?;
     // Also where the run was stopped: what was measured stays.
-    if let Some(figures) = bench.figures() {
+    if let Some(figures) = figures {
         if !plan.quiet {
             output::print(&figures.text())?;
         }
@@ -93,14 +92,44 @@ pub(crate) fn measure<'a, Q: Sequence>(
                 .map_err(|error| Failure::write(path, &error))?;
         }
     }
-    if finished {
+    if measured == sequence.frames().len() {
         return Ok(());
     }
-    Err(Failure::interrupted(format_args!(
+    Err(stopped(measured, sequence))
+}
+
+/// What was measured of a sequence, nothing before its second frame; and how many frames were.
+pub(crate) fn figures<'a, Q: Sequence>(
+    plan: &'a Plan<'a>,
+    sequence: &'a Q,
+    draw: Option<Draw<'a, Q::Session>>,
+) -> Result<(Option<Figures>, usize), Failure> {
+    enough(sequence)?;
+    let mut bench = Bench::new(plan, sequence, draw)?;
+    let outcome = bench.frames();
+    bench.progress.clear();
+    outcome?;
+    let measured = bench.frames.len() + usize::from(bench.first.is_some());
+    Ok((bench.figures(), measured))
+}
+
+/// The message of a run that was interrupted.
+pub(crate) fn stopped(measured: usize, sequence: &impl Sequence) -> Failure {
+    Failure::interrupted(format_args!(
         "stopped: {} of {} measured",
         count(measured as u64),
         counted(sequence.frames().len(), "frame")
-    )))
+    ))
+}
+
+fn enough(sequence: &impl Sequence) -> Result<(), Failure> {
+    if sequence.frames().len() < 2 {
+        return Err(Failure::new(
+            "a bench takes two frames or more: the first is built from scratch",
+        )
+        .help("ask for more with --frames; a scene in which nothing moves has frame 0 only"));
+    }
+    Ok(())
 }
 
 /// A bench under way.
@@ -132,11 +161,11 @@ impl<'a, Q: Sequence> Bench<'a, Q> {
         })
     }
 
-    /// Measures frame after frame; whether all were.
-    fn frames(&mut self) -> Result<bool, Failure> {
+    /// Measures frame after frame, until asked to stop.
+    fn frames(&mut self) -> Result<(), Failure> {
         for (k, &frame) in self.sequence.frames().iter().enumerate() {
             if interrupt::requested() {
-                return Ok(false);
+                return Ok(());
             }
             let links = self.frames.last().map_or(0, |m| m.report.links);
             self.progress.start(frame, links, self.session.held_bytes());
@@ -148,7 +177,7 @@ impl<'a, Q: Sequence> Bench<'a, Q> {
             }
             self.progress.finish_frame();
         }
-        Ok(true)
+        Ok(())
     }
 
     /// Sets up and solves the first frame.
@@ -232,7 +261,7 @@ impl<'a, Q: Sequence> Bench<'a, Q> {
 
 /// Pictures that are drawn and thrown away.
 struct Drawing<'a> {
-    args: &'a BenchArgs,
+    flags: &'a PictureFlags,
     clip: &'a Clip,
     camera: Viewpoint,
     /// Chosen at the first picture where the flags say `auto`.
@@ -240,13 +269,13 @@ struct Drawing<'a> {
 }
 
 impl<'a> Drawing<'a> {
-    fn new(args: &'a BenchArgs, clip: &'a Clip) -> Result<Drawing<'a>, Failure> {
-        let camera = Viewpoint::new(&clip.scene, args.picture.camera.as_deref());
-        let exposure = match args.picture.exposure {
+    fn new(flags: &'a PictureFlags, clip: &'a Clip) -> Result<Drawing<'a>, Failure> {
+        let camera = Viewpoint::new(&clip.scene, flags.camera.as_deref());
+        let exposure = match flags.exposure {
             ExposureFlag::Auto => None,
             ExposureFlag::Stops(stops) => Some(fixed(stops)),
         };
-        Ok(Drawing { args, clip, camera: camera.map_err(Failure::new)?, exposure })
+        Ok(Drawing { flags, clip, camera: camera.map_err(Failure::new)?, exposure })
     }
 
     /// Seconds from the solution to the pixels.
@@ -254,8 +283,8 @@ impl<'a> Drawing<'a> {
         let view = self.camera.at(&self.clip.scene, time_s).map_err(Failure::new)?;
         let automatic = || Exposure::automatic(&session.snapshot(), &view);
         let exposure = *self.exposure.get_or_insert_with(automatic);
-        let shading = self.args.picture.shading.unwrap_or(self.clip.shading);
-        let settings = clip::picture_settings(&self.args.picture, shading, exposure);
+        let shading = self.flags.shading.unwrap_or(self.clip.shading);
+        let settings = clip::picture_settings(self.flags, shading, exposure);
         let started = now();
         let image = picture::render(&session.snapshot(), &view, &settings);
         let seconds = started.elapsed().as_secs_f64();

@@ -63,6 +63,12 @@ impl Clip {
         }
     }
 
+    /// The clip of a demonstration with the paper's oracle, at a threshold.
+    pub(crate) fn of_the_paper(demo: DemoScene, epsilon: f64) -> Result<Clip, Failure> {
+        let oracle = OracleFlag::FormFactor { epsilon, min_area_m2: None };
+        Clip::of_demo(demo, &ClipFlags { oracle, ..ClipFlags::default() })
+    }
+
     fn of_demo(name: DemoScene, flags: &ClipFlags) -> Result<Clip, Failure> {
         if flags.animation.name.is_some() {
             return Err(Failure::usage("the demonstrations have one animation, without a name")

@@ -83,17 +83,19 @@ pub(crate) struct Figures {
 
 /// A row of the paper's Table 0.1.
 #[derive(Debug, PartialEq, Serialize)]
-struct Row {
-    sequence: String,
+pub(crate) struct Row {
+    /// Its name.
+    pub(crate) sequence: String,
     /// Frames averaged over: all but the first.
-    frames: usize,
-    mean_s: f64,
-    standard_deviation_s: f64,
-    median_s: f64,
+    pub(crate) frames: usize,
+    /// Time a frame, seconds: mean, standard deviation, median.
+    pub(crate) mean_s: f64,
+    pub(crate) standard_deviation_s: f64,
+    pub(crate) median_s: f64,
     /// Time to set up and solve the first frame.
-    first_s: f64,
+    pub(crate) first_s: f64,
     /// First by mean.
-    ratio: f64,
+    pub(crate) ratio: f64,
 }
 
 /// Frames against the same frames built from scratch.
@@ -373,7 +375,7 @@ impl Figures {
     }
 
     /// The rows of the paper's table: without and with pictures.
-    fn rows(&self) -> Vec<Row> {
+    pub(crate) fn rows(&self) -> Vec<Row> {
         let seconds: Vec<f64> = self.frames.iter().map(|m| m.seconds).collect();
         let mut rows = vec![Row::new(self.sequence.clone(), &seconds, self.first.seconds)];
         let drawn: Option<Vec<f64>> = self.frames.iter().map(Measured::with_picture).collect();

@@ -96,6 +96,26 @@ fn the_figures_kept_are_those_the_command_draws() {
     }
 }
 
+/// They follow every change to oracles and pictures, and hold times: only that they are drawn.
+#[test]
+fn the_figures_of_space_are_drawn() {
+    let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/figures");
+    let dir = TempDir::new().unwrap();
+    let ran = relume(&["figure", "0.5", "-o", text(dir.path())]).succeeds();
+    assert_eq!(ran.out, "figure-0.5.svg\nfigure-0.5.png\n");
+    let svg = fs::read_to_string(dir.path().join("figure-0.5.svg")).unwrap();
+    assert_eq!(
+        svg.matches("<image ").count(),
+        12,
+        "a picture for each of three sequences and four frames"
+    );
+    for name in ["figure-0.5.svg", "figure-0.5.png", "table-0.1.svg", "table-0.1.png"] {
+        assert!(kept.join(name).exists(), "draw it: relume figure {} -o docs/figures", &name[..9]);
+    }
+    let table = fs::read_to_string(kept.join("table-0.1.svg")).unwrap();
+    assert!(table.starts_with("<svg"));
+}
+
 /// Runs what the tutorial says, in the directory of the scenes, and compares what it prints.
 #[test]
 fn the_tutorial_is_right() {
@@ -134,4 +154,5 @@ fn messages_say_where_and_what() {
     with(&["--frames", "9999"]).fails(2, &["outside the animation"]);
     relume(&["flat"]).fails(2, &["<SCENE>"]);
     relume(&["flat", "figure", "0.9"]).fails(2, &["0.1", "0.4"]);
+    relume(&["figure", "0.4"]).fails(2, &["0.5", "table-0.1"]);
 }

@@ -1,6 +1,6 @@
 //! `relume flat`: scenes in the plane, and the paper's figures of it.
 
-mod draw;
+pub(crate) mod draw;
 mod figures;
 
 use std::fmt::Write;
@@ -21,6 +21,7 @@ use crate::failure::Failure;
 use crate::frames::{resolve, time_of};
 use crate::interrupt;
 use crate::output;
+use crate::paper::make;
 use crate::sequence::Sequence;
 use crate::verify;
 
@@ -76,10 +77,6 @@ pub(crate) fn flat(args: &FlatArgs) -> Result<(), Failure> {
             .help("add --bench, or leave them out"));
     }
     if args.verify { verify::frames(&run, args.update, false) } else { run.solve(path) }
-}
-
-fn make(dir: &Path) -> Result<(), Failure> {
-    fs::create_dir_all(dir).map_err(|error| Failure::write(dir, &error))
 }
 
 struct Run<'a> {

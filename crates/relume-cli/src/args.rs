@@ -98,7 +98,9 @@ pub(crate) enum Command {
     /// [two-sided]`, its front on the left from start to end; `polygon NAME X Y X Y X Y ...`, closed,
     /// its fronts outside if its corners go clockwise; `body NAME`, to which the lines below
     /// belong, with lines `at TIME X Y [DEGREES]` for where it is when. Metres, seconds; # begins a
-    /// comment. Without -o the report goes to stdout.
+    /// comment. Or SVG: line, polyline, polygon, rect and path of straight parts, in groups that move by
+    /// animateTransform, with data-reflectance, data-emit, data-two-sided, data-front=inside|outside, and
+    /// data-units-per-metre at the root. Without -o the report goes to stdout.
     #[command(
         after_help = "Example:  relume flat gutter.flat -o out --epsilon 0.1\n          relume flat figure 0.4 -o docs/figures"
     )]
@@ -139,7 +141,7 @@ pub(crate) enum Figure {
 pub(crate) struct FlatArgs {
     #[command(subcommand)]
     pub(crate) command: Option<FlatCommand>,
-    /// The scene, a text file.
+    /// The scene, a text file or an .svg.
     #[arg(value_name = "SCENE", required = true)]
     pub(crate) scene: Option<PathBuf>,
     /// Directory for report.json and a drawing of each frame (SVG); made if missing.

@@ -34,8 +34,9 @@ fn a_scene_gives_a_report_and_drawings() {
 
 #[test]
 fn every_scene_that_ships_agrees_with_cold_builds() {
-    for name in ["triangle", "duct", "wedge", "screen", "approach", "gutter", "room"] {
-        let file = scene(&format!("{name}.flat"));
+    for name in ["triangle", "duct", "wedge", "screen", "approach", "gutter", "room", "studio"] {
+        let ending = if name == "studio" { "svg" } else { "flat" };
+        let file = scene(&format!("{name}.{ending}"));
         for update in ["certificate", "reinspect"] {
             let more = ["--verify", "--fps", "5", "--epsilon", "0.1", "--update", update];
             let ran = relume(&[&["flat", text(&file)], &more[..]].concat());
@@ -143,6 +144,10 @@ fn messages_say_where_and_what() {
     let file = dir.path().join("wrong.flat");
     fs::write(&file, "segment floor 0 0 1 0\nsegment wall 0 1\n").unwrap();
     relume(&["flat", text(&file)]).fails(1, &["line 2", "`wall`", "x0 y0 x1 y1"]);
+    let svg = dir.path().join("wrong.SVG");
+    fs::write(&svg, "<svg>\n<path id='arc' d='M0 0A1 1 0 0 0 1 1'/></svg>").unwrap();
+    relume(&["flat", text(&svg)])
+        .fails(1, &["path `arc`, line 2", "`A`", "\n  help: make it straight"]);
     let gutter = scene("gutter.flat");
     let with = |more: &[&str]| relume(&[&["flat", text(&gutter)], more].concat());
     with(&["--epsilon", "2"]).fails(2, &["between 0 and 1"]);

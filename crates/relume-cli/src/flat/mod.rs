@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use relume::flat::{FlatOptions, FlatScene, FlatSession, parse};
+use relume::flat::{FlatOptions, FlatScene, FlatSession, SvgError, parse, parse_svg};
 use relume::session::FrameReport;
 use relume_picture::drawing::Pen;
 use relume_picture::export::write_atomically;
@@ -60,10 +60,15 @@ pub(crate) fn flat(args: &FlatArgs) -> Result<(), Failure> {
         Failure::usage("which scene?").help("name a file: relume flat scene.flat")
     })?;
     let text = fs::read_to_string(path).map_err(|error| Failure::read(path, &error))?;
-    let scene = parse(&text).map_err(|error| {
-        Failure::new(format_args!("{}: {error}", path.display()))
-            .help("`relume help flat` shows what a scene looks like")
-    })?;
+    let scene = match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("svg")) {
+        true => parse_svg(&text).map_err(|SvgError { element, what, remedy }| {
+            Failure::new(format_args!("{}: {element}: {what}", path.display())).help(remedy)
+        })?,
+        false => parse(&text).map_err(|error| {
+            Failure::new(format_args!("{}: {error}", path.display()))
+                .help("`relume help flat` shows what a scene looks like")
+        })?,
+    };
     let frames = resolve(args.frames.as_ref(), scene.duration_s(), args.fps)
         .map_err(|error| Failure::usage(error).help("choose other --frames"))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -17,6 +17,7 @@ mod plane;
 mod scene;
 mod session;
 mod strings;
+mod svg;
 mod text;
 
 pub use forest::FlatForest;
@@ -25,4 +26,5 @@ pub use plane::{PlanePose, Segment};
 pub use scene::{Body, BodyIndex, FlatScene, Key, Material, Motion, SceneError, Wall, WallIndex};
 pub use session::{FlatElement, FlatLink, FlatOptions, FlatSession, OptionError};
 pub use strings::{Shaft, exchange, visible_exchange};
+pub use svg::{SvgError, parse_svg};
 pub use text::{TextError, parse};

@@ -98,12 +98,15 @@ impl std::ops::AddAssign for Walk {
 }
 
 /// Goes through the frames of a scene, some of them there and back, `pace` of its frames at a time: with
-/// certificates and without, and against cold builds.
-fn check_frames(seed: u64, bodies: usize, frames: u32, pace: f64) -> Walk {
+/// certificates and without, and against cold builds. `coarse` makes threshold and elements larger.
+fn check_frames(seed: u64, bodies: usize, frames: u32, (pace, coarse): (f64, f64)) -> Walk {
     let mut dice = Dice(seed);
     let scene = Arc::new(random_scene(&mut dice, bodies, f64::from(frames)));
-    let epsilon = dice.within(0.05, 0.3);
-    let session = |update| FlatSession::new(scene.clone(), options(epsilon, update)).unwrap();
+    let epsilon = coarse * dice.within(0.05, 0.3);
+    let session = |update| {
+        let options = FlatOptions { min_length_m: 0.1 * coarse, ..options(epsilon, update) };
+        FlatSession::new(scene.clone(), options).unwrap()
+    };
     let [mut certain, mut warm, mut cold] =
         [Update::Certificate, Update::Reinspect, Update::Scratch].map(session);
     let mut walk = Walk::default();
@@ -178,7 +181,7 @@ fn audit(session: &FlatSession) {
 fn links_that_follow_random_motion_are_those_of_a_cold_build() {
     let mut walk = Walk::default();
     for seed in 0..12 {
-        walk += check_frames(seed, 2 + seed as usize % 9, 200, 1.0);
+        walk += check_frames(seed, 2 + seed as usize % 9, 200, (1.0, 1.0));
     }
     assert!(walk.events > 100_000, "{}: too quiet to show anything", walk.events);
 }
@@ -187,7 +190,7 @@ fn links_that_follow_random_motion_are_those_of_a_cold_build() {
 fn certificates_spare_work_where_things_move_slowly() {
     let mut walk = Walk::default();
     for seed in 20..32 {
-        walk += check_frames(seed, 2 + seed as usize % 9, 150, 0.02);
+        walk += check_frames(seed, 2 + seed as usize % 9, 150, (0.02, 1.0));
     }
     let Walk { events, reinspected, examined, followed, certified, .. } = walk;
     println!("judged {examined} of {reinspected}; {followed} followed, {certified} passed over");
@@ -255,9 +258,12 @@ fn certificates_do_not_outlast_a_rest_that_is_left_backwards() {
 #[test]
 #[ignore = "tens of thousands of frames: some minutes"]
 fn links_follow_random_motion_for_tens_of_thousands_of_frames() {
+    let mut walk = Walk::default();
     for seed in 100..200 {
-        check_frames(seed, 3 + seed as usize % 14, 400, 1.0);
+        let pace = [1.0, 0.2, 0.02][seed as usize % 3];
+        walk += check_frames(seed, 3 + seed as usize % 14, 400, (pace, 3.0));
     }
+    assert!(walk.events > 1_000_000, "{}: too quiet to show anything", walk.events);
 }
 
 /// A gutter and a patch that comes down on it.

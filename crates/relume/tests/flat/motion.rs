@@ -241,6 +241,40 @@ fn what_touches_a_shaft_in_a_corner_does_not_stand_in_the_way() {
     assert!(walk.followed > 10 * walk.reevaluated, "{} judged", walk.reevaluated);
 }
 
+/// A box that slides on the floor, one on top of it that slides on it, a door that turns about the end of a
+/// screen, a lamp along the ceiling: at every pace, near the origin and far from it, turned and not.
+#[test]
+fn bodies_that_touch_agree_with_cold_builds() {
+    for (x, y, turned) in [(0.0, 0.0, 0.0), (0.3, 7.0, 0.0), (-800.0, 500.0, 0.0), (2.0, 1.0, 31.0)]
+    {
+        let turn = DVec2::from_angle(f64::to_radians(turned));
+        let at = |time: f64, u: f64, v: f64, degrees: f64| {
+            let p = turn.rotate(DVec2::new(u, v)) + DVec2::new(x, y);
+            format!("at {time} {} {} {}\n", p.x, p.y, turned + degrees)
+        };
+        let text = [
+            "body room\n",
+            &at(0.0, 0.0, 0.0, 0.0),
+            "polygon wall 0 0 4 0 4 3 0 3\nsegment screen 2 3 2 2 two-sided\n",
+            "body box\n",
+            &(at(0.0, 0.2, 0.0, 0.0) + &at(10.0, 3.0, 0.0, 0.0)),
+            "polygon box 0 0 0 0.5 0.8 0.5 0.8 0\n",
+            "body top\n",
+            &(at(0.0, 0.3, 0.5, 0.0) + &at(10.0, 2.4, 0.5, 0.0)),
+            "polygon top 0 0 0 0.3 0.4 0.3 0.4 0\n",
+            "body door\n",
+            &(at(0.0, 2.0, 2.0, 0.0) + &at(6.0, 2.0, 2.0, 120.0)),
+            "segment door 0 0 0.7 0 two-sided\nbody lamp\n",
+            &(at(0.0, 0.0, 3.0, 0.0) + &at(10.0, 1.5, 3.0, 0.0)),
+            "segment lamp 0.3 0 0 0 emit 9\n",
+        ];
+        for (frames, pace) in [(40, 0.3), (60, 0.02)] {
+            let walk = follow(&text.concat(), 0.2, (0..frames).map(|k| f64::from(k) * pace));
+            assert!(walk.followed > 0, "{turned}, {pace}");
+        }
+    }
+}
+
 /// What was foreseen is not carried along where time goes back, also while nothing moves.
 #[test]
 fn certificates_do_not_outlast_a_rest_that_is_left_backwards() {
@@ -255,15 +289,24 @@ fn certificates_do_not_outlast_a_rest_that_is_left_backwards() {
     );
 }
 
+/// Scenes are small beside those above: what costs time is what stands between the walls of many bodies.
 #[test]
-#[ignore = "tens of thousands of frames: some minutes"]
+#[ignore = "40,000 frames: some minutes"]
 fn links_follow_random_motion_for_tens_of_thousands_of_frames() {
-    let mut walk = Walk::default();
-    for seed in 100..200 {
+    let check = |seed: u64| {
         let pace = [1.0, 0.2, 0.02][seed as usize % 3];
-        walk += check_frames(seed, 3 + seed as usize % 14, 400, (pace, 3.0));
-    }
-    assert!(walk.events > 1_000_000, "{}: too quiet to show anything", walk.events);
+        check_frames(seed, 3 + seed as usize % 10, 400, (pace, 3.0))
+    };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
+    let events: u64 = std::thread::scope(|scope| {
+        let share = |k| {
+            let seeds = (100 + k..200).step_by(threads as usize);
+            scope.spawn(move || seeds.map(|seed| check(seed).events).sum::<u64>())
+        };
+        let shares: Vec<_> = (0..threads).map(share).collect();
+        shares.into_iter().map(|share| share.join().expect("a frame differs")).sum()
+    });
+    assert!(events > 500_000, "{events}: too quiet to show anything");
 }
 
 /// A gutter and a patch that comes down on it.

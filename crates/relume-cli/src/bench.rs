@@ -25,7 +25,7 @@ use crate::strategies;
 pub(crate) struct Plan<'a> {
     /// How the links follow the motion.
     pub(crate) update: UpdateChoice,
-    /// Frames, builds from scratch, files.
+    /// Of this many frames one is built from scratch too.
     pub(crate) every: usize,
     /// All strategies instead.
     pub(crate) compare: bool,

@@ -9,6 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use relume::session::Update;
 use serde::{Deserialize, Serialize};
 
+use crate::failure::Failure;
 use crate::frames::FrameSpec;
 
 /// Largest picture side, pixels.
@@ -97,11 +98,41 @@ pub(crate) enum Command {
     /// [two-sided]`, its front on the left from start to end; `polygon NAME X Y X Y X Y ...`, closed,
     /// its fronts outside if its corners go clockwise; `body NAME`, to which the lines below
     /// belong, with lines `at TIME X Y [DEGREES]` for where it is when. Metres, seconds; # begins a
-    /// comment. Without -o the report goes to stdout.
+    /// comment. Or SVG: line, polyline, polygon, rect and path of straight parts, in groups that move by
+    /// animateTransform, with data-reflectance, data-emit, data-two-sided, data-front=inside|outside, and
+    /// data-units-per-metre at the root. Without -o the report goes to stdout.
     #[command(
         after_help = "Example:  relume flat gutter.flat -o out --epsilon 0.1\n          relume flat figure 0.4 -o docs/figures"
     )]
     Flat(FlatArgs),
+    /// Draw a figure of the paper that is of space, from the scenes that ship, as SVG and PNG.
+    ///
+    /// Those of the plane are drawn by `relume flat figure`.
+    #[command(after_help = "Example:  relume figure 0.5 -o docs/figures")]
+    Figure(FigureArgs),
+}
+
+/// `relume figure`
+#[derive(Debug, Args)]
+pub(crate) struct FigureArgs {
+    /// Which.
+    #[arg(value_enum)]
+    pub(crate) figure: Figure,
+    /// Directory for the files; made if missing.
+    #[arg(short, long, value_name = "DIR", default_value = ".")]
+    pub(crate) output: PathBuf,
+}
+
+/// The figures of space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Figure {
+    /// Two sequences with a moving light: pictures, the elements that are linked to the light, and the
+    /// same with links extrapolated.
+    #[value(name = "0.5")]
+    Sequences,
+    /// Times a frame, measured here, beside the paper's.
+    #[value(name = "table-0.1")]
+    Times,
 }
 
 /// `relume flat`
@@ -110,7 +141,7 @@ pub(crate) enum Command {
 pub(crate) struct FlatArgs {
     #[command(subcommand)]
     pub(crate) command: Option<FlatCommand>,
-    /// The scene, a text file.
+    /// The scene, a text file or an .svg.
     #[arg(value_name = "SCENE", required = true)]
     pub(crate) scene: Option<PathBuf>,
     /// Directory for report.json and a drawing of each frame (SVG); made if missing.
@@ -131,18 +162,22 @@ pub(crate) struct FlatArgs {
     /// Elements are constant, as in the paper; otherwise links carry gradients.
     #[arg(long)]
     pub(crate) constant: bool,
-    /// How the links follow the motion: `reinspect`, `scratch` (the same links) or
-    /// `extrapolate[=N]`.
-    #[arg(long, value_name = "STRATEGY", default_value = "reinspect")]
-    pub(crate) update: UpdateFlag,
-    /// Compare every frame with one built from scratch instead; exit with 1 where they differ.
-    #[arg(long)]
+    #[command(flatten)]
+    pub(crate) update: UpdateChoice,
+    /// Compare every frame with one built from scratch instead, as `relume verify` does in space; exit
+    /// with 1 where they differ.
+    #[arg(long, conflicts_with_all = ["output", "events", "print"])]
     pub(crate) verify: bool,
+    /// Measure what a frame costs instead, as `relume bench` does in space.
+    #[arg(long, conflicts_with_all = ["output", "events", "print", "verify"])]
+    pub(crate) bench: bool,
+    #[command(flatten)]
+    pub(crate) measure: MeasureFlags,
     /// Write every link event to this file (CSV).
     #[arg(long, value_name = "FILE")]
     pub(crate) events: Option<PathBuf>,
     /// What to print.
-    #[arg(long, value_enum, value_name = "WHAT", conflicts_with = "verify")]
+    #[arg(long, value_enum, value_name = "WHAT")]
     pub(crate) print: Option<FlatPrint>,
 }
 
@@ -438,6 +473,21 @@ pub(crate) struct ClipFlags {
     pub(crate) quiet: bool,
 }
 
+impl Default for ClipFlags {
+    fn default() -> ClipFlags {
+        ClipFlags {
+            frames: None,
+            fps: 24.0,
+            animation: AnimationFlag { name: None },
+            tolerance: None,
+            oracle: OracleFlag::Error,
+            threads: None,
+            max_memory: None,
+            quiet: false,
+        }
+    }
+}
+
 /// How the links follow the motion.
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct UpdateChoice {
@@ -524,6 +574,18 @@ pub(crate) struct BenchArgs {
     pub(crate) clip: ClipFlags,
     #[command(flatten)]
     pub(crate) update: UpdateChoice,
+    #[command(flatten)]
+    pub(crate) measure: MeasureFlags,
+    /// Draw no pictures; the row with them is left out.
+    #[arg(long)]
+    pub(crate) no_pictures: bool,
+    #[command(flatten)]
+    pub(crate) picture: PictureFlags,
+}
+
+/// What is measured against what, and where the numbers go.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct MeasureFlags {
     /// Build only every K-th frame from scratch beside the others: quicker, less exact.
     #[arg(long, value_name = "K", default_value = "1", value_parser = parse_every, allow_negative_numbers = true)]
     pub(crate) every: usize,
@@ -531,11 +593,6 @@ pub(crate) struct BenchArgs {
     /// missed events, error of radiosity. Takes the place of the other tables.
     #[arg(long, conflicts_with_all = ["every", "strategy", "error"])]
     pub(crate) compare: bool,
-    /// Draw no pictures; the row with them is left out.
-    #[arg(long)]
-    pub(crate) no_pictures: bool,
-    #[command(flatten)]
-    pub(crate) picture: PictureFlags,
     /// Also write all numbers to this file, frame by frame (`relume-bench/1`).
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
@@ -562,6 +619,18 @@ pub(crate) struct PictureFlags {
     /// Draw the outlines of the elements over the picture.
     #[arg(long)]
     pub(crate) mesh: bool,
+}
+
+impl Default for PictureFlags {
+    fn default() -> PictureFlags {
+        PictureFlags {
+            size: Size { width: 640, height: 480 },
+            shading: None,
+            camera: None,
+            exposure: ExposureFlag::Auto,
+            mesh: false,
+        }
+    }
 }
 
 /// Width and height in pixels.
@@ -803,8 +872,20 @@ impl UpdateChoice {
         }
     }
 
-    /// What the engine is asked for; `None` if an error is stated without extrapolation.
-    pub(crate) fn update(self) -> Option<Update> {
+    /// What the engine is asked for.
+    ///
+    /// Fails if an error is stated without extrapolation.
+    pub(crate) fn asked_for(self) -> Result<Update, Failure> {
+        self.update().ok_or_else(|| {
+            Failure::usage(
+                "--error goes with --update extrapolate only: the other strategies have none",
+            )
+            .help("leave out --error, or add --update extrapolate")
+        })
+    }
+
+    /// The same; `None` if an error is stated without extrapolation.
+    fn update(self) -> Option<Update> {
         Some(match (self.strategy, self.error) {
             (UpdateFlag::Extrapolate { frames }, error) => {
                 let most = if error.is_some() { FRAMES_AHEAD_AT_MOST } else { FRAMES_AHEAD };

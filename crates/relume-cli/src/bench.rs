@@ -4,96 +4,171 @@
 //! one that follows the motion, and one set up for this frame alone. So whatever else the machine
 //! does hits both alike, and ratios hold where seconds do not.
 
-use relume::session::{FrameReport, Session};
+use std::path::Path;
+
+use relume::session::Session;
 use relume_picture::export::{probe, write_atomically};
 use relume_picture::picture::{self, Exposure, Viewpoint};
 
-use crate::args::{BenchArgs, ExposureFlag, UpdateChoice, UpdateFlag};
-use crate::clip::{self, Clip, fixed, now, step_failure};
+use crate::args::{BenchArgs, ExposureFlag, MeasureFlags, PictureFlags, UpdateChoice, UpdateFlag};
+use crate::clip::{self, Clip, fixed, now};
 use crate::failure::Failure;
 use crate::figures::{Cold, Figures, Held, Measured};
 use crate::interrupt;
 use crate::output::{self, count, counted};
 use crate::progress::Progress;
 use crate::report::peak_memory_bytes;
+use crate::sequence::{Sequence, Stepping};
 use crate::strategies;
+
+/// What is measured, and what becomes of it.
+pub(crate) struct Plan<'a> {
+    /// How the links follow the motion.
+    pub(crate) update: UpdateChoice,
+    /// Of this many frames one is built from scratch too.
+    pub(crate) every: usize,
+    /// All strategies instead.
+    pub(crate) compare: bool,
+    /// File for the numbers.
+    pub(crate) json: Option<&'a Path>,
+    /// Neither tables nor a progress bar.
+    pub(crate) quiet: bool,
+}
+
+impl<'a> Plan<'a> {
+    /// From the command line.
+    pub(crate) fn new(flags: &'a MeasureFlags, update: UpdateChoice, quiet: bool) -> Plan<'a> {
+        let MeasureFlags { every, compare, json } = flags;
+        Plan { update, every: *every, compare: *compare, json: json.as_deref(), quiet }
+    }
+}
+
+/// Draws the present frame of a session, at a time; the seconds that took.
+pub(crate) type Draw<'a, S> = Box<dyn FnMut(&S, f64) -> Result<f64, Failure> + 'a>;
 
 /// Runs the command.
 pub(crate) fn bench(args: &BenchArgs) -> Result<(), Failure> {
     let clip = Clip::open(&args.source, &args.clip)?;
-    if clip.frames.len() < 2 {
-        return Err(Failure::new(
-            "a bench takes two frames or more: the first is built from scratch",
-        )
-        .help("ask for more with --frames; a scene in which nothing moves has frame 0 only"));
-    }
     clip.warn();
-    if let Some(path) = &args.json {
+    let plan = Plan::new(&args.measure, args.update, args.clip.quiet);
+    let draw = match args.no_pictures || plan.compare {
+        true => None,
+        false => Some(draw_and_drop(&args.picture, &clip)?),
+    };
+    measure(&plan, &clip, draw)
+}
+
+/// Pictures that are drawn, timed and thrown away.
+pub(crate) fn draw_and_drop<'a>(
+    flags: &'a PictureFlags,
+    clip: &'a Clip,
+) -> Result<Draw<'a, Session>, Failure> {
+    let mut drawing = Drawing::new(flags, clip)?;
+    Ok(Box::new(move |session: &Session, time_s| drawing.draw(session, time_s)))
+}
+
+/// Measures a sequence, and prints and writes what was found.
+pub(crate) fn measure<'a, Q: Sequence>(
+    plan: &'a Plan<'a>,
+    sequence: &'a Q,
+    draw: Option<Draw<'a, Q::Session>>,
+) -> Result<(), Failure> {
+    if let Some(path) = plan.json {
         probe(path).map_err(|error| Failure::write(path, &error))?;
     }
-    if args.compare {
-        return strategies::compare(args, &clip);
+    if plan.compare {
+        enough(sequence)?;
+        return strategies::compare(plan, sequence);
     }
-    let mut bench = Bench::new(args, &clip)?;
-    let outcome = bench.frames();
-    bench.progress.clear();
-    let finished = outcome?;
-    let measured = bench.frames.len() + usize::from(bench.first.is_some());
+    let (figures, measured) = figures(plan, sequence, draw)?;
     // Also where the run was stopped: what was measured stays.
-    if let Some(figures) = bench.figures() {
-        if !args.clip.quiet {
+    if let Some(figures) = figures {
+        if !plan.quiet {
             output::print(&figures.text())?;
         }
-        if let Some(path) = &args.json {
+        if let Some(path) = plan.json {
             let _guard = interrupt::writing();
             write_atomically(path, figures.json()?.as_bytes())
                 .map_err(|error| Failure::write(path, &error))?;
         }
     }
-    if finished {
+    if measured == sequence.frames().len() {
         return Ok(());
     }
-    Err(Failure::interrupted(format_args!(
+    Err(stopped(measured, sequence))
+}
+
+/// What was measured of a sequence, nothing before its second frame; and how many frames were.
+pub(crate) fn figures<'a, Q: Sequence>(
+    plan: &'a Plan<'a>,
+    sequence: &'a Q,
+    draw: Option<Draw<'a, Q::Session>>,
+) -> Result<(Option<Figures>, usize), Failure> {
+    enough(sequence)?;
+    let mut bench = Bench::new(plan, sequence, draw)?;
+    let outcome = bench.frames();
+    bench.progress.clear();
+    outcome?;
+    let measured = bench.frames.len() + usize::from(bench.first.is_some());
+    Ok((bench.figures(), measured))
+}
+
+/// The message of a run that was interrupted.
+pub(crate) fn stopped(measured: usize, sequence: &impl Sequence) -> Failure {
+    Failure::interrupted(format_args!(
         "stopped: {} of {} measured",
         count(measured as u64),
-        counted(clip.frames.len(), "frame")
-    )))
+        counted(sequence.frames().len(), "frame")
+    ))
+}
+
+fn enough(sequence: &impl Sequence) -> Result<(), Failure> {
+    if sequence.frames().len() < 2 {
+        return Err(Failure::new(
+            "a bench takes two frames or more: the first is built from scratch",
+        )
+        .help("ask for more with --frames; a scene in which nothing moves has frame 0 only"));
+    }
+    Ok(())
 }
 
 /// A bench under way.
-struct Bench<'a> {
-    args: &'a BenchArgs,
-    clip: &'a Clip,
-    session: Session,
-    drawing: Option<Drawing<'a>>,
+struct Bench<'a, Q: Sequence> {
+    plan: &'a Plan<'a>,
+    sequence: &'a Q,
+    session: Q::Session,
+    draw: Option<Draw<'a, Q::Session>>,
     progress: Progress,
     first: Option<Measured>,
     frames: Vec<Measured>,
 }
 
-impl<'a> Bench<'a> {
-    fn new(args: &'a BenchArgs, clip: &'a Clip) -> Result<Bench<'a>, Failure> {
-        let drawing = if args.no_pictures { None } else { Some(Drawing::new(args, clip)?) };
+impl<'a, Q: Sequence> Bench<'a, Q> {
+    fn new(
+        plan: &'a Plan<'a>,
+        sequence: &'a Q,
+        draw: Option<Draw<'a, Q::Session>>,
+    ) -> Result<Bench<'a, Q>, Failure> {
         Ok(Bench {
-            args,
-            clip,
+            plan,
+            sequence,
             // Set up again, and timed, with the first frame.
-            session: clip.session(args.update, false)?,
-            drawing,
-            progress: Progress::new(clip.frames.len(), 0, args.clip.quiet),
+            session: sequence.begin(plan.update)?,
+            draw,
+            progress: Progress::new(sequence.frames().len(), 0, plan.quiet),
             first: None,
             frames: Vec::new(),
         })
     }
 
-    /// Measures frame after frame; whether all were.
-    fn frames(&mut self) -> Result<bool, Failure> {
-        for (k, &frame) in self.clip.frames.iter().enumerate() {
+    /// Measures frame after frame, until asked to stop.
+    fn frames(&mut self) -> Result<(), Failure> {
+        for (k, &frame) in self.sequence.frames().iter().enumerate() {
             if interrupt::requested() {
-                return Ok(false);
+                return Ok(());
             }
             let links = self.frames.last().map_or(0, |m| m.report.links);
-            self.progress.start(frame, links, self.session.memory_bytes());
+            self.progress.start(frame, links, self.session.held_bytes());
             if k == 0 {
                 self.first = Some(self.first(frame)?);
             } else {
@@ -102,12 +177,12 @@ impl<'a> Bench<'a> {
             }
             self.progress.finish_frame();
         }
-        Ok(true)
+        Ok(())
     }
 
     /// Sets up and solves the first frame.
     fn first(&mut self, frame: u32) -> Result<Measured, Failure> {
-        let (session, Cold { seconds, report }) = self.build(frame, None, self.args.update)?;
+        let (session, Cold { seconds, report }) = self.build(frame, None, self.plan.update)?;
         self.session = session;
         let picture_seconds = self.draw(frame)?;
         Ok(Measured { seconds, picture_seconds, report, cold: None })
@@ -116,12 +191,12 @@ impl<'a> Bench<'a> {
     /// Follows the motion to a frame, and builds it from scratch where that is asked for: the two in
     /// turns before and after each other.
     fn next(&mut self, k: usize, frame: u32) -> Result<Measured, Failure> {
-        let asked = (k - 1).is_multiple_of(self.args.every);
+        let asked = (k - 1).is_multiple_of(self.plan.every);
         let before = k.is_multiple_of(2);
-        let from = self.clip.frames[k - 1];
+        let from = self.sequence.frames()[k - 1];
         let mut cold = if asked && before { Some(self.cold(frame, from)?) } else { None };
         let started = now();
-        let report = step(&mut self.session, self.clip, frame)?;
+        let report = self.sequence.step(&mut self.session, frame)?;
         let seconds = started.elapsed().as_secs_f64();
         let picture_seconds = self.draw(frame)?;
         if asked && !before {
@@ -141,25 +216,25 @@ impl<'a> Bench<'a> {
         frame: u32,
         from: Option<u32>,
         update: UpdateChoice,
-    ) -> Result<(Session, Cold), Failure> {
+    ) -> Result<(Q::Session, Cold), Failure> {
         let started = now();
-        let mut session = self.clip.session(update, false)?;
-        session.came_from(from.map(|frame| self.clip.time_of(frame)));
-        let report = step(&mut session, self.clip, frame)?;
+        let mut session = self.sequence.begin(update)?;
+        session.count_from(from.map(|frame| self.sequence.time_of(frame)));
+        let report = self.sequence.step(&mut session, frame)?;
         let seconds = started.elapsed().as_secs_f64();
         Ok((session, Cold { seconds, report }))
     }
 
     /// Draws the present frame, if pictures are drawn; the seconds that took.
     fn draw(&mut self, frame: u32) -> Result<Option<f64>, Failure> {
-        let Some(drawing) = &mut self.drawing else { return Ok(None) };
-        drawing.draw(&self.session, self.clip.time_of(frame)).map(Some)
+        let Some(draw) = &mut self.draw else { return Ok(None) };
+        draw(&self.session, self.sequence.time_of(frame)).map(Some)
     }
 
     /// What was measured; `None` before the second frame.
     fn figures(self) -> Option<Figures> {
-        let memory = self.session.memory();
-        let peak = peak_memory_bytes().unwrap_or_else(|| self.session.memory_bytes());
+        let memory = self.session.held();
+        let peak = peak_memory_bytes().unwrap_or_else(|| self.session.held_bytes());
         let report = &self.frames.last()?.report;
         let held = Held {
             pair_bytes: memory.pairs,
@@ -171,11 +246,12 @@ impl<'a> Bench<'a> {
             links: report.links,
         };
         Some(Figures {
-            sequence: self.clip.scene.name.clone(),
-            tolerance: self.clip.tolerance,
-            oracle: self.args.clip.oracle.to_string(),
-            update: self.args.update.name(),
-            threads: self.clip.threads,
+            sequence: self.sequence.name().to_owned(),
+            tolerance: self.sequence.tolerance(),
+            oracle: self.sequence.oracle(),
+            settings: self.sequence.settings(),
+            update: self.plan.update.name(),
+            threads: self.sequence.threads(),
             first: self.first?,
             frames: self.frames,
             held,
@@ -183,13 +259,9 @@ impl<'a> Bench<'a> {
     }
 }
 
-pub(crate) fn step(session: &mut Session, clip: &Clip, frame: u32) -> Result<FrameReport, Failure> {
-    session.step(frame, clip.time_of(frame)).map_err(|error| step_failure(error, ""))
-}
-
 /// Pictures that are drawn and thrown away.
 struct Drawing<'a> {
-    args: &'a BenchArgs,
+    flags: &'a PictureFlags,
     clip: &'a Clip,
     camera: Viewpoint,
     /// Chosen at the first picture where the flags say `auto`.
@@ -197,13 +269,13 @@ struct Drawing<'a> {
 }
 
 impl<'a> Drawing<'a> {
-    fn new(args: &'a BenchArgs, clip: &'a Clip) -> Result<Drawing<'a>, Failure> {
-        let camera = Viewpoint::new(&clip.scene, args.picture.camera.as_deref());
-        let exposure = match args.picture.exposure {
+    fn new(flags: &'a PictureFlags, clip: &'a Clip) -> Result<Drawing<'a>, Failure> {
+        let camera = Viewpoint::new(&clip.scene, flags.camera.as_deref());
+        let exposure = match flags.exposure {
             ExposureFlag::Auto => None,
             ExposureFlag::Stops(stops) => Some(fixed(stops)),
         };
-        Ok(Drawing { args, clip, camera: camera.map_err(Failure::new)?, exposure })
+        Ok(Drawing { flags, clip, camera: camera.map_err(Failure::new)?, exposure })
     }
 
     /// Seconds from the solution to the pixels.
@@ -211,8 +283,8 @@ impl<'a> Drawing<'a> {
         let view = self.camera.at(&self.clip.scene, time_s).map_err(Failure::new)?;
         let automatic = || Exposure::automatic(&session.snapshot(), &view);
         let exposure = *self.exposure.get_or_insert_with(automatic);
-        let shading = self.args.picture.shading.unwrap_or(self.clip.shading);
-        let settings = clip::picture_settings(&self.args.picture, shading, exposure);
+        let shading = self.flags.shading.unwrap_or(self.clip.shading);
+        let settings = clip::picture_settings(self.flags, shading, exposure);
         let started = now();
         let image = picture::render(&session.snapshot(), &view, &settings);
         let seconds = started.elapsed().as_secs_f64();

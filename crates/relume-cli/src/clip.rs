@@ -63,6 +63,12 @@ impl Clip {
         }
     }
 
+    /// The clip of a demonstration with the paper's oracle, at a threshold.
+    pub(crate) fn of_the_paper(demo: DemoScene, epsilon: f64) -> Result<Clip, Failure> {
+        let oracle = OracleFlag::FormFactor { epsilon, min_area_m2: None };
+        Clip::of_demo(demo, &ClipFlags { oracle, ..ClipFlags::default() })
+    }
+
     fn of_demo(name: DemoScene, flags: &ClipFlags) -> Result<Clip, Failure> {
         if flags.animation.name.is_some() {
             return Err(Failure::usage("the demonstrations have one animation, without a name")
@@ -114,6 +120,11 @@ impl Clip {
         }
     }
 
+    /// The oracle, as on the command line.
+    pub(crate) fn oracle(&self) -> String {
+        self.flags.oracle.to_string()
+    }
+
     /// Time of a frame, seconds.
     pub(crate) fn time_of(&self, frame: u32) -> f64 {
         frames::time_of(frame, self.flags.fps)
@@ -128,12 +139,7 @@ impl Clip {
                 min_area_m2: min_area_m2.unwrap_or(self.scene.area_m2() * MIN_AREA_SHARE),
             },
         };
-        let update = update.update().ok_or_else(|| {
-            Failure::usage(
-                "--error goes with --update extrapolate only: the other strategies have none",
-            )
-            .help("leave out --error, or add --update extrapolate")
-        })?;
+        let update = update.asked_for()?;
         Ok(Options {
             tolerance: self.tolerance,
             oracle,

@@ -63,10 +63,12 @@ pub(crate) struct Held {
 pub(crate) struct Figures {
     /// Name of the scene.
     pub(crate) sequence: String,
-    /// Relative error of irradiance aimed at.
-    pub(crate) tolerance: f64,
+    /// Relative error of irradiance aimed at, where there is one.
+    pub(crate) tolerance: Option<f64>,
     /// The oracle, as on the command line.
     pub(crate) oracle: String,
+    /// Both in words.
+    pub(crate) settings: String,
     /// The update strategy, as on the command line.
     pub(crate) update: String,
     /// Threads used.
@@ -81,17 +83,19 @@ pub(crate) struct Figures {
 
 /// A row of the paper's Table 0.1.
 #[derive(Debug, PartialEq, Serialize)]
-struct Row {
-    sequence: String,
+pub(crate) struct Row {
+    /// Its name.
+    pub(crate) sequence: String,
     /// Frames averaged over: all but the first.
-    frames: usize,
-    mean_s: f64,
-    standard_deviation_s: f64,
-    median_s: f64,
+    pub(crate) frames: usize,
+    /// Time a frame, seconds: mean, standard deviation, median.
+    pub(crate) mean_s: f64,
+    pub(crate) standard_deviation_s: f64,
+    pub(crate) median_s: f64,
     /// Time to set up and solve the first frame.
-    first_s: f64,
+    pub(crate) first_s: f64,
     /// First by mean.
-    ratio: f64,
+    pub(crate) ratio: f64,
 }
 
 /// Frames against the same frames built from scratch.
@@ -155,7 +159,8 @@ struct File<'a> {
     schema: &'static str,
     version: &'static str,
     scene: &'a str,
-    tolerance: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tolerance: Option<f64>,
     oracle: &'a str,
     update: &'a str,
     threads: usize,
@@ -234,10 +239,9 @@ impl Figures {
     fn write(&self, out: &mut String) -> fmt::Result {
         writeln!(
             out,
-            "{}: tolerance {}, oracle {}, update {}, {}\n",
+            "{}: {}, update {}, {}\n",
             self.sequence,
-            self.tolerance,
-            self.oracle,
+            self.settings,
             self.update,
             counted(self.threads, "thread")
         )?;
@@ -371,7 +375,7 @@ impl Figures {
     }
 
     /// The rows of the paper's table: without and with pictures.
-    fn rows(&self) -> Vec<Row> {
+    pub(crate) fn rows(&self) -> Vec<Row> {
         let seconds: Vec<f64> = self.frames.iter().map(|m| m.seconds).collect();
         let mut rows = vec![Row::new(self.sequence.clone(), &seconds, self.first.seconds)];
         let drawn: Option<Vec<f64>> = self.frames.iter().map(Measured::with_picture).collect();
@@ -553,8 +557,9 @@ mod tests {
         let cold = Cold { seconds: 0.2, report: report(100, 200) };
         Figures {
             sequence: "room".into(),
-            tolerance: 0.02,
+            tolerance: Some(0.02),
             oracle: "error".into(),
+            settings: "tolerance 0.02, oracle error".into(),
             update: "reinspect".into(),
             threads: 2,
             first: frame(0.4, None),

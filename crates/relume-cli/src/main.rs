@@ -14,6 +14,7 @@ mod frames;
 mod info;
 mod interrupt;
 mod output;
+mod paper;
 mod probe;
 mod progress;
 mod report;
@@ -21,6 +22,7 @@ mod resume;
 mod run;
 mod scene_file;
 mod sensors;
+mod sequence;
 mod strategies;
 mod verify;
 
@@ -49,6 +51,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Bench(args) => interrupt::listen().and_then(|()| bench::bench(&args)),
         Command::Factors(args) => interrupt::listen().and_then(|()| factors::factors(&args)),
         Command::Probe(args) => interrupt::listen().and_then(|()| probe::probe(&args)),
+        Command::Figure(args) => interrupt::listen().and_then(|()| paper::figure(&args)),
         Command::Flat(args) => interrupt::listen().and_then(|()| flat::flat(&args)),
         Command::Solve(args) => interrupt::listen().and_then(|()| run::solve(args)),
         Command::Render(args) => interrupt::listen().and_then(|()| run::render(args)),

@@ -2,18 +2,19 @@
 
 use std::fmt::Write;
 
-use relume::session::{Session, missed, radiosity_error};
+use relume::session::{missed, radiosity_error};
 use relume_picture::export::write_atomically;
 use serde::Serialize;
 
-use crate::args::{BenchArgs, UpdateChoice, UpdateFlag};
-use crate::bench::step;
-use crate::clip::{Clip, now};
+use crate::args::{UpdateChoice, UpdateFlag};
+use crate::bench::Plan;
+use crate::clip::now;
 use crate::failure::Failure;
 use crate::figures::{mean, ratio, standard_deviation, time, times, whole};
 use crate::interrupt;
 use crate::output;
 use crate::progress::Progress;
+use crate::sequence::{Sequence, Stepping};
 
 /// Name of the format.
 const SCHEMA: &str = "relume-strategies/1";
@@ -31,22 +32,22 @@ const SCRATCH: usize = 0;
 const REINSPECT: usize = 1;
 
 /// Runs the comparison.
-pub(crate) fn compare(args: &BenchArgs, clip: &Clip) -> Result<(), Failure> {
-    let sessions = STRATEGIES.iter().map(|&s| clip.session(s, false)).collect::<Result<_, _>>()?;
-    let progress = Progress::new(clip.frames.len(), 0, args.clip.quiet);
-    let mut comparison = Comparison { clip, sessions, columns: Vec::new(), first_s: Vec::new() };
+pub(crate) fn compare(plan: &Plan<'_>, sequence: &impl Sequence) -> Result<(), Failure> {
+    let sessions = STRATEGIES.iter().map(|&s| sequence.begin(s)).collect::<Result<_, _>>()?;
+    let progress = Progress::new(sequence.frames().len(), 0, plan.quiet);
+    let mut comparison =
+        Comparison { sequence, sessions, columns: Vec::new(), first_s: Vec::new() };
     comparison.columns = STRATEGIES.iter().map(|_| Vec::new()).collect();
     let outcome = comparison.frames(&progress);
     progress.clear();
     let finished = outcome?;
     if !comparison.columns[0].is_empty() {
-        if !args.clip.quiet {
-            output::print(&comparison.text(&args.clip.oracle.to_string()))?;
+        if !plan.quiet {
+            output::print(&comparison.text())?;
         }
-        if let Some(path) = &args.json {
+        if let Some(path) = plan.json {
             let _guard = interrupt::writing();
-            let text = comparison.json(&args.clip.oracle.to_string())?;
-            write_atomically(path, text.as_bytes())
+            write_atomically(path, comparison.json()?.as_bytes())
                 .map_err(|error| Failure::write(path, &error))?;
         }
     }
@@ -73,9 +74,9 @@ struct Cell {
     max_error: f64,
 }
 
-struct Comparison<'a> {
-    clip: &'a Clip,
-    sessions: Vec<Session>,
+struct Comparison<'a, Q: Sequence> {
+    sequence: &'a Q,
+    sessions: Vec<Q::Session>,
     /// By strategy, by frame after the first.
     columns: Vec<Vec<Cell>>,
     /// Time of the first frame by strategy.
@@ -108,23 +109,23 @@ struct Row {
     max_error: f64,
 }
 
-impl Comparison<'_> {
+impl<Q: Sequence> Comparison<'_, Q> {
     /// Steps all sessions from frame to frame, each frame in another order; whether to the end.
     fn frames(&mut self, progress: &Progress) -> Result<bool, Failure> {
         let count = self.sessions.len();
         self.first_s = vec![0.0; count];
-        for (k, &frame) in self.clip.frames.iter().enumerate() {
+        for (k, &frame) in self.sequence.frames().iter().enumerate() {
             if interrupt::requested() {
                 return Ok(false);
             }
-            let bytes = self.sessions.iter().map(Session::memory_bytes).sum();
+            let bytes = self.sessions.iter().map(Stepping::held_bytes).sum();
             progress.start(frame, 0, bytes);
             let mut cells = vec![Cell::default(); count];
             let mut hashes = vec![String::new(); count];
             for turn in 0..count {
                 let at = (turn + k) % count;
                 let started = now();
-                let report = step(&mut self.sessions[at], self.clip, frame)?;
+                let report = self.sequence.step(&mut self.sessions[at], frame)?;
                 let seconds = started.elapsed().as_secs_f64();
                 cells[at] = Cell {
                     seconds,
@@ -161,15 +162,15 @@ impl Comparison<'_> {
         STRATEGIES.iter().zip(&self.columns).map(|(s, cells)| row(s.name(), cells)).collect()
     }
 
-    fn text(&self, oracle: &str) -> String {
+    fn text(&self) -> String {
         let mut out = String::new();
-        let (clip, rows) = (self.clip, self.rows());
+        let (sequence, rows) = (self.sequence, self.rows());
         let _ = writeln!(
             out,
-            "{}: tolerance {}, oracle {oracle}, {} threads, {} frames after the first; means a frame",
-            clip.scene.name,
-            clip.tolerance,
-            clip.threads,
+            "{}: {}, {} threads, {} frames after the first; means a frame",
+            sequence.name(),
+            sequence.settings(),
+            sequence.threads(),
             self.columns[0].len()
         );
         let _ = writeln!(
@@ -230,7 +231,7 @@ impl Comparison<'_> {
         out
     }
 
-    fn json(&self, oracle: &str) -> Result<String, Failure> {
+    fn json(&self) -> Result<String, Failure> {
         #[derive(Serialize)]
         struct Strategy<'a> {
             means: Row,
@@ -242,8 +243,9 @@ impl Comparison<'_> {
             schema: &'static str,
             version: &'static str,
             scene: &'a str,
-            tolerance: f64,
-            oracle: &'a str,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            tolerance: Option<f64>,
+            oracle: String,
             threads: usize,
             strategies: Vec<Strategy<'a>>,
         }
@@ -251,10 +253,10 @@ impl Comparison<'_> {
         let file = File {
             schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION"),
-            scene: &self.clip.scene.name,
-            tolerance: self.clip.tolerance,
-            oracle,
-            threads: self.clip.threads,
+            scene: self.sequence.name(),
+            tolerance: self.sequence.tolerance(),
+            oracle: self.sequence.oracle(),
+            threads: self.sequence.threads(),
             strategies: strategies
                 .map(|((means, frames), &first_s)| Strategy { means, first_s, frames })
                 .collect(),

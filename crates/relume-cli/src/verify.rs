@@ -1,13 +1,14 @@
 //! `relume verify`: frame by frame, the links that followed the motion against links built anew.
 
-use relume::session::{Difference, FrameReport, RadiosityGap, Session, compare, radiosity_gap};
+use relume::session::{Difference, FrameReport, RadiosityGap, Solution, compare, radiosity_gap};
 
 use crate::args::{UpdateChoice, UpdateFlag, VerifyArgs};
-use crate::clip::{Clip, step_failure};
+use crate::clip::Clip;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{self, count, counted};
 use crate::progress::Progress;
+use crate::sequence::{Sequence, Stepping};
 
 /// What the two solutions are called in messages.
 const ONE: &str = "incrementally";
@@ -17,47 +18,59 @@ const TWO: &str = "from scratch";
 pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
     let clip = Clip::open(&args.source, &args.clip)?;
     clip.warn();
+    frames(&clip, UpdateChoice::of(args.update.into()), args.clip.quiet)
+}
+
+/// Solves all frames twice and compares. A difference is a failure.
+pub(crate) fn frames(
+    sequence: &impl Sequence,
+    update: UpdateChoice,
+    quiet: bool,
+) -> Result<(), Failure> {
     let mut sides = Sides {
-        warm: clip.session(UpdateChoice::of(args.update.into()), false)?,
-        cold: clip.session(UpdateChoice::of(UpdateFlag::Scratch), false)?,
+        warm: sequence.begin(update)?,
+        cold: sequence.begin(UpdateChoice::of(UpdateFlag::Scratch))?,
     };
-    let progress = Progress::new(clip.frames.len(), 0, args.clip.quiet);
-    let outcome = sides.frames(&clip, &progress, args.clip.quiet);
+    let progress = Progress::new(sequence.frames().len(), 0, quiet);
+    let outcome = sides.frames(sequence, update, &progress, quiet);
     progress.clear();
     let tightest = outcome?;
-    if args.clip.quiet {
+    if quiet {
         return Ok(());
     }
     output::print(&format!(
         "{} equal: links bit for bit, radiosities within {:.0} % of their bound\n",
-        counted(clip.frames.len(), "frame"),
+        counted(sequence.frames().len(), "frame"),
         100.0 * tightest
     ))
 }
 
 /// The two solutions side by side.
-struct Sides {
-    warm: Session,
-    cold: Session,
+struct Sides<S> {
+    warm: S,
+    cold: S,
 }
 
-impl Sides {
+impl<S: Stepping> Sides<S> {
     /// Solves and compares; the largest share of its bound that a radiosity differed by.
-    fn frames(&mut self, clip: &Clip, progress: &Progress, quiet: bool) -> Result<f64, Failure> {
+    fn frames(
+        &mut self,
+        sequence: &impl Sequence<Session = S>,
+        update: UpdateChoice,
+        progress: &Progress,
+        quiet: bool,
+    ) -> Result<f64, Failure> {
         let (mut tightest, mut links) = (0.0, 0);
-        for (done, &frame) in clip.frames.iter().enumerate() {
+        let frames = sequence.frames();
+        for (done, &frame) in frames.iter().enumerate() {
             if interrupt::requested() {
-                return Err(interrupted(done, clip.frames.len()));
+                return Err(interrupted(done, frames.len()));
             }
-            let memory = self.warm.memory_bytes() + self.cold.memory_bytes();
-            progress.start(frame, links, memory);
-            let time_s = clip.time_of(frame);
-            let step = |session: &mut Session| {
-                session.step(frame, time_s).map_err(|error| step_failure(error, ""))
-            };
-            let report = step(&mut self.warm)?;
-            step(&mut self.cold)?;
-            let gap = agree(&self.warm, &self.cold).map_err(|found| differs(frame, &found))?;
+            progress.start(frame, links, self.warm.held_bytes() + self.cold.held_bytes());
+            let report = sequence.step(&mut self.warm, frame)?;
+            sequence.step(&mut self.cold, frame)?;
+            let gap =
+                agree(&self.warm, &self.cold).map_err(|found| differs(frame, update, &found))?;
             if !quiet {
                 progress.suspend(|| output::print(&line(&report, &gap)))?;
             }
@@ -71,7 +84,7 @@ impl Sides {
 
 /// How near the radiosities of two solutions that agree come to their bound; else the first
 /// difference.
-fn agree(warm: &Session, cold: &Session) -> Result<RadiosityGap, Difference> {
+fn agree<S: Solution>(warm: &S, cold: &S) -> Result<RadiosityGap, Difference> {
     match compare(warm, cold) {
         Some(difference) => Err(difference),
         None => radiosity_gap(warm, cold),
@@ -90,12 +103,15 @@ fn line(report: &FrameReport, gap: &RadiosityGap) -> String {
     )
 }
 
-fn differs(frame: u32, difference: &Difference) -> Failure {
+fn differs(frame: u32, update: UpdateChoice, difference: &Difference) -> Failure {
     Failure::new(format_args!(
         "frame {frame} solved incrementally differs from frame {frame} solved from scratch: {}",
         difference.in_words(ONE, TWO)
     ))
-    .help("this is a defect of relume: please report it with the scene; --update scratch avoids it")
+    .help(match update.strategy {
+        UpdateFlag::Extrapolate { .. } => "what is extrapolated is not what is there: leave out --update",
+        _ => "this is a defect of relume: please report it with the scene; --update scratch avoids it",
+    })
 }
 
 fn interrupted(done: usize, wanted: usize) -> Failure {
@@ -110,7 +126,7 @@ fn interrupted(done: usize, wanted: usize) -> Failure {
 mod tests {
     use std::sync::Arc;
 
-    use relume::session::{Options, Oracle};
+    use relume::session::{Options, Oracle, Session};
 
     use super::*;
     use crate::args::DemoScene;
@@ -127,7 +143,8 @@ mod tests {
             session
         };
         let (one, two) = (at(0.0), at(0.25));
-        let failure = differs(7, &agree(&one, &two).unwrap_err());
+        let certain = UpdateChoice::of(UpdateFlag::Certificate);
+        let failure = differs(7, certain, &agree(&one, &two).unwrap_err());
         assert_eq!(failure.exit_code(), 1);
         let text = failure.to_string();
         for part in ["frame 7", "the link between surface `", "incrementally", "X = ", "V = "] {

@@ -34,14 +34,51 @@ fn a_scene_gives_a_report_and_drawings() {
 
 #[test]
 fn every_scene_that_ships_agrees_with_cold_builds() {
-    for name in ["triangle", "duct", "wedge", "screen", "approach", "gutter", "room"] {
-        let file = scene(&format!("{name}.flat"));
-        let ran = relume(&["flat", text(&file), "--verify", "--fps", "5", "--epsilon", "0.1"]);
-        ran.says(&["equal: links bit for bit"]);
+    for name in ["triangle", "duct", "wedge", "screen", "approach", "gutter", "room", "studio"] {
+        let ending = if name == "studio" { "svg" } else { "flat" };
+        let file = scene(&format!("{name}.{ending}"));
+        for update in ["certificate", "reinspect"] {
+            let more = ["--verify", "--fps", "5", "--epsilon", "0.1", "--update", update];
+            let ran = relume(&[&["flat", text(&file)], &more[..]].concat());
+            ran.says(&["equal: links bit for bit"]);
+        }
     }
     // What is extrapolated is not a function of the instant, and that is found out.
     let gutter = scene("gutter.flat");
     relume(&["flat", text(&gutter), "--verify", "--update", "extrapolate"]).fails(1, &["differs"]);
+}
+
+#[test]
+fn the_bench_is_that_of_space() {
+    let dir = TempDir::new().unwrap();
+    let (room, numbers) = (scene("room.flat"), dir.path().join("bench.json"));
+    let bench = |more: &[&str]| {
+        let begin = ["flat", text(&room), "--bench", "--frames", "0-8", "--json", text(&numbers)];
+        relume(&[&begin, more].concat())
+    };
+    bench(&["--every", "2"]).says(&[
+        "room: oracle form-factor=0.05,0.02, update certificate, ",
+        "\nroom           8  ",
+        "\nfrom scratch  4 frames built both ways",
+        " of links with a moved end",
+        " bytes a pair (",
+    ]);
+    let value = json(&numbers);
+    assert_eq!(value["schema"], "relume-bench/1");
+    let frame = &value["frames"][0];
+    assert_eq!(frame["report"]["hash"], frame["from_scratch"]["report"]["hash"]);
+    assert!(frame["from_scratch"]["report"]["dynamic_links"].as_u64() > Some(0));
+    assert!(value["memory_each"]["pair_bytes"].as_f64().unwrap() > 0.0);
+    bench(&["--compare"]).says(&["room: oracle form-factor=0.05,0.02, ", "\ncertificate  "]);
+    let value = json(&numbers);
+    assert_eq!(value["schema"], "relume-strategies/1");
+    for exact in 0..3 {
+        let row = &value["strategies"][exact]["means"];
+        let missed = (row["missed_states"].as_f64(), row["missed_occlusions"].as_f64());
+        assert_eq!((row["equal_frames"].as_u64(), missed), (Some(8), (Some(0.0), Some(0.0))));
+    }
+    let judged = |k: usize| value["strategies"][k]["means"]["examined"].as_f64();
+    assert!(judged(2) < judged(1));
 }
 
 #[test]
@@ -58,6 +95,26 @@ fn the_figures_kept_are_those_the_command_draws() {
             assert!(old.exists() && bytes(&new).len() > 1000, "{name}");
         }
     }
+}
+
+/// They follow every change to oracles and pictures, and hold times: only that they are drawn.
+#[test]
+fn the_figures_of_space_are_drawn() {
+    let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/figures");
+    let dir = TempDir::new().unwrap();
+    let ran = relume(&["figure", "0.5", "-o", text(dir.path())]).succeeds();
+    assert_eq!(ran.out, "figure-0.5.svg\nfigure-0.5.png\n");
+    let svg = fs::read_to_string(dir.path().join("figure-0.5.svg")).unwrap();
+    assert_eq!(
+        svg.matches("<image ").count(),
+        12,
+        "a picture for each of three sequences and four frames"
+    );
+    for name in ["figure-0.5.svg", "figure-0.5.png", "table-0.1.svg", "table-0.1.png"] {
+        assert!(kept.join(name).exists(), "draw it: relume figure {} -o docs/figures", &name[..9]);
+    }
+    let table = fs::read_to_string(kept.join("table-0.1.svg")).unwrap();
+    assert!(table.starts_with("<svg"));
 }
 
 /// Runs what the tutorial says, in the directory of the scenes, and compares what it prints.
@@ -87,11 +144,20 @@ fn messages_say_where_and_what() {
     let file = dir.path().join("wrong.flat");
     fs::write(&file, "segment floor 0 0 1 0\nsegment wall 0 1\n").unwrap();
     relume(&["flat", text(&file)]).fails(1, &["line 2", "`wall`", "x0 y0 x1 y1"]);
+    let svg = dir.path().join("wrong.SVG");
+    fs::write(&svg, "<svg>\n<path id='arc' d='M0 0A1 1 0 0 0 1 1'/></svg>").unwrap();
+    relume(&["flat", text(&svg)])
+        .fails(1, &["path `arc`, line 2", "`A`", "\n  help: make it straight"]);
     let gutter = scene("gutter.flat");
     let with = |more: &[&str]| relume(&[&["flat", text(&gutter)], more].concat());
     with(&["--epsilon", "2"]).fails(2, &["between 0 and 1"]);
-    with(&["--update", "certificate"]).fails(2, &["use reinspect"]);
+    with(&["--update", "reinspect", "--error", "0.1"])
+        .fails(2, &["goes with --update extrapolate"]);
+    with(&["--compare"]).fails(2, &["add --bench"]);
+    with(&["--bench", "--verify"]).fails(2, &["cannot be used with"]);
+    with(&["--bench", "--frames", "3"]).fails(1, &["two frames or more"]);
     with(&["--frames", "9999"]).fails(2, &["outside the animation"]);
     relume(&["flat"]).fails(2, &["<SCENE>"]);
     relume(&["flat", "figure", "0.9"]).fails(2, &["0.1", "0.4"]);
+    relume(&["figure", "0.4"]).fails(2, &["0.5", "table-0.1"]);
 }

@@ -6,11 +6,11 @@ use relume::pair::EventKind;
 use relume_picture::drawing::{Colour, Drawing, Pen};
 
 /// Geometry, letters.
-pub(super) const BLACK: Colour = [30, 30, 30];
+pub(crate) const BLACK: Colour = [30, 30, 30];
 /// Links.
-pub(super) const PINK: Colour = [226, 60, 142];
+pub(crate) const PINK: Colour = [226, 60, 142];
 /// What is hidden.
-pub(super) const GREY: Colour = [170, 170, 178];
+pub(crate) const GREY: Colour = [170, 170, 178];
 /// Elements.
 pub(super) const BLUE: Colour = [38, 92, 160];
 
@@ -147,7 +147,7 @@ impl Sheet {
 }
 
 /// Drawings side by side and one below the other, row by row, `columns` in a row.
-pub(super) fn table(drawings: &[Drawing], columns: usize) -> Drawing {
+pub(crate) fn table(drawings: &[Drawing], columns: usize) -> Drawing {
     let most = |of: &dyn Fn(&Drawing) -> u32| drawings.iter().map(of).max().unwrap_or(0);
     let (width, height) = (most(&|d| d.width), most(&|d| d.height));
     let rows = drawings.len().div_ceil(columns) as u32;

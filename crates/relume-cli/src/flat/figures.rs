@@ -11,6 +11,7 @@ use relume_picture::export::write_atomically;
 
 use crate::args::FlatFigure;
 use crate::failure::Failure;
+use crate::paper::save;
 
 use super::draw::{BLACK, BLUE, GREY, PINK, Sheet, colour_of, extent, table};
 
@@ -28,7 +29,7 @@ pub(super) fn draw(figure: FlatFigure, dir: &Path) -> Result<Vec<String>, Failur
         FlatFigure::Occlusion => screen(),
         FlatFigure::Demotion => approach(),
         FlatFigure::Gutter => {
-            let mut names = save(&gutter(), "figure-0.4", dir)?;
+            let mut names = save(&gutter(), "figure-0.4", 2, dir)?;
             names.extend(gutter_in_motion(dir)?);
             return Ok(names);
         }
@@ -41,16 +42,7 @@ pub(super) fn draw(figure: FlatFigure, dir: &Path) -> Result<Vec<String>, Failur
         FlatFigure::Gutter => "figure-0.4",
         FlatFigure::Convergence => "convergence",
     };
-    save(&drawing, name, dir)
-}
-
-fn save(drawing: &Drawing, name: &str, dir: &Path) -> Result<Vec<String>, Failure> {
-    let names = [format!("{name}.svg"), format!("{name}.png")];
-    let svg = dir.join(&names[0]);
-    write_atomically(&svg, drawing.to_svg().as_bytes())
-        .map_err(|error| Failure::write(&svg, &error))?;
-    drawing.to_image(2).write_png(dir.join(&names[1])).map_err(Failure::new)?;
-    Ok(names.to_vec())
+    save(&drawing, name, 2, dir)
 }
 
 /// A scene that ships with the command.
@@ -184,7 +176,7 @@ fn gutter() -> Drawing {
 
 /// Figure 0.4 in motion, there and back: what happens to a link flashes in the colour of its kind.
 fn gutter_in_motion(dir: &Path) -> Result<Vec<String>, Failure> {
-    const FRAMES: u32 = 48;
+    const FRAMES: u32 = 40;
     let scene = scene(GUTTER);
     let mut session = session(&scene, GUTTER_EPSILON, 0.06);
     let at = |frame: u32| 10.0 * f64::from(frame) / f64::from(FRAMES);
@@ -213,7 +205,7 @@ fn gutter_in_motion(dir: &Path) -> Result<Vec<String>, Failure> {
         pictures.push(whole.to_image(1));
     }
     let name = "figure-0.4-in-motion.png";
-    let bytes = animation(&pictures, 120).map_err(Failure::new)?;
+    let bytes = animation(&pictures, 140).map_err(Failure::new)?;
     let path = dir.join(name);
     write_atomically(&path, &bytes).map_err(|error| Failure::write(&path, &error))?;
     Ok(vec![name.into()])

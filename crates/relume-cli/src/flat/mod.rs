@@ -1,6 +1,6 @@
 //! `relume flat`: scenes in the plane, and the paper's figures of it.
 
-mod draw;
+pub(crate) mod draw;
 mod figures;
 
 use std::fmt::Write;
@@ -8,18 +8,22 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use relume::flat::{FlatOptions, FlatScene, FlatSession, parse};
+use relume::flat::{FlatOptions, FlatScene, FlatSession, SvgError, parse, parse_svg};
 use relume::session::FrameReport;
 use relume_picture::drawing::Pen;
 use relume_picture::export::write_atomically;
 use serde::Serialize;
 
-use crate::args::{FlatArgs, FlatCommand, FlatPrint, UpdateChoice, UpdateFlag};
+use crate::args::{FlatArgs, FlatCommand, FlatPrint, UpdateChoice};
+use crate::bench;
 use crate::events::EventTable;
 use crate::failure::Failure;
 use crate::frames::{resolve, time_of};
 use crate::interrupt;
-use crate::output::{self, counted};
+use crate::output;
+use crate::paper::make;
+use crate::sequence::Sequence;
+use crate::verify;
 
 /// Name of the report's format.
 const SCHEMA: &str = "relume-flat/1";
@@ -56,29 +60,41 @@ pub(crate) fn flat(args: &FlatArgs) -> Result<(), Failure> {
         Failure::usage("which scene?").help("name a file: relume flat scene.flat")
     })?;
     let text = fs::read_to_string(path).map_err(|error| Failure::read(path, &error))?;
-    let scene = parse(&text).map_err(|error| {
-        Failure::new(format_args!("{}: {error}", path.display()))
-            .help("`relume help flat` shows what a scene looks like")
-    })?;
+    let scene = match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("svg")) {
+        true => parse_svg(&text).map_err(|SvgError { element, what, remedy }| {
+            Failure::new(format_args!("{}: {element}: {what}", path.display())).help(remedy)
+        })?,
+        false => parse(&text).map_err(|error| {
+            Failure::new(format_args!("{}: {error}", path.display()))
+                .help("`relume help flat` shows what a scene looks like")
+        })?,
+    };
     let frames = resolve(args.frames.as_ref(), scene.duration_s(), args.fps)
         .map_err(|error| Failure::usage(error).help("choose other --frames"))?;
-    let run = Run { scene: Arc::new(scene), args, frames };
-    if args.verify { run.verify() } else { run.solve(path) }
-}
-
-fn make(dir: &Path) -> Result<(), Failure> {
-    fs::create_dir_all(dir).map_err(|error| Failure::write(dir, &error))
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let run = Run { scene: Arc::new(scene), name, args, frames };
+    let measure = &args.measure;
+    if args.bench {
+        return bench::measure(&bench::Plan::new(measure, args.update, false), &run, None);
+    }
+    if measure.compare || measure.json.is_some() || measure.every != 1 {
+        return Err(Failure::usage("--compare, --json and --every go with --bench")
+            .help("add --bench, or leave them out"));
+    }
+    if args.verify { verify::frames(&run, args.update, false) } else { run.solve(path) }
 }
 
 struct Run<'a> {
     scene: Arc<FlatScene>,
+    /// Of the file, without its ending.
+    name: String,
     args: &'a FlatArgs,
     frames: Vec<u32>,
 }
 
 impl Run<'_> {
-    fn options(&self, update: UpdateFlag) -> Result<FlatOptions, Failure> {
-        let update = UpdateChoice::of(update).update().expect("no error is stated");
+    fn options(&self, update: UpdateChoice) -> Result<FlatOptions, Failure> {
+        let update = update.asked_for()?;
         Ok(FlatOptions {
             epsilon: self.args.epsilon,
             min_length_m: self.args.min_length,
@@ -89,16 +105,9 @@ impl Run<'_> {
         })
     }
 
-    fn session(&self, update: UpdateFlag) -> Result<FlatSession, Failure> {
-        FlatSession::new(self.scene.clone(), self.options(update)?).map_err(Failure::usage)
-    }
-
-    fn time_of(&self, frame: u32) -> f64 {
-        time_of(frame, self.args.fps)
-    }
-
     fn solve(&self, path: &Path) -> Result<(), Failure> {
-        let mut session = self.session(self.args.update)?;
+        let options = self.options(self.args.update)?;
+        let mut session = FlatSession::new(self.scene.clone(), options).map_err(Failure::usage)?;
         let times = self.frames.iter().map(|&frame| self.time_of(frame));
         let part = draw::extent(&self.scene, times);
         if let Some(dir) = &self.args.output {
@@ -126,7 +135,7 @@ impl Run<'_> {
                 min_length_m: self.args.min_length,
                 constant: self.args.constant,
                 residual: FlatOptions::default().residual,
-                update: UpdateChoice::of(self.args.update).name(),
+                update: self.args.update.name(),
                 fps: self.args.fps,
             },
             frames: &reports,
@@ -146,33 +155,38 @@ impl Run<'_> {
             (Some(FlatPrint::Events), _) => output::print(events.text()),
         }
     }
+}
 
-    /// Frame by frame against a cold build.
-    fn verify(&self) -> Result<(), Failure> {
-        let mut warm = self.session(self.args.update)?;
-        let mut cold = self.session(UpdateFlag::Scratch)?;
-        for &frame in &self.frames {
-            let time_s = self.time_of(frame);
-            let (one, two) = (warm.step(frame, time_s), cold.step(frame, time_s));
-            let of = |r: &FrameReport| (r.hash.clone(), r.links, r.elements);
-            if of(&one) != of(&two) {
-                return Err(Failure::new(format_args!(
-                    "frame {frame} differs: {} links and {} elements, {} and {} from scratch",
-                    one.links, one.elements, two.links, two.elements
-                )));
-            }
-            let gap = warm.radiosity_gap(&cold);
-            if gap.largest > gap.allowed {
-                return Err(Failure::new(format_args!(
-                    "frame {frame}: a radiosity differs by {:.1e} W/m2, {:.1e} are allowed",
-                    gap.largest, gap.allowed
-                )));
-            }
-        }
-        let frames = counted(self.frames.len(), "frame");
-        output::print(&format!(
-            "{frames} equal: links bit for bit, radiosities within their bound\n"
-        ))
+impl Sequence for Run<'_> {
+    type Session = FlatSession;
+
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn frames(&self) -> &[u32] {
+        &self.frames
+    }
+
+    fn time_of(&self, frame: u32) -> f64 {
+        time_of(frame, self.args.fps)
+    }
+
+    fn tolerance(&self) -> Option<f64> {
+        None
+    }
+
+    fn oracle(&self) -> String {
+        format!("form-factor={},{}", self.args.epsilon, self.args.min_length)
+    }
+
+    fn threads(&self) -> usize {
+        rayon::current_num_threads()
+    }
+
+    fn begin(&self, update: UpdateChoice) -> Result<FlatSession, Failure> {
+        let options = FlatOptions { balance: false, ..self.options(update)? };
+        FlatSession::new(self.scene.clone(), options).map_err(Failure::usage)
     }
 }
 
@@ -183,16 +197,17 @@ fn write(path: &Path, text: &str) -> Result<(), Failure> {
 /// A line for each frame.
 fn lines(reports: &[FrameReport]) -> String {
     let mut out = String::from(
-        "frame  links  elements  examined  extrapolated  demoted  promoted  occluded  hash\n",
+        "frame  links  elements  judged  followed  extrapolated  demoted  promoted  occluded  hash\n",
     );
     for r in reports {
         let _ = writeln!(
             out,
-            "{:>5}  {:>5}  {:>8}  {:>8}  {:>12}  {:>7}  {:>8}  {:>8}  {}",
+            "{:>5}  {:>5}  {:>8}  {:>6}  {:>8}  {:>12}  {:>7}  {:>8}  {:>8}  {}",
             r.frame,
             r.links,
             r.elements,
             r.examined,
+            r.followed,
             r.extrapolated,
             r.demoted,
             r.promoted,

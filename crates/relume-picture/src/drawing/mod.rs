@@ -1,9 +1,15 @@
-//! Line drawings: strokes, discs and lettering, as SVG and as pixels, and pixels in motion as APNG.
+//! Line drawings: strokes, discs, lettering and pictures among them, as SVG and as pixels, and pixels in motion as APNG.
 //!
 //! Must not know what a drawing shows. Both forms come from the same list of shapes, lettering included,
 //! which is drawn in strokes: no fonts are needed and both look alike.
 
+use std::sync::Arc;
+
+use crate::picture::Image;
+
+mod base64;
 mod letters;
+mod palette;
 mod pixels;
 mod svg;
 
@@ -13,12 +19,14 @@ pub use pixels::animation;
 pub type Colour = [u8; 3];
 
 /// One shape; lengths in pixels, y down.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Shape {
     /// A stroke with round ends.
     Stroke { from: [f64; 2], to: [f64; 2], width: f64, colour: Colour, opacity: f64 },
     /// A filled disc.
     Disc { centre: [f64; 2], radius: f64, colour: Colour },
+    /// A picture, its upper left corner at a whole pixel.
+    Picture { at: [u32; 2], image: Arc<Image> },
 }
 
 /// A drawing on white: shapes, later ones over earlier ones.
@@ -80,6 +88,11 @@ impl Drawing {
         self.shapes.push(Shape::Disc { centre, radius, colour });
     }
 
+    /// A picture, pixel by pixel, its upper left corner at a point.
+    pub fn picture(&mut self, at: [u32; 2], image: Image) {
+        self.shapes.push(Shape::Picture { at, image: Arc::new(image) });
+    }
+
     /// Lettering in capitals, `height` pixels tall, from the left end of its base line. What has no
     /// letter is left blank.
     pub fn letters(&mut self, at: [f64; 2], height: f64, text: &str, colour: Colour) {
@@ -102,12 +115,16 @@ impl Drawing {
     /// Another drawing on top, moved by an offset.
     pub fn add(&mut self, other: &Drawing, by: [f64; 2]) {
         let moved = |p: [f64; 2]| [p[0] + by[0], p[1] + by[1]];
-        self.shapes.extend(other.shapes.iter().map(|shape| match *shape {
+        self.shapes.extend(other.shapes.iter().map(|shape| match shape.clone() {
             Shape::Stroke { from, to, width, colour, opacity } => {
                 Shape::Stroke { from: moved(from), to: moved(to), width, colour, opacity }
             }
             Shape::Disc { centre, radius, colour } => {
                 Shape::Disc { centre: moved(centre), radius, colour }
+            }
+            Shape::Picture { at, image } => {
+                let at = moved(at.map(f64::from)).map(|x| x.round() as u32);
+                Shape::Picture { at, image }
             }
         }));
     }

@@ -2,6 +2,7 @@
 
 use crate::picture::Image;
 
+use super::palette::Palette;
 use super::{Colour, Drawing, Shape};
 
 impl Drawing {
@@ -16,7 +17,8 @@ impl Drawing {
         let s = f64::from(scale);
         let at = |p: [f64; 2]| [p[0] * s, p[1] * s];
         for shape in &self.shapes {
-            match *shape {
+            match shape.clone() {
+                Shape::Picture { at, image } => canvas.picture(at, &image, scale),
                 Shape::Stroke { from, to, width, colour, opacity } => {
                     canvas.stroke(at(from), at(to), 0.5 * width * s, (colour, opacity));
                 }
@@ -37,6 +39,19 @@ struct Canvas {
 }
 
 impl Canvas {
+    /// Each pixel of a picture as a square.
+    fn picture(&mut self, at: [u32; 2], image: &Image, scale: u32) {
+        for y in 0..image.height * scale {
+            for x in 0..image.width * scale {
+                let (column, row) = ((at[0] * scale + x) as usize, (at[1] * scale + y) as usize);
+                if column < self.width && row < self.height {
+                    let pixel = image.pixel(x / scale, y / scale);
+                    self.pixels[row * self.width + column] = pixel.map(f32::from);
+                }
+            }
+        }
+    }
+
     /// Covers what is within `half` pixels of a line; the edge is softened over one pixel.
     fn stroke(&mut self, from: [f64; 2], to: [f64; 2], half: f64, (colour, ink): (Colour, f64)) {
         let reach = half + 1.0;
@@ -72,23 +87,40 @@ impl Canvas {
 }
 
 /// Pictures of one size in turn, without end, as an animated PNG (what does not know of animation shows
-/// the first).
+/// the first), in at most 255 colours. Only pixels that change are stored.
 ///
 /// # Errors
 /// What the encoder says; none for pictures of one size.
 pub fn animation(pictures: &[Image], milliseconds: u16) -> Result<Vec<u8>, String> {
     let text = |error: png::EncodingError| error.to_string();
     let first = pictures.first().ok_or("no pictures")?;
+    let palette = Palette::of(pictures);
+    let mut opaque = vec![255; usize::from(palette.len())];
+    // The last number is of no colour.
+    opaque.push(0);
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, first.width, first.height);
-    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_color(png::ColorType::Indexed);
     encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_palette([palette.bytes(), vec![0; 3]].concat());
+    encoder.set_trns(opaque);
     encoder.set_compression(png::Compression::High);
+    encoder.set_filter(png::Filter::NoFilter);
     encoder.set_animated(pictures.len() as u32, 0).map_err(text)?;
     encoder.set_frame_delay(milliseconds, 1000).map_err(text)?;
+    encoder.set_blend_op(png::BlendOp::Over).map_err(text)?;
+    encoder.set_dispose_op(png::DisposeOp::None).map_err(text)?;
     let mut writer = encoder.write_header().map_err(text)?;
+    let mut shown: Vec<u8> = Vec::new();
     for picture in pictures {
-        writer.write_image_data(picture.pixels.as_flattened()).map_err(text)?;
+        let numbers: Vec<u8> = picture.pixels.iter().map(|&pixel| palette.number(pixel)).collect();
+        let changed = |(k, &number): (usize, &u8)| match shown.get(k) == Some(&number) {
+            true => palette.len(),
+            false => number,
+        };
+        let data: Vec<u8> = numbers.iter().enumerate().map(changed).collect();
+        writer.write_image_data(&data).map_err(text)?;
+        shown = numbers;
     }
     writer.finish().map_err(text)?;
     Ok(bytes)
@@ -114,6 +146,24 @@ mod tests {
         assert_eq!(image.pixel(4, 7), [255, 255, 255]);
         assert_eq!(image.pixel(10, 5), [255, 0, 0]);
         assert_eq!(sample().to_image(2).width, 40);
+    }
+
+    #[test]
+    fn pictures_are_where_they_are_put() {
+        let mut drawing = Drawing::new(8, 6);
+        let pixels = vec![[1, 2, 3], [4, 5, 6]];
+        drawing.picture([3, 2], Image { width: 2, height: 1, pixels });
+        let mut whole = Drawing::new(20, 10);
+        whole.add(&drawing, [10.0, 4.0]);
+        let image = whole.to_image(2);
+        for (x, y, colour) in [(26, 12, [1, 2, 3]), (27, 13, [1, 2, 3]), (28, 12, [4, 5, 6])] {
+            assert_eq!(image.pixel(x, y), colour);
+        }
+        assert_eq!(image.pixel(25, 12), [255; 3]);
+        let svg = whole.to_svg();
+        let begin =
+            "<image x=\"13\" y=\"6\" width=\"2\" height=\"1\" href=\"data:image/png;base64,iVBOR";
+        assert!(svg.contains(begin), "{svg}");
     }
 
     #[test]

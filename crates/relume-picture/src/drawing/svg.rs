@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Colour, Drawing, Shape};
+use super::{Colour, Drawing, Shape, base64};
 
 impl Drawing {
     /// The text of an SVG file.
@@ -16,7 +16,19 @@ impl Drawing {
         );
         let mut pen = None;
         for shape in shapes {
-            match *shape {
+            match shape.clone() {
+                Shape::Picture { at: [x, y], image } => {
+                    close(&mut out, &mut pen);
+                    let (w, h) = (image.width, image.height);
+                    let _ = write!(
+                        out,
+                        "<image x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" \
+                         href=\"data:image/png;base64,"
+                    );
+                    // A picture that cannot be encoded has no pixels.
+                    base64::push(&image.to_png().unwrap_or_default(), &mut out);
+                    out.push_str("\"/>\n");
+                }
                 Shape::Stroke { from, to, width, colour, opacity } => {
                     let style = (width, colour, opacity);
                     if pen != Some(style) {

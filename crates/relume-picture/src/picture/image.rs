@@ -62,7 +62,7 @@ impl Image {
     }
 
     /// The bytes of the PNG file.
-    fn to_png(&self) -> Result<Vec<u8>, String> {
+    pub(crate) fn to_png(&self) -> Result<Vec<u8>, String> {
         let text = |error: png::EncodingError| error.to_string();
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);

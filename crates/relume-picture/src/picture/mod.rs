@@ -10,6 +10,7 @@
 //! | `camera` | where the picture is taken from: [`Viewpoint`], [`View`] |
 //! | `auto_view` | a sensible [`View`] for a scene without a camera |
 //! | `project` | world to pixels, near clipping, and pixels back to a patch's plane |
+//! | `outline` | edges of polygons, for line drawings: [`Outlines`] |
 //! | `gouraud` | sample points of a patch, triangulated in the patch's own frame |
 //! | `assemble` | a snapshot as an ordered list of things to draw |
 //! | `raster` | which thing each sample of each pixel sees |
@@ -23,6 +24,7 @@ mod camera;
 mod exposure;
 mod gouraud;
 mod image;
+mod outline;
 mod project;
 mod raster;
 mod render;
@@ -31,5 +33,6 @@ mod tone;
 pub use camera::{View, ViewError, Viewpoint};
 pub use exposure::Exposure;
 pub use image::{Image, WriteError};
+pub use outline::Outlines;
 pub use render::{Settings, Shading, render};
 pub use tone::Tone;

@@ -7,6 +7,43 @@ use crate::scene::{BodyId, Drift, Scene};
 /// Ticks ahead that are looked at.
 const AHEAD: [Tick; 7] = [1, 2, 4, 8, 16, 32, 64];
 
+/// What is known beforehand of the motion of a scene, in space or in the plane (that of z = 0).
+pub trait KnownMotion {
+    /// Bodies are numbered below this.
+    fn body_count(&self) -> usize;
+    /// Whether a body is animated at all.
+    fn moves(&self, body: BodyId) -> bool;
+    /// Where the points of a body can get between two times, the earlier one first.
+    fn drift(&self, body: BodyId, span_s: [f64; 2]) -> Drift;
+    /// The same of each punctual light.
+    fn light_drifts(&self, span_s: [f64; 2]) -> Vec<Drift>;
+    /// The first time after `time_s` at which a body or a light appears or vanishes; infinite if none
+    /// does any more.
+    fn next_presence_change_s(&self, time_s: f64) -> f64;
+}
+
+impl KnownMotion for Scene {
+    fn body_count(&self) -> usize {
+        self.bodies.len()
+    }
+
+    fn moves(&self, body: BodyId) -> bool {
+        Scene::moves(self, body)
+    }
+
+    fn drift(&self, body: BodyId, span_s: [f64; 2]) -> Drift {
+        Scene::drift(self, body, span_s)
+    }
+
+    fn light_drifts(&self, span_s: [f64; 2]) -> Vec<Drift> {
+        self.lights.iter().map(|l| self.motion.drift(l.node, 0.0, span_s)).collect()
+    }
+
+    fn next_presence_change_s(&self, time_s: f64) -> f64 {
+        Scene::next_presence_change_s(self, time_s)
+    }
+}
+
 /// How far the bodies of a scene can get until some coming ticks, the *horizons*, counted from the
 /// nearest. No body and no light appears or vanishes before any of them.
 #[derive(Clone, Debug, Default)]
@@ -27,13 +64,13 @@ struct Horizon {
 }
 
 impl Foresight {
-    /// What the animation of `scene` holds from `time_s` on, the present of `ticks`. Cost:
+    /// What the motion of `scene` holds from `time_s` on, the present of `ticks`. Cost:
     /// proportional to the bodies and their keys within the horizons.
-    pub fn new(scene: &Scene, ticks: &Ticks, time_s: f64) -> Foresight {
-        let all = (0..scene.bodies.len() as u32).map(BodyId);
+    pub fn new(scene: &impl KnownMotion, ticks: &Ticks, time_s: f64) -> Foresight {
+        let all = (0..scene.body_count() as u32).map(BodyId);
         let bodies: Vec<BodyId> = all.clone().filter(|&b| scene.moves(b)).collect();
         let mut out = Foresight { now: ticks.now(), bodies, ..Foresight::default() };
-        out.rows = vec![None; scene.bodies.len()];
+        out.rows = vec![None; scene.body_count()];
         for (row, body) in out.bodies.iter().enumerate() {
             out.rows[body.0 as usize] = Some(row as u32);
         }
@@ -45,8 +82,7 @@ impl Foresight {
                 break;
             }
             let drifts: Vec<Drift> = out.bodies.iter().map(|&b| scene.drift(b, span)).collect();
-            let light = |l: &crate::scene::Light| scene.motion.drift(l.node, 0.0, span);
-            let lights = scene.lights.iter().map(light).collect();
+            let lights = scene.light_drifts(span);
             let widest = drifts.iter().fold(Drift::Rests.reach(), |b, d| b.union(d.reach()));
             out.horizons.push(Horizon { until, drifts, lights, widest });
         }

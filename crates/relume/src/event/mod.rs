@@ -7,6 +7,6 @@ mod foresight;
 mod history;
 mod ticks;
 
-pub use foresight::Foresight;
+pub use foresight::{Foresight, KnownMotion};
 pub use history::{History, Lookahead, Sample};
 pub use ticks::{Tick, Ticks};

@@ -117,6 +117,14 @@ impl FlatForest {
         self.nodes.is_empty()
     }
 
+    /// Bytes held, what all forests of a scene share included.
+    pub fn memory_bytes(&self) -> u64 {
+        let lists = self.vacant.capacity() + self.loose.capacity() + self.changed.capacity();
+        let facet = size_of::<(WallIndex, bool, Segment)>() + size_of::<ElementId>();
+        let fixed = self.fixed.facets.len() * facet;
+        (self.nodes.capacity() * size_of::<Node>() + lists * size_of::<u32>() + fixed) as u64
+    }
+
     /// Elements alive, at all levels.
     pub fn element_count(&self) -> u64 {
         self.elements

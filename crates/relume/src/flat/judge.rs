@@ -5,14 +5,16 @@ use std::ops::Range;
 use glam::DVec2;
 
 use crate::element::{ElementId, ElementKey};
-use crate::event::{Lookahead, Tick};
+use crate::event::{Foresight, Lookahead, Tick};
+use crate::geometry::Aabb;
 use crate::pair::{
-    Carried, CullReason, Finding, Gradients, Hierarchy, Judge, Judgement, Margin, Side, Stale,
-    Verdict,
+    Carried, CullReason, Finding, Gradients, Hierarchy, Judge, Judgement, Margin, Outlook, Side,
+    Stale, Verdict,
 };
 
+use super::certificate::FlatOutlook;
 use super::forest::{FlatForest, FlatKind};
-use super::plane::{Bounds, PlanePose, Segment};
+use super::plane::{PlanePose, Segment};
 use super::scene::{BodyIndex, FlatScene};
 use super::strings::Shaft;
 
@@ -25,7 +27,7 @@ pub struct PlaneView {
     /// The body of each wall.
     bodies: Vec<BodyIndex>,
     /// Of each body.
-    bounds: Vec<Bounds>,
+    bounds: Vec<Aabb>,
 }
 
 impl PlaneView {
@@ -35,7 +37,8 @@ impl PlaneView {
         let walls: Vec<Segment> =
             scene.walls().iter().map(|w| poses[w.body.0 as usize].segment(&w.local)).collect();
         let of_body = |b: &super::scene::Body| {
-            Bounds::of(&walls[b.walls.start as usize..b.walls.end as usize])
+            let of = &walls[b.walls.start as usize..b.walls.end as usize];
+            of.iter().fold(Aabb::EMPTY, |all, wall| all.union(wall.bounds()))
         };
         let bounds = scene.bodies().iter().map(of_body).collect();
         PlaneView { bounds, bodies: scene.walls().iter().map(|w| w.body).collect(), poses, walls }
@@ -49,6 +52,11 @@ impl PlaneView {
     /// The walls in the world.
     pub fn walls(&self) -> &[Segment] {
         &self.walls
+    }
+
+    /// The box around a body, in the plane z = 0; empty if it has no walls.
+    pub(super) fn bounds(&self, body: BodyIndex) -> &Aabb {
+        &self.bounds[body.0 as usize]
     }
 
     /// Where an element is in the world.
@@ -82,6 +90,8 @@ pub(super) struct FlatPlaced<'a> {
     pub(super) min_length_m: f64,
     /// Links carry no gradients.
     pub(super) constant: bool,
+    /// What the known motion allows next; `None` where certificates are not asked for.
+    pub(super) ahead: Option<&'a Foresight>,
     pub(super) lookahead: Option<Lookahead>,
 }
 
@@ -153,17 +163,20 @@ impl Judge for FlatPlaced<'_> {
         Some(margin)
     }
 
-    fn stale(&self, a: ElementId, b: ElementId, _certified: bool) -> Stale {
+    fn stale(&self, a: ElementId, b: ElementId, certified: bool) -> Stale {
         let Some(before) = self.before else { return Stale::Moved };
         let (body_a, body_b) = (self.forest.body(a), self.forest.body(b));
         let (Some(body_a), Some(body_b)) = (body_a, body_b) else { return Stale::Below };
         let apart = body_a != body_b && (self.moved(body_a) || self.moved(body_b));
         if !self.are_elements(a, b) {
-            let near = apart || self.are_neared((body_a, body_b), before);
+            let near = apart || (!certified && self.are_neared((body_a, body_b), before));
             return if near { Stale::Below } else { Stale::Nothing };
         }
-        if apart {
-            return Stale::Moved;
+        match (apart, certified) {
+            (true, true) => return Stale::Followed,
+            (true, false) => return Stale::Moved,
+            (false, true) => return Stale::Nothing,
+            (false, false) => {}
         }
         let ends = self.ends(a, b);
         let entered = Shaft::new(&ends.a, &ends.b)
@@ -193,16 +206,30 @@ impl Judge for FlatPlaced<'_> {
         false
     }
 
-    fn certified(&self, _: Tick) -> bool {
-        false
+    fn certified(&self, due: Tick) -> bool {
+        self.ahead.is_some_and(|ahead| ahead.holds(due))
     }
 
     fn lookahead(&self) -> Option<&Lookahead> {
         self.lookahead.as_ref()
     }
 
-    fn foresee(&self, _: ElementId, _: ElementId, _: Finding) -> Tick {
-        0
+    fn may_be_clear(&self, a: ElementId, b: ElementId, narrowed: &[u32]) -> bool {
+        if !self.are_elements(a, b) {
+            return narrowed.is_empty();
+        }
+        // Walls that touch a shaft are possible occluders of pairs below, but do not stand in it.
+        let ends = self.ends(a, b);
+        let enters =
+            |shaft: &Shaft, &wall: &u32| shaft.is_entered_by(&self.wall(self.now, &ends, wall));
+        Shaft::new(&ends.a, &ends.b)
+            .is_some_and(|shaft| !narrowed.iter().any(|wall| enters(&shaft, wall)))
+    }
+
+    fn foresee(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick {
+        let Some(ahead) = self.ahead else { return 0 };
+        let (scene, forest, now) = (self.scene, &*self.forest, self.now);
+        FlatOutlook { scene, forest, now, ahead }.until(a, b, finding)
     }
 
     fn holds(&self, _: ElementId, _: ElementId) -> bool {
@@ -342,10 +369,9 @@ impl FlatPlaced<'_> {
         let mut movers =
             bodies.map(BodyIndex).filter(|&body| if rides { body != a } else { self.moved(body) });
         movers.any(|mover| {
-            [before, self.now].iter().any(|at| {
-                let of = |body: BodyIndex| &at.bounds[body.0 as usize];
-                of(a).union(of(b)).meets(of(mover))
-            })
+            [before, self.now]
+                .iter()
+                .any(|at| at.bounds(a).union(*at.bounds(b)).distance(at.bounds(mover)) == 0.0)
         })
     }
 

@@ -9,18 +9,22 @@
 //! All quantities are per metre of the direction that was integrated out: an "area" is a length, m2 for
 //! each metre of depth.
 
+mod certificate;
+mod drift;
 mod forest;
 mod judge;
 mod plane;
 mod scene;
 mod session;
 mod strings;
+mod svg;
 mod text;
 
 pub use forest::FlatForest;
 pub use judge::PlaneView;
 pub use plane::{PlanePose, Segment};
 pub use scene::{Body, BodyIndex, FlatScene, Key, Material, Motion, SceneError, Wall, WallIndex};
-pub use session::{FlatElement, FlatLink, FlatOptions, FlatSession, OptionError, RadiosityGap};
+pub use session::{FlatElement, FlatLink, FlatOptions, FlatSession, OptionError};
 pub use strings::{Shaft, exchange, visible_exchange};
+pub use svg::{SvgError, parse_svg};
 pub use text::{TextError, parse};

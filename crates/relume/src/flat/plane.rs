@@ -1,6 +1,8 @@
 //! Points, directed segments and rigid motion of the plane: pure functions.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
+
+use crate::geometry::Aabb;
 
 /// A directed segment, metres; its front is on its left, seen from start to end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,7 +14,7 @@ pub struct Segment {
 }
 
 /// Share of the coordinates' size that counts as rounding.
-const ROUNDING: f64 = 1e-12;
+pub(super) const ROUNDING: f64 = 1e-12;
 
 impl Segment {
     /// From two points.
@@ -82,10 +84,20 @@ impl Segment {
         }
     }
 
+    /// The box around it.
+    pub(super) fn bounds(&self) -> Aabb {
+        Aabb::of([in_space(self.start), in_space(self.end)])
+    }
+
     /// Largest coordinate, m: what rounding is relative to.
     pub fn size(&self) -> f64 {
         self.start.abs().max(self.end.abs()).max_element()
     }
+}
+
+/// The plane in space: that of z = 0.
+pub(super) fn in_space(v: DVec2) -> DVec3 {
+    v.extend(0.0)
 }
 
 /// What counts as rounding between two segments, m.
@@ -132,36 +144,6 @@ impl PlanePose {
     /// Body coordinates of a segment of the world.
     pub fn segment_back(&self, world: &Segment) -> Segment {
         Segment { start: self.back(world.start), end: self.back(world.end) }
-    }
-}
-
-/// A box along the axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bounds {
-    lo: DVec2,
-    hi: DVec2,
-}
-
-impl Bounds {
-    /// Of some segments; of none, a box that nothing meets.
-    pub(super) fn of<'a>(segments: impl IntoIterator<Item = &'a Segment>) -> Bounds {
-        let mut out =
-            Bounds { lo: DVec2::splat(f64::INFINITY), hi: DVec2::splat(f64::NEG_INFINITY) };
-        for s in segments {
-            out.lo = out.lo.min(s.start).min(s.end);
-            out.hi = out.hi.max(s.start).max(s.end);
-        }
-        out
-    }
-
-    /// The box around two.
-    pub(super) fn union(&self, other: &Bounds) -> Bounds {
-        Bounds { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
-    }
-
-    /// Whether two boxes have a point in common.
-    pub(super) fn meets(&self, other: &Bounds) -> bool {
-        self.lo.cmple(other.hi).all() && other.lo.cmple(self.hi).all()
     }
 }
 

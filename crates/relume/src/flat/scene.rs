@@ -80,18 +80,22 @@ impl Motion {
 
     /// Where the body is: a pure function of time.
     pub fn pose(&self, time_s: f64) -> PlanePose {
+        self.at(time_s).map_or(PlanePose::IDENTITY, |key| PlanePose::new(key.angle, key.place))
+    }
+
+    /// The key that the body is at; `None` where there are none.
+    pub(super) fn at(&self, time_s: f64) -> Option<Key> {
         let after = self.keys.partition_point(|key| key.time_s <= time_s);
-        let key = match (after.checked_sub(1).map(|k| self.keys[k]), self.keys.get(after)) {
-            (None, None) => return PlanePose::IDENTITY,
-            (Some(only), None) => only,
-            (None, Some(&first)) => first,
+        match (after.checked_sub(1).map(|k| self.keys[k]), self.keys.get(after)) {
+            (None, None) => None,
+            (Some(only), None) => Some(only),
+            (None, Some(&first)) => Some(first),
             (Some(one), Some(two)) => {
                 let share = (time_s - one.time_s) / (two.time_s - one.time_s);
                 let place = one.place + (two.place - one.place) * share;
-                Key { time_s, place, angle: one.angle + (two.angle - one.angle) * share }
+                Some(Key { time_s, place, angle: one.angle + (two.angle - one.angle) * share })
             }
-        };
-        PlanePose::new(key.angle, key.place)
+        }
     }
 }
 

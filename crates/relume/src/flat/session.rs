@@ -4,11 +4,11 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::element::{ElementId, ElementKey};
-use crate::event::{Lookahead, Ticks};
+use crate::event::Ticks;
 use crate::pair::{Carried, LinkEvent, PairHash, PairTree, Record, update};
 use crate::session::{
-    Clock, ElementName, Event, FrameReport, PairCounts, Receivers, Update, apply_edits, balance_of,
-    links_of, with_names,
+    Ahead, Clock, ElementName, Event, FrameReport, Memory, PairCounts, Receivers, Solution, Update,
+    apply_edits, balance_of, links_of, with_names,
 };
 use crate::solver::{Dirty, Links, Lit, Place, Radiosity, Stop, Surfaces};
 
@@ -28,8 +28,10 @@ pub struct FlatOptions {
     pub constant: bool,
     /// Residual of the solver, relative to the mean radiosity, in (0, 1). Default 1e-5.
     pub residual: f64,
-    /// How the pair tree follows the motion. [`Update::Certificate`] is not there yet.
+    /// How the pair tree follows the motion. Default [`Update::Certificate`].
     pub update: Update,
+    /// Whether every step measures row sums and energies. Default true.
+    pub balance: bool,
     /// Whether every step keeps the events of its links, for [`FlatSession::events`].
     pub events: bool,
 }
@@ -41,7 +43,8 @@ impl Default for FlatOptions {
             min_length_m: 0.02,
             constant: false,
             residual: 1e-5,
-            update: Update::Reinspect,
+            update: Update::Certificate,
+            balance: true,
             events: false,
         }
     }
@@ -56,9 +59,6 @@ pub enum OptionError {
     /// A length that is none.
     #[error("the smallest length is {0} m: it must not be negative")]
     Length(f64),
-    /// A strategy that the plane does not have.
-    #[error("certificates are not there in the plane yet: use reinspect, which has the same links")]
-    Certificate,
     /// Extrapolation over too many frames.
     #[error("extrapolate={0}: frames ahead must be 1 to 255")]
     Frames(u32),
@@ -78,7 +78,6 @@ impl FlatOptions {
             return Err(OptionError::Length(self.min_length_m));
         }
         match self.update {
-            Update::Certificate => Err(OptionError::Certificate),
             Update::Extrapolate { frames, .. } if !(1..=255).contains(&frames) => {
                 Err(OptionError::Frames(frames))
             }
@@ -116,21 +115,14 @@ pub struct FlatElement {
     pub radiosity: [f32; 3],
 }
 
-/// By how much the radiosities of two solutions differ.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RadiosityGap {
-    /// Largest difference of a leaf's radiosity, W/m2.
-    pub largest: f64,
-    /// What the residuals of both allow, W/m2.
-    pub allowed: f64,
-}
-
 /// One scene in the plane being solved, frame by frame.
 pub struct FlatSession {
     scene: Arc<FlatScene>,
     options: FlatOptions,
     seed: FlatForest,
     solved: Option<Solved>,
+    /// Time that dynamic links of a cold build are counted from.
+    came_from: Option<f64>,
 }
 
 struct Solved {
@@ -158,7 +150,7 @@ impl FlatSession {
         options.check()?;
         scene.check()?;
         let seed = FlatForest::new(&scene);
-        Ok(FlatSession { scene, options, seed, solved: None })
+        Ok(FlatSession { scene, options, seed, solved: None, came_from: None })
     }
 
     /// The scene being solved.
@@ -169,6 +161,7 @@ impl FlatSession {
     /// Brings the solution to `time_s`; `frame` only labels the report. Any time may follow any other:
     /// the links are those of a cold build at `time_s`, bit for bit, unless they are extrapolated.
     pub fn step(&mut self, frame: u32, time_s: f64) -> FrameReport {
+        let from = self.came_from.take().or(self.solved.as_ref().map(|s| s.time_s));
         let last = self.solved.take().filter(|_| self.options.update != Update::Scratch);
         let settled = |last: &Solved| last.tree.live_count() == 0;
         // What was extrapolated cannot be taken along when time jumps or goes back.
@@ -176,18 +169,29 @@ impl FlatSession {
         let label = FrameReport { frame, time_s, ..FrameReport::default() };
         let view = PlaneView::new(&self.scene, time_s);
         let solved = match last {
-            Some(last) if settled(&last) && last.view == view => {
+            Some(mut last) if settled(&last) && last.view == view => {
+                if time_s < last.time_s {
+                    // What was foreseen from a later time says nothing of an earlier one.
+                    last.ticks = Ticks::default();
+                    last.tree.forget_certificates();
+                }
                 let report = last.report.of_a_still_frame(label);
                 Solved { time_s, report, events: Vec::new(), ..last }
             }
-            last => rayon::scope(|_| self.advance(last, view, label)),
+            last => rayon::scope(|_| self.advance(last, from, view, label)),
         };
         let report = solved.report.clone();
         self.solved = Some(solved);
         report
     }
 
-    fn advance(&self, last: Option<Solved>, view: PlaneView, mut report: FrameReport) -> Solved {
+    fn advance(
+        &self,
+        last: Option<Solved>,
+        from: Option<f64>,
+        view: PlaneView,
+        mut report: FrameReport,
+    ) -> Solved {
         let mut clock = Clock::start();
         let cold = last.is_none();
         let mut solved = last.unwrap_or_else(|| self.blank(report.time_s));
@@ -196,8 +200,14 @@ impl FlatSession {
         if let Some(before) = &before {
             report.moved = self.moved(before, &solved.view);
         }
-        let lookahead = if cold { None } else { self.look_ahead(&mut solved, report.time_s) };
         report.seconds.moving = clock.lap();
+        let times_s = [solved.time_s, report.time_s];
+        let clocked = (&mut solved.ticks, &mut solved.tree);
+        let ahead = match cold {
+            true => Ahead::default(),
+            false => Ahead::new(self.options.update, &*self.scene, clocked, times_s, false),
+        };
+        report.seconds.predict = clock.lap();
         let mut placed = FlatPlaced {
             scene: &self.scene,
             forest: &mut solved.forest,
@@ -206,7 +216,8 @@ impl FlatSession {
             epsilon: self.options.epsilon,
             min_length_m: self.options.min_length_m,
             constant: self.options.constant,
-            lookahead,
+            ahead: ahead.foresight.as_ref(),
+            lookahead: ahead.lookahead,
         };
         let walls: Vec<u32> = (0..self.scene.walls().len() as u32).collect();
         let record = Record { edits: !cold, events: !cold && self.options.events };
@@ -231,8 +242,7 @@ impl FlatSession {
         solved.time_s = report.time_s;
         report.count(&changes.work);
         if cold {
-            // There is nothing that they moved against.
-            report.dynamic_links = 0;
+            report.dynamic_links = from.map_or(0, |from| self.dynamic_links(&solved, from));
         }
         self.tally(&mut report, &solved);
         report.seconds.total = clock.total();
@@ -259,16 +269,6 @@ impl FlatSession {
         let poses = before.poses().iter().zip(now.poses());
         let moved = poses.zip(self.scene.bodies()).filter(|((one, two), _)| one != two);
         moved.map(|(_, body)| body.name.clone()).collect()
-    }
-
-    /// What the paper's strategy extrapolates with.
-    fn look_ahead(&self, solved: &mut Solved, time_s: f64) -> Option<Lookahead> {
-        let Update::Extrapolate { frames, error } = self.options.update else { return None };
-        if solved.ticks.go(solved.time_s, time_s) {
-            solved.tree.forget_histories();
-        }
-        let frame_s = solved.ticks.length_s();
-        solved.ticks.runs().then_some(Lookahead { now_s: time_s, frame_s, frames, error })
     }
 
     fn edit_links(
@@ -310,6 +310,9 @@ impl FlatSession {
         report.sweeps = solved.radiosity.sweeps;
         report.gathers = solved.radiosity.gathers;
         report.residual = solved.radiosity.residual;
+        if !self.options.balance {
+            return;
+        }
         let surfaces = LitPlane::new(&self.scene, &solved.forest);
         let facets = solved.forest.facets().iter().copied();
         let lit = (&solved.links, &solved.radiosity);
@@ -417,28 +420,89 @@ impl FlatSession {
         ElementName::Element { body, surface, patch: None, facet: None, path }
     }
 
-    /// How far the radiosities of two solutions of the same elements are from each other.
-    ///
-    /// # Panics
-    /// Before the first [`FlatSession::step`] of either, or if their elements differ.
-    pub fn radiosity_gap(&self, other: &FlatSession) -> RadiosityGap {
-        let (ours, theirs) = (self.elements(), other.elements());
-        assert_eq!(ours.len(), theirs.len(), "different elements");
-        let mut gap = RadiosityGap::default();
-        let (mut flux, mut area) = (0.0, 0.0);
-        for (one, two) in ours.iter().zip(&theirs).filter(|(one, _)| one.is_leaf) {
-            for c in 0..3 {
-                let (x, y) = (f64::from(one.radiosity[c]), f64::from(two.radiosity[c]));
-                gap.largest = gap.largest.max((x - y).abs());
-                flux += one.place.length() * x / 3.0;
-            }
-            area += one.place.length();
+    /// Says at which time the frame before the next step was, where that is not the last step:
+    /// [`FrameReport::dynamic_links`] of a cold build count from there. Nothing else depends on it.
+    pub fn came_from(&mut self, time_s: Option<f64>) {
+        self.came_from = time_s;
+    }
+
+    /// Links between bodies of which at least one is elsewhere than at another time.
+    fn dynamic_links(&self, solved: &Solved, from_s: f64) -> u64 {
+        let from = PlaneView::new(&self.scene, from_s);
+        let dynamic = |link: &crate::pair::Link| {
+            let bodies = [link.a, link.b].map(|id| solved.forest.body(id).expect("has a body"));
+            let moved = |body: super::scene::BodyIndex| {
+                from.poses()[body.0 as usize] != solved.view.poses()[body.0 as usize]
+            };
+            bodies[0] != bodies[1] && bodies.into_iter().any(moved)
+        };
+        solved.tree.links().filter(dynamic).count() as u64
+    }
+
+    /// Bytes that the engine's structures hold now.
+    pub fn memory(&self) -> Memory {
+        let mut memory = Memory { fixed: self.seed.memory_bytes(), ..Memory::default() };
+        if let Some(s) = &self.solved {
+            memory.pairs = s.tree.memory_bytes() + s.links.pool_bytes();
+            memory.elements =
+                s.forest.memory_bytes() + s.radiosity.memory_bytes() + s.links.span_bytes();
         }
-        let brightest = self.scene.walls().iter().flat_map(|w| w.material.reflectance);
-        let rho = brightest.fold(0.0, f64::max);
-        let residuals = self.now().report.residual + other.now().report.residual;
-        gap.allowed = residuals * (flux / area) / (1.0 - rho);
-        gap
+        memory
+    }
+}
+
+impl Solution for FlatSession {
+    fn tree(&self) -> &PairTree {
+        &self.now().tree
+    }
+
+    fn report(&self) -> &FrameReport {
+        &self.now().report
+    }
+
+    fn facets(&self) -> &[ElementId] {
+        self.now().forest.facets()
+    }
+
+    fn id_limit(&self) -> u32 {
+        self.now().forest.len() as u32
+    }
+
+    fn is_element(&self, id: ElementId) -> bool {
+        self.now().forest.is_element(id)
+    }
+
+    fn children(&self, id: ElementId) -> Range<u32> {
+        self.now().forest.children(id)
+    }
+
+    fn key(&self, id: ElementId) -> ElementKey {
+        self.now().forest.key(id)
+    }
+
+    fn name_of(&self, key: ElementKey) -> ElementName {
+        self.facet_name(ElementId(key.facet)).at(key.path)
+    }
+
+    fn area_m2(&self, id: ElementId) -> f64 {
+        self.now().forest.length(id)
+    }
+
+    fn is_present(&self, _: ElementId) -> bool {
+        true
+    }
+
+    fn radiosity(&self, id: ElementId) -> [f32; 3] {
+        FlatSession::radiosity(self, id)
+    }
+
+    fn reflectance_max(&self) -> f64 {
+        self.scene.walls().iter().flat_map(|w| w.material.reflectance).fold(0.0, f64::max)
+    }
+
+    fn is_of_the_scene_of(&self, other: &FlatSession) -> bool {
+        self.seed.facets() == other.seed.facets()
+            && self.scene.walls().len() == other.scene.walls().len()
     }
 }
 

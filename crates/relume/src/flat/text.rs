@@ -155,7 +155,7 @@ fn material(words: &[&str]) -> Result<Material, String> {
 }
 
 /// `0.5` or `0.5,0.2,0.1`.
-fn channels(what: &str, word: Option<&str>) -> Result<[f64; 3], String> {
+pub(super) fn channels(what: &str, word: Option<&str>) -> Result<[f64; 3], String> {
     let Some(word) = word else { return Err(format!("`{what}` needs a number")) };
     let parts = word.split(',').map(number).collect::<Result<Vec<f64>, String>>()?;
     match parts[..] {

@@ -61,6 +61,27 @@ impl Aabb {
         self.hi - self.lo
     }
 
+    /// The box of all sums of a vector of this box and one of the other.
+    #[inline]
+    pub fn sum(&self, other: &Aabb) -> Aabb {
+        Aabb { lo: self.lo + other.lo, hi: self.hi + other.hi }
+    }
+
+    /// The box of all differences of a vector of this box and one of the other.
+    #[inline]
+    pub fn difference(&self, other: &Aabb) -> Aabb {
+        Aabb { lo: self.lo - other.hi, hi: self.hi - other.lo }
+    }
+
+    /// How far the vectors of the box go along a direction, at least and at most.
+    #[inline]
+    pub fn along(&self, direction: DVec3) -> (f64, f64) {
+        let forwards = direction.cmpge(DVec3::ZERO);
+        let lo = DVec3::select(forwards, self.lo, self.hi);
+        let hi = DVec3::select(forwards, self.hi, self.lo);
+        (direction.dot(lo), direction.dot(hi))
+    }
+
     /// Length of the space diagonal, metres; 0 for an empty box.
     pub fn diagonal(&self) -> f64 {
         if self.is_empty() { 0.0 } else { self.extent().length() }

@@ -1,4 +1,4 @@
-//! Certificates: until when the known motion cannot change what was found of a pair.
+//! Certificates of pairs in space: until when the known motion cannot change what was found.
 //!
 //! All tests are conservative twice over: what can get anywhere is bounded by boxes, and where the
 //! exact test of a pair allows some slack, these allow half of it, so that rounding does not matter.
@@ -8,26 +8,15 @@ use glam::DVec3;
 use crate::element::{
     ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldPatch, WorldView,
 };
-use crate::event::{Foresight, Tick};
+use crate::event::Foresight;
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
 use crate::scene::{BodyId, Drift, PatchId};
 
 use super::judge::{LightPlace, body_of};
+use super::outlook::{Moves, Outlook};
 
-/// What was found of a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Finding {
-    /// Nothing that moved concerns it: it stays as it is, with all pairs below it, while its ends
-    /// rest against each other and no body that moves comes between them.
-    Unaffected,
-    /// Nothing stands between its ends: V is 1, of all pairs below it too.
-    Clear,
-    /// It is culled.
-    Culled,
-}
-
-/// A scene at one instant, with what comes.
-pub(super) struct Outlook<'a> {
+/// A scene in space at one instant, with what comes.
+pub(super) struct SpaceOutlook<'a> {
     pub(super) forest: &'a Forest,
     pub(super) view: &'a WorldView,
     pub(super) ahead: &'a Foresight,
@@ -50,56 +39,16 @@ const OFF: f64 = 8.0;
 /// The span of nothing.
 const NO_SPAN: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 
-/// How far the least and the greatest displacement of a box go along a direction.
-fn along(by: &Aabb, n: DVec3) -> (f64, f64) {
-    let lo = DVec3::select(n.cmpge(DVec3::ZERO), by.lo, by.hi);
-    let hi = DVec3::select(n.cmpge(DVec3::ZERO), by.hi, by.lo);
-    (n.dot(lo), n.dot(hi))
-}
-
-fn swept(bounds: &Aabb, by: &Aabb) -> Aabb {
-    Aabb { lo: bounds.lo + by.lo, hi: bounds.hi + by.hi }
-}
-
-/// Displacements by `one` seen from what is displaced by `other`.
-fn against(one: &Aabb, other: &Aabb) -> Aabb {
-    Aabb { lo: one.lo - other.hi, hi: one.hi - other.lo }
-}
-
-impl Outlook<'_> {
-    /// The last of the coming ticks until which a finding stands; 0 if that is none.
-    pub(super) fn until(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick {
-        let stands = |&h: &usize| match finding {
-            Finding::Unaffected => self.rest(h, a, b) && !self.is_entered(h, a, b),
-            Finding::Clear => self.stays_clear(h, a, b),
-            Finding::Culled => self.rest(h, a, b) || self.stays_away(h, a, b),
-        };
-        let last = self.ahead.horizons().take_while(stands).last();
-        last.map_or(0, |h| self.ahead.until(h))
+impl Outlook for SpaceOutlook<'_> {
+    fn ahead(&self) -> &Foresight {
+        self.ahead
     }
 
-    fn body(&self, id: ElementId) -> Option<BodyId> {
-        body_of(self.forest, self.view, id)
-    }
-
-    /// Whether two ends rest against each other.
     fn rest(&self, h: usize, a: ElementId, b: ElementId) -> bool {
         let same = self.body(a).is_some_and(|body| self.body(b) == Some(body));
         same || (self.rests(h, a) && self.rests(h, b))
     }
 
-    fn rests(&self, h: usize, id: ElementId) -> bool {
-        if let Some(light) = self.forest.light(id) {
-            return self.ahead.light_rests(h, light);
-        }
-        match self.body(id) {
-            Some(body) => self.ahead.drift(h, body) == Drift::Rests,
-            None => self.ahead.widest(h) == Drift::Rests.reach(),
-        }
-    }
-
-    /// Whether a body that moves against the ends, which rest against each other, may enter their
-    /// shaft.
     fn is_entered(&self, h: usize, a: ElementId, b: ElementId) -> bool {
         let own = self.body(a).filter(|&body| self.ahead.drift(h, body) != Drift::Rests);
         self.with_ends(a, b, &mut |ends| match own {
@@ -112,7 +61,6 @@ impl Outlook<'_> {
         })
     }
 
-    /// Whether nothing at all may get between the ends.
     fn stays_clear(&self, h: usize, a: ElementId, b: ElementId) -> bool {
         let lit = |id| self.forest.kind(id) == Kind::Light;
         !lit(a)
@@ -120,6 +68,38 @@ impl Outlook<'_> {
             && self.body(a).is_some()
             && self.body(b).is_some()
             && !self.with_ends(a, b, &mut |ends| self.may_block(h, ends, Forest::ROOT, None))
+    }
+
+    fn stays_away(&self, h: usize, a: ElementId, b: ElementId) -> bool {
+        let lit = |id| self.forest.kind(id) == Kind::Light;
+        if lit(a) && lit(b) {
+            return true;
+        }
+        // What is absent stays so up to every horizon.
+        let absent = |id| !lit(id) && self.view.fixed_box(self.forest.fixed(id)).is_empty();
+        if absent(a) || absent(b) {
+            return true;
+        }
+        if lit(a) || lit(b) {
+            return false;
+        }
+        self.is_behind(h, a, b) || self.is_behind(h, b, a)
+    }
+}
+
+impl SpaceOutlook<'_> {
+    fn body(&self, id: ElementId) -> Option<BodyId> {
+        body_of(self.forest, self.view, id)
+    }
+
+    fn rests(&self, h: usize, id: ElementId) -> bool {
+        if let Some(light) = self.forest.light(id) {
+            return self.ahead.light_rests(h, light);
+        }
+        match self.body(id) {
+            Some(body) => self.ahead.drift(h, body) == Drift::Rests,
+            None => self.ahead.widest(h) == Drift::Rests.reach(),
+        }
     }
 
     fn with_ends(
@@ -182,8 +162,8 @@ impl Outlook<'_> {
             return false;
         }
         let moves = self.moves(h, ends, body);
-        let (a, b) = (swept(&ends.bounds.0, &moves.a), swept(&ends.bounds.1, &moves.b));
-        if !shaft_meets_box(&a, &b, &swept(bounds, &moves.c).grown(ends.margin_m)) {
+        let (a, b) = (ends.bounds.0.sum(&moves.a), ends.bounds.1.sum(&moves.b));
+        if !shaft_meets_box(&a, &b, &bounds.sum(&moves.c).grown(ends.margin_m)) {
             return false;
         }
         match self.forest.patch(id) {
@@ -195,31 +175,18 @@ impl Outlook<'_> {
         }
     }
 
-    /// Displacements of both ends and of what may come between, all seen from something that does not
-    /// turn.
+    /// Displacements of both ends and of what may come between.
     fn moves(&self, h: usize, ends: &Ends<'_>, body: Option<BodyId>) -> Moves {
         let of = |body: Option<BodyId>| match body {
             Some(body) => self.ahead.drift(h, body),
             None => Drift::Rests,
         };
-        let (a, b) = (of(ends.bodies.0), of(ends.bodies.1));
         let c = match body {
             Some(body) => self.ahead.drift(h, body),
             None => Drift::Turns(self.ahead.widest(h)),
         };
-        let turns = |d: Drift| matches!(d, Drift::Turns(_));
-        let turning = (turns(a), turns(b), turns(c));
-        let none = Drift::Rests.reach();
-        match c {
-            // Seen from the blocker.
-            Drift::Slides(by) => {
-                let seen = |end: Option<BodyId>, drift: Drift| {
-                    if end == body { none } else { against(&drift.reach(), &by) }
-                };
-                Moves { a: seen(ends.bodies.0, a), b: seen(ends.bodies.1, b), c: none, turning }
-            }
-            _ => Moves { a: a.reach(), b: b.reach(), c: c.reach(), turning },
-        }
+        let end = |end: Option<BodyId>| (of(end), end == body);
+        Moves::new(end(ends.bodies.0), end(ends.bodies.1), c)
     }
 
     fn patch_may_block(&self, ends: &Ends<'_>, patch: PatchId, moves: &Moves) -> bool {
@@ -237,7 +204,7 @@ impl Outlook<'_> {
         // Distances of an end from the blocker's plane at all times.
         let span = |e: &WorldElement, by: &Aabb| {
             let (lo, hi) = e.span(&c.plane);
-            let shift = along(&against(by, &moves.c), c.plane.normal);
+            let shift = by.difference(&moves.c).along(c.plane.normal);
             (lo + shift.0, hi + shift.1)
         };
         let spans = (span(a, &moves.a), span(b, &moves.b));
@@ -253,7 +220,7 @@ impl Outlook<'_> {
             let rides = end.0 == Some(body);
             let shift = match rides {
                 true => (0.0, 0.0),
-                false => along(&against(&moves.c, by), e.plane.normal),
+                false => moves.c.difference(by).along(e.plane.normal),
             };
             // The end's plane does not turn against what bounds the blocker's corners.
             let known = rides || !turns;
@@ -293,23 +260,6 @@ impl Outlook<'_> {
         OFF * half * (1.0 + 2.0 * self.view.far_m() * diameter / area.max(f64::MIN_POSITIVE))
     }
 
-    /// Whether one end stays behind the other, as it is now.
-    fn stays_away(&self, h: usize, a: ElementId, b: ElementId) -> bool {
-        let lit = |id| self.forest.kind(id) == Kind::Light;
-        if lit(a) && lit(b) {
-            return true;
-        }
-        // What is absent stays so up to every horizon.
-        let absent = |id| !lit(id) && self.view.fixed_box(self.forest.fixed(id)).is_empty();
-        if absent(a) || absent(b) {
-            return true;
-        }
-        if lit(a) || lit(b) {
-            return false;
-        }
-        self.is_behind(h, a, b) || self.is_behind(h, b, a)
-    }
-
     /// Whether `b` stays wholly behind the plane of `a`.
     fn is_behind(&self, h: usize, a: ElementId, b: ElementId) -> bool {
         let (Some(patch), Some(body)) = (self.forest.patch(a), self.body(a)) else { return false };
@@ -323,7 +273,7 @@ impl Outlook<'_> {
             Some(body) => self.ahead.drift(h, body).reach(),
             None => self.ahead.widest(h),
         };
-        let shift = along(&against(&by, &drift.reach()), plane.normal).1;
+        let shift = by.difference(&drift.reach()).along(plane.normal).1;
         let elements = [a, b].iter().all(|&id| self.forest.kind(id) == Kind::Element);
         let (far, slack) = if elements {
             let b = WorldElement::new(self.view, self.forest, b, false);
@@ -336,14 +286,6 @@ impl Outlook<'_> {
         };
         far + shift <= 0.5 * slack
     }
-}
-
-/// Displacements within one horizon.
-struct Moves {
-    a: Aabb,
-    b: Aabb,
-    c: Aabb,
-    turning: (bool, bool, bool),
 }
 
 /// How a blocker lies to an end at all times.

@@ -14,10 +14,11 @@ use crate::transport::{
 };
 
 use super::brightness::Brightness;
-use super::certificate::{Finding, Outlook};
+use super::certificate::SpaceOutlook;
 use super::hash::pair_key;
 use super::margin::Margin;
 use super::oracle::{End, Oracle, Side, estimate};
+use super::outlook::{Finding, Outlook};
 use super::since::Since;
 use super::tree::{Carried, CullReason, Gradients};
 use super::update::{Hierarchy, Judge, Judgement, Stale, Verdict};
@@ -165,7 +166,7 @@ impl Judge for Placed<'_> {
 
     fn foresee(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick {
         let Some(ahead) = self.ahead else { return 0 };
-        Outlook { forest: self.forest, view: self.view, ahead }.until(a, b, finding)
+        SpaceOutlook { forest: self.forest, view: self.view, ahead }.until(a, b, finding)
     }
 
     fn holds(&self, a: ElementId, b: ElementId) -> bool {

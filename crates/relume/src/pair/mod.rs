@@ -9,18 +9,22 @@ mod hash;
 mod judge;
 mod margin;
 mod oracle;
+mod outlook;
 mod since;
 mod tree;
 mod update;
 
 pub use brightness::{Brightness, Light};
-pub use certificate::Finding;
 pub use hash::{PairHash, pair_key};
 pub use judge::{Placed, Stage};
 pub use margin::{Margin, Shift};
 pub use oracle::{Oracle, Side};
+pub use outlook::Finding;
 pub use since::Since;
 pub use tree::{Carried, CullReason, Gradients, Link, PairId, PairTree, State, StateCounts};
+// The plane has certificates of its own.
+pub(crate) use outlook::{Moves, Outlook};
+
 pub use update::{
     Changes, Edit, EventKind, Held, Hierarchy, Judge, Judgement, LinkEvent, OutOfMemory, Record,
     Stale, Verdict, Work, update,

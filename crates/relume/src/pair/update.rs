@@ -12,10 +12,10 @@ use rayon::prelude::*;
 use crate::element::{ElementId, ElementKey};
 use crate::event::{History, Lookahead, Sample, Tick};
 
-use super::certificate::Finding;
 use super::hash::{PairHash, pair_key};
 use super::margin::Margin;
 use super::oracle::Side;
+use super::outlook::Finding;
 use super::tree::{Carried, CullReason, PairId, PairTree, State};
 
 /// What is decided on a pair.
@@ -127,6 +127,12 @@ pub trait Judge: Hierarchy + Sync {
 
     /// How far ahead pairs are extrapolated, if they are.
     fn lookahead(&self) -> Option<&Lookahead>;
+
+    /// Whether it is worth asking how long nothing will stand between the ends of a refined pair with
+    /// these possible occluders.
+    fn may_be_clear(&self, _a: ElementId, _b: ElementId, narrowed: &[u32]) -> bool {
+        narrowed.is_empty()
+    }
 
     /// The last tick until which the known motion cannot change what was found of a pair; 0 if none.
     fn foresee(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick;
@@ -485,7 +491,10 @@ fn look_at<J: Judge>(
         found.margin.side = Margin::ENDLESS;
     }
     let refined = matches!(found.verdict, Verdict::Refine(_) | Verdict::RefineSelf);
-    let clear = narrowed.len() == start || (!refined && found.segments == 0);
+    let may_be_clear = match refined {
+        true => stale == Stale::Moved && judge.may_be_clear(a, b, &narrowed[start..]),
+        false => found.segments == 0,
+    };
     if !refined {
         narrowed.truncate(start);
     }
@@ -494,7 +503,7 @@ fn look_at<J: Judge>(
         (_, Stale::Followed) => None,
         // It is met again, perhaps still in the state that it had.
         (Verdict::Hold, _) => Some(0),
-        (_, Stale::Moved) if clear && !candidates.is_empty() => {
+        (_, Stale::Moved) if may_be_clear && !candidates.is_empty() => {
             Some(judge.foresee(a, b, Finding::Clear))
         }
         _ => Some(0),

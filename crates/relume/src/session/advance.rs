@@ -3,17 +3,18 @@
 //! Without a state to start from, the same edits build it: a cold build is the update of nothing.
 
 use crate::element::{ElementId, Forest, Kind, WorldView};
-use crate::event::{Foresight, Lookahead, Ticks};
+use crate::event::Ticks;
 use crate::pair::{
     Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Record, Since, Stage, update,
 };
 use crate::scene::{BodyId, LightKind};
 use crate::solver::{Dirty, Links, Radiosity, Stop};
 
+use super::ahead::Ahead;
 use super::coarse::{self, Coarse};
 use super::report::FrameReport;
 use super::surfaces::{LitForest, apply_edits, links_of};
-use super::{Clock, FOLLOWED_SHARE, RESIDUAL_SHARE, Session, SessionError, Solved, Update, tally};
+use super::{Clock, FOLLOWED_SHARE, RESIDUAL_SHARE, Session, SessionError, Solved, tally};
 
 impl Session {
     /// Whether nothing at all differs between the last state and this time.
@@ -45,7 +46,13 @@ impl Session {
         report.seconds.moving = clock.lap();
         let ahead = match cold {
             true => Ahead::default(),
-            false => self.look_ahead(&mut solved, &old, time_s),
+            false => Ahead::new(
+                self.options.update,
+                &*self.scene,
+                (&mut solved.ticks, &mut solved.tree),
+                [solved.time_s, time_s],
+                old.far_m() != solved.view.far_m(),
+            ),
         };
         report.seconds.predict = clock.lap();
 
@@ -126,32 +133,6 @@ impl Session {
             emitted_w += mean(light.intensity) * spread;
         }
         emitted_w / area_m2 / (1.0 - rho)
-    }
-
-    /// What the strategy predicts with, from this time on; what no longer holds is taken back.
-    fn look_ahead(&self, solved: &mut Solved, old: &WorldView, time_s: f64) -> Ahead {
-        if matches!(self.options.update, Update::Scratch | Update::Reinspect) {
-            return Ahead::default();
-        }
-        let void = solved.ticks.go(solved.time_s, time_s);
-        if void || old.far_m() != solved.view.far_m() {
-            solved.tree.forget_certificates();
-        }
-        if void {
-            solved.tree.forget_histories();
-        }
-        let mut ahead = Ahead::default();
-        match self.options.update {
-            Update::Extrapolate { frames, error } if solved.ticks.runs() => {
-                let frame_s = solved.ticks.length_s();
-                ahead.lookahead = Some(Lookahead { now_s: time_s, frame_s, frames, error });
-            }
-            Update::Certificate => {
-                ahead.foresight = Some(Foresight::new(&self.scene, &solved.ticks, time_s));
-            }
-            _ => {}
-        }
-        ahead
     }
 
     /// Nothing but the seed and an unjudged root.
@@ -295,13 +276,6 @@ impl Session {
             links: solved.tree.len() as u64,
         }
     }
-}
-
-/// What a strategy predicts with.
-#[derive(Default)]
-struct Ahead {
-    foresight: Option<Foresight>,
-    lookahead: Option<Lookahead>,
 }
 
 /// Links by receiver, for each pair of the tree, bytes.

@@ -5,12 +5,11 @@
 
 use std::fmt;
 
-use crate::element::{ElementId, ElementKey, Forest, Kind};
-use crate::pair::{Carried, Gradients, PairHash, PairTree, pair_key};
-use crate::scene::Scene;
+use crate::element::{ElementId, ElementKey};
+use crate::pair::{Carried, Gradients, PairHash, pair_key};
 
-use super::names::{ElementName, name_of};
-use super::{Session, Solved};
+use super::names::ElementName;
+use super::solution::{Solution, named_leaves};
 
 /// Single-precision roundings that a radiosity may differ by, in units of the last place: the
 /// links of a receiver may be summed in another order.
@@ -114,10 +113,10 @@ pub struct RadiosityGap {
 /// differs they are sorted. Cost: linear in links and n log n in elements where all is well.
 ///
 /// # Panics
-/// Before the first [`Session::step`] of either.
-pub fn compare(one: &Session, two: &Session) -> Option<Difference> {
-    let both = Both::new(one, two);
-    if !both.same_scene() {
+/// Before the first step of either.
+pub fn compare<S: Solution>(one: &S, two: &S) -> Option<Difference> {
+    let both = Both { one, two };
+    if !one.is_of_the_scene_of(two) {
         return Some(Difference::Scene);
     }
     both.links().or_else(|| both.counts()).or_else(|| both.radiosities().err())
@@ -130,46 +129,31 @@ pub fn compare(one: &Session, two: &Session) -> Option<Difference> {
 /// The first leaf that only one of them has, or whose radiosities are too far apart.
 ///
 /// # Panics
-/// Before the first [`Session::step`] of either.
-pub fn radiosity_gap(one: &Session, two: &Session) -> Result<RadiosityGap, Difference> {
-    let both = Both::new(one, two);
-    if both.same_scene() { both.radiosities() } else { Err(Difference::Scene) }
+/// Before the first step of either.
+pub fn radiosity_gap<S: Solution>(one: &S, two: &S) -> Result<RadiosityGap, Difference> {
+    let both = Both { one, two };
+    if one.is_of_the_scene_of(two) { both.radiosities() } else { Err(Difference::Scene) }
 }
 
 /// Two sessions side by side.
-struct Both<'a> {
-    scene: &'a Scene,
-    sessions: [&'a Session; 2],
-    one: &'a Solved,
-    two: &'a Solved,
+struct Both<'a, S> {
+    one: &'a S,
+    two: &'a S,
 }
 
 /// A link by the names of its ends.
 type NamedLink = ((ElementKey, ElementKey), Carried);
 
-impl<'a> Both<'a> {
-    fn new(one: &'a Session, two: &'a Session) -> Both<'a> {
-        let solved = |s: &'a Session| s.solved.as_ref().expect("a step comes before a comparison");
-        Both { scene: &one.scene, sessions: [one, two], one: solved(one), two: solved(two) }
-    }
-
-    /// Names mean the same in both: the forest's fixed part is a function of the scene.
-    fn same_scene(&self) -> bool {
-        let [a, b] = self.sessions.map(|s| &s.scene);
-        let (one, two) = (&self.one.forest, &self.two.forest);
-        let alike = a.patches.len() == b.patches.len() && a.lights.len() == b.lights.len();
-        alike && one.fixed_len() == two.fixed_len() && one.facets() == two.facets()
-    }
-
+impl<S: Solution> Both<'_, S> {
     fn links(&self) -> Option<Difference> {
-        let hashes = [self.one, self.two].map(|s| hash_of(&s.tree, &s.forest));
+        let hashes = [self.one, self.two].map(hash_of);
         if hashes[0] != hashes[1] {
             let (one, two) = (named_links(self.one), named_links(self.two));
             return self.first_link(&one, &two);
         }
         let reports = [(Which::One, self.one), (Which::Two, self.two)];
         reports.into_iter().zip(hashes).find_map(|((which, solved), found)| {
-            let (reported, found) = (solved.report.hash.clone(), found.to_string());
+            let (reported, found) = (solved.report().hash.clone(), found.to_string());
             (reported != found).then_some(Difference::Hash { which, reported, found })
         })
     }
@@ -200,7 +184,7 @@ impl<'a> Both<'a> {
     }
 
     fn counts(&self) -> Option<Difference> {
-        let (one, two) = (&self.one.report, &self.two.report);
+        let (one, two) = (self.one.report(), self.two.report());
         let counts = [
             ("links", one.links, two.links),
             ("elements", one.elements, two.elements),
@@ -211,15 +195,14 @@ impl<'a> Both<'a> {
     }
 
     fn radiosities(&self) -> Result<RadiosityGap, Difference> {
-        let (one, two) = (named_leaves(&self.one.forest), named_leaves(&self.two.forest));
+        let (one, two) = (named_leaves(self.one), named_leaves(self.two));
         let bound = Bound::new(self);
         let mut worst = RadiosityGap::default();
         for (a, b) in one.iter().zip(&two) {
             if a.0 != b.0 {
                 break;
             }
-            let of = |solved: &Solved, id: ElementId| solved.radiosity.radiosity(id.0);
-            let (x, y) = (of(self.one, a.1), of(self.two, b.1));
+            let (x, y) = (self.one.radiosity(a.1), self.two.radiosity(b.1));
             let gap = bound.gap(x, y);
             // So that what is no number counts as a difference.
             let within = gap.difference_w_m2 <= gap.bound_w_m2;
@@ -243,7 +226,7 @@ impl<'a> Both<'a> {
     }
 
     fn name(&self, key: ElementKey) -> ElementName {
-        name_of(self.scene, &self.one.forest, key)
+        self.one.name_of(key)
     }
 }
 
@@ -255,15 +238,10 @@ struct Bound {
 }
 
 impl Bound {
-    fn new(both: &Both<'_>) -> Bound {
-        let reflectances = both
-            .scene
-            .patches
-            .iter()
-            .flat_map(|patch| both.scene.materials[patch.material.0 as usize].reflectance);
-        let grows = 1.0 / (1.0 - reflectances.fold(0.0, f64::max));
+    fn new(both: &Both<'_, impl Solution>) -> Bound {
+        let grows = 1.0 / (1.0 - both.one.reflectance_max());
         let mean_w_m2 = mean_radiosity(both.one).max(mean_radiosity(both.two));
-        let residuals = both.one.report.residual + both.two.report.residual;
+        let residuals = both.one.report().residual + both.two.report().residual;
         Bound {
             by_residuals_w_m2: residuals * grows * mean_w_m2,
             mean_w_m2,
@@ -291,11 +269,11 @@ impl RadiosityGap {
 }
 
 /// Area-weighted mean over all surfaces and channels, W/m2.
-fn mean_radiosity(solved: &Solved) -> f64 {
+fn mean_radiosity(solved: &impl Solution) -> f64 {
     let (mut flux, mut area) = (0.0, 0.0);
-    for &facet in solved.forest.facets() {
-        let a = solved.forest.area_m2(facet);
-        let b: f32 = solved.radiosity.radiosity(facet.0).iter().sum();
+    for &facet in solved.facets() {
+        let a = solved.area_m2(facet);
+        let b: f32 = solved.radiosity(facet).iter().sum();
         flux += a * f64::from(b) / 3.0;
         area += a;
     }
@@ -307,28 +285,19 @@ fn bits(carried: &Carried) -> (u32, u16, Gradients) {
     (carried.exchange_area_m2.to_bits(), carried.visibility, carried.gradients)
 }
 
-fn hash_of(tree: &PairTree, forest: &Forest) -> PairHash {
+fn hash_of(solved: &impl Solution) -> PairHash {
     let mut hash = PairHash::default();
-    for link in tree.links() {
-        hash.add(pair_key(forest.key(link.a), forest.key(link.b)), &link.carried);
+    for link in solved.tree().links() {
+        hash.add(pair_key(solved.key(link.a), solved.key(link.b)), &link.carried);
     }
     hash
 }
 
-fn named_links(solved: &Solved) -> Vec<NamedLink> {
-    let key = |id| solved.forest.key(id);
+fn named_links(solved: &impl Solution) -> Vec<NamedLink> {
+    let key = |id| solved.key(id);
     let mut out: Vec<NamedLink> =
-        solved.tree.links().map(|l| ((key(l.a), key(l.b)), l.carried)).collect();
+        solved.tree().links().map(|l| ((key(l.a), key(l.b)), l.carried)).collect();
     out.sort_unstable_by_key(|link| link.0);
-    out
-}
-
-fn named_leaves(forest: &Forest) -> Vec<(ElementKey, ElementId)> {
-    let ids = (0..forest.len() as u32).map(ElementId);
-    let leaf =
-        |id: &ElementId| forest.kind(*id) == Kind::Element && forest.children(*id).is_empty();
-    let mut out: Vec<_> = ids.filter(leaf).map(|id| (forest.key(id), id)).collect();
-    out.sort_unstable_by_key(|leaf| leaf.0);
     out
 }
 

@@ -1,9 +1,9 @@
 //! How far a solution that predicts with losses is from one that does not.
 
-use crate::element::{ElementId, ElementKey, Forest, Kind};
+use crate::element::{ElementId, ElementKey};
 use crate::pair::{PairId, PairTree, State};
 
-use super::{Session, Solved};
+use super::solution::{Solution, named_leaves};
 
 /// Pairs that are in another state than they should be.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,21 +19,21 @@ pub struct Missed {
 /// not counted: they follow from it.
 ///
 /// # Panics
-/// Before the first [`Session::step`] of either.
-pub fn missed(session: &Session, reference: &Session) -> Missed {
-    let (one, two) = (Solved::of(session), Solved::of(reference));
+/// Before the first step of either.
+pub fn missed<S: Solution>(session: &S, reference: &S) -> Missed {
+    let (one, two) = (session.tree(), reference.tree());
     let mut out = Missed::default();
     // Both trees from the root: children of pairs in the same state have the same names in the same
     // order.
     let mut stack = vec![(PairTree::ROOT, PairTree::ROOT)];
     while let Some((p, q)) = stack.pop() {
-        let (a, b) = (one.tree.state(p), two.tree.state(q));
+        let (a, b) = (one.state(p), two.state(q));
         if a != b {
             // Refined on the other side is no event: both are fine enough.
             out.states += u64::from(!(a.is_refined() && b.is_refined()));
             continue;
         }
-        if let (State::Active, Some(l), Some(m)) = (a, one.tree.link(p), two.tree.link(q)) {
+        if let (State::Active, Some(l), Some(m)) = (a, one.link(p), two.link(q)) {
             let class = |v: u16| {
                 if v == 0 {
                     0
@@ -46,16 +46,10 @@ pub fn missed(session: &Session, reference: &Session) -> Missed {
             let differs = class(l.carried.visibility) != class(m.carried.visibility);
             out.occlusions += u64::from(differs);
         }
-        let (p, q) = (one.tree.children(p), two.tree.children(q));
+        let (p, q) = (one.children(p), two.children(q));
         stack.extend(p.map(PairId).zip(q.map(PairId)));
     }
     out
-}
-
-impl Solved {
-    fn of(session: &Session) -> &Solved {
-        session.solved.as_ref().expect("a step comes before a comparison")
-    }
 }
 
 /// How far radiosities are from those of a reference, relative to its mean radiosity.
@@ -71,20 +65,17 @@ pub struct RadiosityError {
 /// its elements there, or the element that holds the leaf.
 ///
 /// # Panics
-/// Before the first [`Session::step`] of either.
-pub fn radiosity_error(session: &Session, reference: &Session) -> RadiosityError {
-    let (one, two) = (Solved::of(session), Solved::of(reference));
-    let known = Known::new(&one.forest);
+/// Before the first step of either.
+pub fn radiosity_error<S: Solution>(session: &S, reference: &S) -> RadiosityError {
+    let known = Known::new(session);
     let (mut squares, mut area, mut sum, mut max) = (0.0, 0.0, 0.0, 0.0_f64);
-    for id in (0..two.forest.len() as u32).map(ElementId) {
-        let leaf = two.forest.kind(id) == Kind::Element && two.forest.children(id).is_empty();
-        let body = two.forest.patch(id).map(|p| two.view.patch(p).body);
-        if !leaf || !body.is_some_and(|b| two.view.is_present(b)) {
+    for (key, id) in named_leaves(reference) {
+        if !reference.is_present(id) {
             continue;
         }
-        let a = two.forest.area_m2(id);
-        let found = one.radiosity.radiosity(known.holding(two.forest.key(id)).0);
-        for (x, y) in found.into_iter().zip(two.radiosity.radiosity(id.0)) {
+        let a = reference.area_m2(id);
+        let found = session.radiosity(known.holding(key));
+        for (x, y) in found.into_iter().zip(reference.radiosity(id)) {
             let off = f64::from(x) - f64::from(y);
             squares += a * off * off / 3.0;
             sum += a * f64::from(y) / 3.0;
@@ -103,10 +94,10 @@ pub fn radiosity_error(session: &Session, reference: &Session) -> RadiosityError
 struct Known(Vec<(ElementKey, ElementId)>);
 
 impl Known {
-    fn new(forest: &Forest) -> Known {
-        let ids = (0..forest.len() as u32).map(ElementId);
-        let elements = ids.filter(|&id| forest.kind(id) == Kind::Element);
-        let mut out: Vec<_> = elements.map(|id| (forest.key(id), id)).collect();
+    fn new(solution: &impl Solution) -> Known {
+        let ids = (0..solution.id_limit()).map(ElementId);
+        let elements = ids.filter(|&id| solution.is_element(id));
+        let mut out: Vec<_> = elements.map(|id| (solution.key(id), id)).collect();
         out.sort_unstable_by_key(|e| e.0);
         Known(out)
     }

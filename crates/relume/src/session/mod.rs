@@ -11,6 +11,7 @@ use crate::solver::{Links, Radiosity};
 use crate::transport::Simd;
 
 mod advance;
+mod ahead;
 mod coarse;
 mod compact;
 mod compare;
@@ -24,6 +25,7 @@ mod pieces;
 mod reconstruct;
 mod report;
 mod snapshot;
+mod solution;
 mod surfaces;
 mod tally;
 
@@ -36,8 +38,10 @@ pub use names::ElementName;
 pub use options::{Options, Oracle, Update};
 pub use report::{Energy, FrameReport, PairCounts, RowSumError, Seconds};
 pub use snapshot::{Leaf, Snapshot};
+pub use solution::Solution;
 
 // Flatland's session shares these.
+pub(crate) use ahead::Ahead;
 pub(crate) use events::with_names;
 pub(crate) use surfaces::{Receivers, apply_edits, links_of};
 pub(crate) use tally::balance_of;

@@ -1,0 +1,48 @@
+//! What a strategy predicts with.
+
+use crate::event::{Foresight, KnownMotion, Lookahead, Ticks};
+use crate::pair::PairTree;
+
+use super::Update;
+
+/// What a strategy predicts with; nothing for those that do not.
+#[derive(Default)]
+pub(crate) struct Ahead {
+    /// Of certificates.
+    pub(crate) foresight: Option<Foresight>,
+    /// Of extrapolation.
+    pub(crate) lookahead: Option<Lookahead>,
+}
+
+impl Ahead {
+    /// From the second of two times on; what no longer holds is taken back. `other_rounding` says that
+    /// what counts as rounding changed between the two, which no certificate outlasts.
+    pub(crate) fn new(
+        update: Update,
+        scene: &impl KnownMotion,
+        (ticks, tree): (&mut Ticks, &mut PairTree),
+        [from_s, to_s]: [f64; 2],
+        other_rounding: bool,
+    ) -> Ahead {
+        let mut ahead = Ahead::default();
+        if matches!(update, Update::Scratch | Update::Reinspect) {
+            return ahead;
+        }
+        let void = ticks.go(from_s, to_s);
+        if void || other_rounding {
+            tree.forget_certificates();
+        }
+        if void {
+            tree.forget_histories();
+        }
+        match update {
+            Update::Extrapolate { frames, error } if ticks.runs() => {
+                let frame_s = ticks.length_s();
+                ahead.lookahead = Some(Lookahead { now_s: to_s, frame_s, frames, error });
+            }
+            Update::Certificate => ahead.foresight = Some(Foresight::new(scene, ticks, to_s)),
+            _ => {}
+        }
+        ahead
+    }
+}

@@ -619,6 +619,10 @@ pub(crate) struct PictureFlags {
     /// Draw the outlines of the elements over the picture.
     #[arg(long)]
     pub(crate) mesh: bool,
+    /// Find the light of every element anew from all links above it: cleaner corners and shadows, at
+    /// several times the cost of a frame.
+    #[arg(long)]
+    pub(crate) reconstruct: bool,
 }
 
 impl Default for PictureFlags {
@@ -629,6 +633,7 @@ impl Default for PictureFlags {
             camera: None,
             exposure: ExposureFlag::Auto,
             mesh: false,
+            reconstruct: false,
         }
     }
 }

@@ -102,6 +102,9 @@ pub(crate) struct PictureOptions {
     pub(crate) exposure_ev: Option<f64>,
     /// Whether the elements' outlines were drawn.
     pub(crate) mesh: bool,
+    /// Whether the light of every element was found anew from all links above it.
+    #[serde(default)]
+    pub(crate) reconstruct: bool,
 }
 
 /// The number of a frame, from its entry; an entry without a hash is none.

@@ -187,6 +187,7 @@ mod tests {
                 exposure: "auto".into(),
                 exposure_ev: Some(1.25),
                 mesh: false,
+                reconstruct: false,
             }),
         };
         Report::new(scene, options)

@@ -173,6 +173,7 @@ impl Job {
                 ExposureFlag::Stops(stops) => Some(stops),
             },
             mesh: flags.mesh,
+            reconstruct: flags.reconstruct,
         });
         let flags = &self.solve.clip;
         RunOptions {
@@ -329,7 +330,9 @@ impl Run<'_> {
     }
 
     fn draw(&mut self, frame: u32, path: &Path) -> Result<(), Failure> {
-        let snapshot = self.session.snapshot();
+        let reconstruct = self.job.picture.as_ref().is_some_and(|(_, flags)| flags.reconstruct);
+        let snapshot =
+            if reconstruct { self.session.reconstruction() } else { self.session.snapshot() };
         if self.exposure_is_open() {
             self.choose_exposure(frame, &snapshot)?;
         }

@@ -23,7 +23,7 @@ const HALF: f64 = 0.12;
 fn scene() -> Arc<Scene> {
     let mut b = SceneBuilder::new("cells");
     let room = common::still(&mut b, "room");
-    let slider = common::sliding(&mut b, "box", v(0.15, 0.3, 0.45), v(0.85, 0.3, 0.55));
+    let slider = common::sliding(&mut b, "box", v(0.15, 0.3, 0.45), v(0.83, 0.3, 0.55));
     common::turn(&mut b, slider, DVec3::Y, 0.3);
     let grey = b.material("grey", [0.5; 3], [0.0; 3]);
     for (node, lo, hi, n, inward) in [
@@ -66,14 +66,11 @@ fn rows_sum_to_one_and_entries_are_right_at_every_place_of_the_box() {
         let time_s = f64::from(frame) / 4.0;
         session.step(frame, time_s).unwrap();
         let f = sums.factors(&session);
-        for row in 0..f.len() as u32 {
-            let sum = f.row_sum(row);
-            assert!(
-                (sum - 1.0).abs() < 1e-3,
-                "frame {frame}, {}: {sum}",
-                grouping.names[row as usize]
-            );
-        }
+        let offs = (0..f.len() as u32).map(|row| ((f.row_sum(row) - 1.0).abs(), row));
+        let (worst, row) = offs.fold((0.0, 0), |m, o| if o.0 > m.0 { o } else { m });
+        let name = &grouping.names[row as usize];
+        println!("frame {frame}: rows within {worst:.1e} ({name})");
+        assert!(worst < 1e-3, "frame {frame}, {name}: {worst}");
         assert!(reciprocity_error(&f) < 1e-12);
         let polygon = |k: usize| -> Vec<DVec3> {
             let patch = &scene.patches[k];

@@ -74,7 +74,7 @@ const AROUND: usize = 32;
 const UNSEEN: f64 = 0.05;
 
 /// The same where what blocks is nearer than this many radii of the piece.
-const NEAR: f64 = 2.0;
+const NEAR: f64 = 4.0;
 
 /// See [`NEAR`].
 const UNSEEN_NEAR: f64 = 0.25;

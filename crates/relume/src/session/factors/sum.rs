@@ -48,7 +48,7 @@ struct Buckets {
 pub(super) type Upper = Vec<Vec<(u32, u64)>>;
 
 /// Links that one task looks at.
-const LINKS_AT_ONCE: usize = 2_048;
+const LINKS_AT_ONCE: usize = 64;
 
 /// Whether links are added to sums or taken out of them.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use common::v;
 use glam::{DQuat, DVec3};
-use relume::scene::{Scene, SceneBuilder};
+use relume::scene::{LightKind, Scene, SceneBuilder};
 use relume::session::{Factors, Grouping, PartFactors, Session};
 use relume_judge::{Random, seen};
 
@@ -144,6 +144,8 @@ fn a_body_that_is_absent_leaves_room() {
     let room = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
     let guest = b.node("guest", None, DVec3::splat(0.5), DQuat::IDENTITY);
     b.animate_presence(guest, vec![(0.0, false), (1.0, true)]);
+    // Lights are in no group.
+    b.light("bulb", room, LightKind::Point, [1.0; 3]);
     let grey = b.material("grey", [0.5; 3], [0.0; 3]);
     for (node, half, inward) in [(room, DVec3::ZERO, true), (guest, DVec3::splat(0.1), false)] {
         let (lo, hi) = if inward { (half, DVec3::ONE) } else { (-half, half) };

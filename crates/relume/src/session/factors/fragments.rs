@@ -176,8 +176,12 @@ impl Spread<'_> {
     /// a link carries between any two groups.
     pub(super) fn spread(&self, link: &Link, add: &mut dyn FnMut(u32, u32, f64)) {
         let of = |id: ElementId| self.fragments.of[id.0 as usize];
+        let counts = |id| !matches!(of(id), Lies::Within(NONE));
+        if !counts(link.a) || !counts(link.b) {
+            return;
+        }
         if let (Lies::Within(a), Lies::Within(b)) = (of(link.a), of(link.b)) {
-            if a != NONE && b != NONE && link.carried.visibility > 0 {
+            if link.carried.visibility > 0 {
                 let v = f64::from(link.carried.visibility) / 65_535.0;
                 add(a, b, f64::from(link.carried.exchange_area_m2) * v);
             }

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use relume::flat::{FlatOptions, FlatScene, FlatSession, SvgError, parse, parse_svg};
+use relume::flat::{FlatOptions, FlatScene, FlatSession, SvgError, Wall, parse, parse_svg};
 use relume::session::FrameReport;
 use relume_picture::drawing::Pen;
 use relume_picture::export::write_atomically;
@@ -69,6 +69,15 @@ pub(crate) fn flat(args: &FlatArgs) -> Result<(), Failure> {
                 .help("`relume help flat` shows what a scene looks like")
         })?,
     };
+    let bright = |wall: &&Wall| wall.material.reflectance.iter().any(|&r| r >= BRIGHT);
+    if let Some(wall) = scene.walls().iter().find(bright) {
+        output::complain(&format!(
+            "warning: `{}` reflects {:.0} % or more: what links err by grows by 1 / (1 - reflectance); \
+             lower --epsilon and see whether the energies agree",
+            wall.name,
+            100.0 * BRIGHT
+        ));
+    }
     let frames = resolve(args.frames.as_ref(), scene.duration_s(), args.fps)
         .map_err(|error| Failure::usage(error).help("choose other --frames"))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -83,6 +92,9 @@ pub(crate) fn flat(args: &FlatArgs) -> Result<(), Failure> {
     }
     if args.verify { verify::frames(&run, args.update, false) } else { run.solve(path) }
 }
+
+/// Reflectance from which on a scene is doubtful.
+const BRIGHT: f64 = 0.95;
 
 struct Run<'a> {
     scene: Arc<FlatScene>,
@@ -100,7 +112,9 @@ impl Run<'_> {
             min_length_m: self.args.min_length,
             constant: self.args.constant,
             update,
-            events: self.args.events.is_some() || self.args.print == Some(FlatPrint::Events),
+            events: self.args.events.is_some()
+                || self.args.output.is_some()
+                || self.args.print == Some(FlatPrint::Events),
             ..FlatOptions::default()
         })
     }
@@ -236,6 +250,7 @@ fn picture(session: &FlatSession, part: (glam::DVec2, glam::DVec2), frame: u32) 
     let scale = SIDE / (part.1 - part.0).max_element();
     let mut sheet = draw::Sheet::new(part, scale, 36.0);
     sheet.links(session, &session.links(), Pen { opacity: 0.7, ..Pen::new(0.9, draw::PINK) });
+    sheet.events(session);
     sheet.walls(session.view());
     sheet.ticks(&session.elements());
     sheet.caption(&format!("frame {frame}"));

@@ -183,7 +183,8 @@ impl FlatScene {
         if local.start == local.end {
             return Err(SceneError::NoLength(name));
         }
-        if !material.reflectance.iter().all(|r| (0.0..1.0).contains(r)) {
+        // The solver holds it in single precision.
+        if !material.reflectance.iter().all(|&r| r >= 0.0 && (r as f32) < 1.0) {
             return Err(SceneError::Reflectance(name));
         }
         if !material.exitance.iter().all(|m| *m >= 0.0 && m.is_finite()) {

@@ -178,7 +178,15 @@ impl FlatSession {
                 let report = last.report.of_a_still_frame(label);
                 Solved { time_s, report, events: Vec::new(), ..last }
             }
-            last => rayon::scope(|_| self.advance(last, from, view, label)),
+            last => rayon::scope(|_| {
+                let extrapolates = last.is_some();
+                let solved = self.advance(last, from, view.clone(), label.clone());
+                // Extrapolated links that no scene can have: this frame is built anew.
+                match extrapolates && solved.report.residual.is_infinite() {
+                    true => self.advance(None, from, view, label),
+                    false => solved,
+                }
+            }),
         };
         let report = solved.report.clone();
         self.solved = Some(solved);
@@ -207,6 +215,7 @@ impl FlatSession {
             true => Ahead::default(),
             false => Ahead::new(self.options.update, &*self.scene, clocked, times_s, false),
         };
+        let ahead_of_all = ahead.lookahead.is_some();
         report.seconds.predict = clock.lap();
         let mut placed = FlatPlaced {
             scene: &self.scene,
@@ -232,7 +241,12 @@ impl FlatSession {
         if lit.is_dark() {
             solved.radiosity = Radiosity::new(&lit);
         } else {
-            let stop = Stop::Residual(self.options.residual);
+            let residual = self.options.residual;
+            let stop = match ahead_of_all {
+                // Extrapolated links may feed each other.
+                true => Stop::Bounded { residual, mean_w_m2: 1.1 * self.most_mean_w_m2() },
+                false => Stop::Residual(residual),
+            };
             solved.radiosity.solve(&lit, &solved.links, dirty, stop);
         }
         report.seconds.solve = clock.lap();
@@ -248,6 +262,18 @@ impl FlatSession {
         report.seconds.total = clock.total();
         solved.report = report;
         solved
+    }
+
+    /// The mean radiosity that no scene with these walls can pass, W/m2, whatever hides what.
+    fn most_mean_w_m2(&self) -> f64 {
+        let (mut emitted, mut length_m, mut rho) = (0.0, 0.0, 0.0_f64);
+        for wall in self.scene.walls() {
+            let long = wall.local.length();
+            emitted += long * wall.material.exitance.iter().sum::<f64>() / 3.0;
+            length_m += long;
+            rho = wall.material.reflectance.into_iter().fold(rho, f64::max);
+        }
+        emitted / length_m / (1.0 - rho)
     }
 
     fn blank(&self, time_s: f64) -> Solved {

@@ -265,7 +265,8 @@ fn check_materials(materials: &[Material]) -> Result<(), SceneError> {
                 remedy: remedy.to_owned(),
             })
         };
-        if let Some(bad) = material.reflectance.iter().find(|r| !(0.0..1.0).contains(*r)) {
+        if let Some(bad) = material.reflectance.iter().find(|r| !(**r >= 0.0 && (**r as f32) < 1.0))
+        {
             return fail(
                 format!("its reflectance is {bad}"),
                 "choose each channel from 0 up to, but not including, 1",

@@ -141,7 +141,8 @@ impl Radiosity {
             Stop::Residual(limit) | Stop::Bounded { residual: limit, .. } => (limit * mean) as f32,
         };
         let to_residual = !matches!(stop, Stop::Sweeps(_));
-        let mut limit = limit_of(self.mean(surfaces));
+        let mut last_mean = self.mean(surfaces);
+        let mut limit = limit_of(last_mean);
         loop {
             if self.held > HELD_MAX * limit && !work.all && to_residual {
                 // What was little beside a brighter scene is too much beside this one.
@@ -176,9 +177,17 @@ impl Radiosity {
                 }
                 _ => !work.is_left(surfaces, links, limit, &mut self.pending),
             };
-            if done || self.sweeps >= SWEEPS_MAX {
+            if done {
                 return;
             }
+            if self.sweeps >= SWEEPS_MAX {
+                // Given up: what the last sweep did to all is what is left at least.
+                let change = (mean - last_mean).abs() / mean;
+                self.residual =
+                    if change.is_finite() { self.residual + change } else { f64::INFINITY };
+                return;
+            }
+            last_mean = mean;
             if all && work.all && to_residual {
                 jump.after(&mut self.radiosity);
             }

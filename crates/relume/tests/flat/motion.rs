@@ -414,6 +414,34 @@ fn what_was_extrapolated_does_not_outlast_a_rest_or_a_jump() {
 }
 
 #[test]
+fn extrapolated_links_that_no_scene_can_have_are_built_anew() {
+    let text = "polygon room 0 0 4 0 4 3 0 3 reflectance 0.95\nbody a\nat 0 .5 .5 0\nat .5 3.5 .5 180\n\
+        at 1 3.5 2.5 0\nat 2 .5 2.5 720\n\
+        polygon a -.4 -.4 -.4 .4 .4 .4 .4 -.4 reflectance 0.95 emit 1\n\
+        body b\nat 0 3 2\nat 1 1 1 500\nat 2 3 2.9 0\n\
+        segment b -.5 0 .5 0 two-sided reflectance 0.95\n";
+    let scene = Arc::new(parse(text).unwrap());
+    let update = Update::Extrapolate { frames: 60, error: None };
+    let mut session = FlatSession::new(scene, options(0.1, update)).unwrap();
+    for frame in 0..120 {
+        let report = session.step(frame, f64::from(frame) / 60.0);
+        assert!(report.residual < 1e-3, "frame {frame}: {}", report.residual);
+        let energy = report.energy.unwrap();
+        assert!(energy.absorbed_w < 12.0 * energy.emitted_w, "frame {frame}: {energy:?}");
+    }
+}
+
+#[test]
+fn a_solve_that_was_given_up_says_so() {
+    let text = "polygon room 0 0 2 0 2 1 0 1 reflectance 0.999999 emit 1\n";
+    let scene = Arc::new(parse(text).unwrap());
+    let mut session = FlatSession::new(scene, options(0.1, Update::Scratch)).unwrap();
+    let report = session.step(0, 0.0);
+    assert!(report.residual > 1e-5, "{} after {} sweeps", report.residual, report.sweeps);
+    assert!(parse("segment a 0 0 1 0 reflectance 0.9999999999").is_err());
+}
+
+#[test]
 fn energy_is_kept_in_a_closed_room() {
     let text = "polygon room 0 0 2 0 2 1 0 1 reflectance 0.7\n\
         body lamp\nat 0 0.5 0.8\nat 1 1.5 0.8\npolygon lamp 0 0 0 0.05 0.3 0.05 0.3 0 emit 10\n";

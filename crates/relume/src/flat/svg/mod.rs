@@ -148,6 +148,20 @@ struct Reader {
 const NOTHING: [&str; 7] =
     ["defs", "title", "desc", "metadata", "style", "text", "animateTransform"];
 
+/// The names and values of an element's style.
+fn styles<'a>(node: Node<'a, '_>) -> impl Iterator<Item = (&'a str, &'a str)> {
+    let style = node.attribute("style").unwrap_or("");
+    style
+        .split(';')
+        .filter_map(|s| s.split_once(':'))
+        .map(|(name, value)| (name.trim(), value.trim()))
+}
+
+fn is_hidden(node: Node<'_, '_>) -> bool {
+    node.attribute("display") == Some("none")
+        || styles(node).any(|style| style == ("display", "none"))
+}
+
 impl Reader {
     fn children(&mut self, node: Node<'_, '_>, place: &Place) -> Result<(), SvgError> {
         let elements = node.children().filter(Node::is_element);
@@ -158,14 +172,24 @@ impl Reader {
         let foreign =
             node.tag_name().namespace().is_some_and(|ns| ns != "http://www.w3.org/2000/svg");
         let tag = node.tag_name().name();
-        if foreign || NOTHING.contains(&tag) || node.attribute("display") == Some("none") {
+        if foreign || NOTHING.contains(&tag) || is_hidden(node) {
             return Ok(());
+        }
+        if styles(node).any(|(name, _)| name == "transform") {
+            let what = "its style has a transform, which is not read";
+            return fault(what, "write it as the attribute transform").map_err(|f| at(node, f));
         }
         let inner = self.enter(node, place).map_err(|fault| at(node, fault))?;
         if tag == "g" {
             return self.children(node, &inner);
         }
         self.shapes += 1;
+        let animated = |tag: &str| tag.starts_with("animate") || tag == "set";
+        if let Some(child) = node.children().find(|c| animated(c.tag_name().name())) {
+            let what = format!("its <{}> is not read", child.tag_name().name());
+            return fault(what, "put it into a <g> and move that by animateTransform")
+                .map_err(|f| at(node, f));
+        }
         let chains = shape(node).map_err(|fault| at(node, fault))?;
         self.draw(node, &chains, &inner).map_err(|fault| at(node, fault))
     }

@@ -49,7 +49,8 @@ fn units_transforms_and_materials_are_handed_down() {
     let text = "<svg data-units-per-metre='100'>\
         <g id='room' data-reflectance='0.7' transform='translate(100 0) rotate(90)'>\
         <line id='a' x2='50' data-emit='1,2,3'/><line id='b' x2='50' data-two-sided='true' \
-        data-reflectance='0.1'/></g><g display='none'><circle r='1'/></g><title>t</title></svg>";
+        data-reflectance='0.1'/></g><g display='none'><circle r='1'/></g>\
+        <g style='fill:red; display: none'><circle r='1'/></g><title>t</title></svg>";
     let scene = parse_svg(text).unwrap();
     let [a, b] = scene.walls() else { panic!() };
     assert!((a.local.start - DVec2::new(1.0, 0.0)).length() < 1e-15);
@@ -155,6 +156,13 @@ fn errors_name_the_element_its_line_and_what_helps() {
             "ascending",
         ),
         ("<g><animateTransform dur='1'/></g>", "g", "no values", "from and to"),
+        (
+            "<line x2='1'><animate attributeName='x1' values='0;1' dur='1'/></line>",
+            "line",
+            "<animate>",
+            "animateTransform",
+        ),
+        ("<g style='transform: rotate(9deg)'/>", "g", "style", "attribute"),
         (
             "<g><animateTransform values='0 0;1 0' dur='1' calcMode='spline'/></g>",
             "g",

@@ -281,12 +281,13 @@ impl<'a> Drawing<'a> {
     /// Seconds from the solution to the pixels.
     fn draw(&mut self, session: &Session, time_s: f64) -> Result<f64, Failure> {
         let view = self.camera.at(&self.clip.scene, time_s).map_err(Failure::new)?;
-        let automatic = || Exposure::automatic(&session.snapshot(), &view);
+        let flags = self.flags;
+        let automatic = || Exposure::automatic(&clip::snapshot(session, flags), &view);
         let exposure = *self.exposure.get_or_insert_with(automatic);
         let shading = self.flags.shading.unwrap_or(self.clip.shading);
         let settings = clip::picture_settings(self.flags, shading, exposure);
         let started = now();
-        let image = picture::render(&session.snapshot(), &view, &settings);
+        let image = picture::render(&clip::snapshot(session, flags), &view, &settings);
         let seconds = started.elapsed().as_secs_f64();
         drop(image);
         Ok(seconds)

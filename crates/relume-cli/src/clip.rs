@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use indicatif::HumanBytes;
 use relume::scene::Scene;
-use relume::session::{Options, Oracle, Session, SessionError};
+use relume::session::{Options, Oracle, Session, SessionError, Snapshot};
 use relume_picture::picture::{self, Exposure, Settings};
 
 use crate::args::{
@@ -177,6 +177,11 @@ pub(crate) fn step_failure(error: SessionError, kept: &str) -> Failure {
         other if kept.is_empty() => Failure::new(other),
         other => Failure::new(other).help(kept),
     }
+}
+
+/// The solution as pictures are to show it.
+pub(crate) fn snapshot(session: &Session, flags: &PictureFlags) -> Snapshot {
+    if flags.reconstruct { session.reconstruction() } else { session.snapshot() }
 }
 
 /// How a picture is drawn.

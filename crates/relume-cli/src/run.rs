@@ -330,9 +330,8 @@ impl Run<'_> {
     }
 
     fn draw(&mut self, frame: u32, path: &Path) -> Result<(), Failure> {
-        let reconstruct = self.job.picture.as_ref().is_some_and(|(_, flags)| flags.reconstruct);
-        let snapshot =
-            if reconstruct { self.session.reconstruction() } else { self.session.snapshot() };
+        let Some((_, flags)) = &self.job.picture else { return Ok(()) };
+        let snapshot = clip::snapshot(&self.session, flags);
         if self.exposure_is_open() {
             self.choose_exposure(frame, &snapshot)?;
         }
@@ -382,7 +381,9 @@ impl Run<'_> {
         session
             .step(frame, frames::time_of(frame, fps))
             .map_err(|error| self.session_failure(error))?;
-        self.choose_exposure(frame, &session.snapshot())
+        let Some((_, flags)) = &self.job.picture else { return Ok(()) };
+        let snapshot = clip::snapshot(&session, flags);
+        self.choose_exposure(frame, &snapshot)
     }
 
     fn exposure_is_open(&self) -> bool {

@@ -64,12 +64,21 @@ fn a_demonstration_writes_scene_pictures_and_report() {
 
 #[test]
 fn parts_of_a_clip_match_the_whole() {
+    part_matches_whole(&[]);
+}
+
+#[test]
+fn parts_of_a_reconstructed_clip_match_the_whole() {
+    part_matches_whole(&["--reconstruct"]);
+}
+
+fn part_matches_whole(how: &[&str]) {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
     let (whole, part) = (path("whole"), path("part"));
     // From scratch, so that radiosities are the same to the last bit; else they agree within the
     // solver's residual, and a few pixels differ by one level.
-    let scratch = ["--update", "scratch"];
+    let scratch = [&["--update", "scratch"], how].concat();
     let demo = ["demo", "room", "-o", &whole, "--frames", "0-6x3"];
     succeeded(&relume(&[&demo[..], &scratch].concat()));
     let scene = format!("{whole}/room.glb");

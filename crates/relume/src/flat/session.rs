@@ -215,7 +215,7 @@ impl FlatSession {
             true => Ahead::default(),
             false => Ahead::new(self.options.update, &*self.scene, clocked, times_s, false),
         };
-        let ahead_of_all = ahead.lookahead.is_some();
+        let extrapolates = ahead.lookahead.is_some();
         report.seconds.predict = clock.lap();
         let mut placed = FlatPlaced {
             scene: &self.scene,
@@ -242,7 +242,7 @@ impl FlatSession {
             solved.radiosity = Radiosity::new(&lit);
         } else {
             let residual = self.options.residual;
-            let stop = match ahead_of_all {
+            let stop = match extrapolates {
                 // Extrapolated links may feed each other.
                 true => Stop::Bounded { residual, mean_w_m2: 1.1 * self.most_mean_w_m2() },
                 false => Stop::Residual(residual),

@@ -269,7 +269,7 @@ impl RadiosityGap {
 }
 
 /// Area-weighted mean over all surfaces and channels, W/m2.
-fn mean_radiosity(solved: &impl Solution) -> f64 {
+pub(super) fn mean_radiosity(solved: &impl Solution) -> f64 {
     let (mut flux, mut area) = (0.0, 0.0);
     for &facet in solved.facets() {
         let a = solved.area_m2(facet);

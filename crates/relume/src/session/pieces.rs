@@ -54,7 +54,7 @@ struct Look {
     is_clear: bool,
 }
 
-/// (sum of the radii / distance)^2 above which two fragments are not points.
+/// (sum of the radii / distance)^2 above which two pieces are not points.
 const POINTS: f64 = 0.01;
 
 /// Occluding polygons up to which pieces of partly hidden links are looked at by clipping.
@@ -70,7 +70,7 @@ const BESIDE: f64 = 1.01;
 /// How far apart in their order pieces are asked whether they are side by side.
 const AROUND: usize = 32;
 
-/// Spread of visibility that four points which agree may have overlooked.
+/// Spread of visibility that pieces side by side which agree may have overlooked.
 const UNSEEN: f64 = 0.05;
 
 /// The same where what blocks is nearer than this many radii of the piece.

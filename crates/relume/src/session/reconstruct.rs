@@ -11,6 +11,7 @@ use crate::element::{ElementId, Forest, Kind, Shape};
 use crate::pair::{Gradients, Link};
 use crate::solver::Surfaces;
 
+use super::compare::mean_radiosity;
 use super::pieces::Sharing;
 use super::surfaces::LitForest;
 use super::{Session, Solved};
@@ -42,7 +43,7 @@ pub(super) fn corrections(session: &Session, solved: &Solved) -> Vec<[f32; 3]> {
         solved,
         sharing: Sharing::new(session, solved),
         leaves: Leaves::of(forest),
-        dim_w_m2: DIM * session.options.tolerance * mean_radiosity(solved),
+        dim_w_m2: DIM * session.options.tolerance * mean_radiosity(session),
     };
     let links: Vec<Link> = solved.tree.links().collect();
     let of_links = |links: &[Link]| {
@@ -101,18 +102,6 @@ fn push(forest: &Forest, id: ElementId, values: &mut [[f32; 3]]) {
         add(&mut values[child as usize], own, 1.0);
         push(forest, ElementId(child), values);
     }
-}
-
-/// Over the area of all facets, the brightest channel.
-fn mean_radiosity(solved: &Solved) -> f64 {
-    let (mut sum, mut area) = (0.0, 0.0);
-    for &facet in solved.forest.facets() {
-        let a = solved.forest.area_m2(facet);
-        let b = solved.radiosity.linear(facet.0).mean;
-        sum += a * f64::from(b.iter().fold(0.0_f32, |m, b| m.max(*b)));
-        area += a;
-    }
-    if area > 0.0 { sum / area } else { 0.0 }
 }
 
 /// The leaves of a forest in depth-first order, so that those below an element are side by side.

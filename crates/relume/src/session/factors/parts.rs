@@ -10,9 +10,9 @@ use crate::geometry::shaft_meets_box;
 use crate::pair::Link;
 use crate::scene::{BodyId, Joined, Part, Scene};
 
-use super::fragments::{Fragments, Spread};
 use crate::session::pieces::Sharing;
 
+use super::fragments::{Fragments, Spread};
 use super::sum::{Fixed, Sign, Upper, mirrored, plus};
 use super::{Factors, Grouping, Session, Solved, areas};
 
@@ -55,11 +55,6 @@ impl PartFactors {
         assert_eq!(grouping.of_patch.len(), scene.patches.len());
         let (scene, parts) = (Arc::clone(scene), joined.parts.clone());
         PartFactors { scene, parts, grouping, resting: None }
-    }
-
-    /// The groups.
-    pub fn grouping(&self) -> &Grouping {
-        &self.grouping
     }
 
     /// Form factors at the present instant of the session; the same, bit for bit, whatever came before.

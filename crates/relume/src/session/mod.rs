@@ -214,7 +214,7 @@ impl Session {
     /// Before the first [`Session::step`].
     pub fn snapshot(&self) -> Snapshot {
         let solved = self.solved.as_ref().expect("a step comes before a snapshot");
-        snapshot::take(&self.scene, solved, None)
+        snapshot::take(&self.scene, solved, &solved.radiosity)
     }
 
     /// The present solution with the irradiance of every leaf found anew from the links above it: along
@@ -227,7 +227,7 @@ impl Session {
     /// Before the first [`Session::step`].
     pub fn reconstruction(&self) -> Snapshot {
         let solved = self.solved.as_ref().expect("a step comes before a snapshot");
-        snapshot::take(&self.scene, solved, Some(&reconstruct::corrections(self, solved)))
+        snapshot::take(&self.scene, solved, &reconstruct::solve(self, solved))
     }
 
     /// The pair tree of the present solution, with the forest its elements are in.

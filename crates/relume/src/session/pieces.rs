@@ -8,7 +8,9 @@ use glam::DVec3;
 use crate::element::{ElementId, Forest, Shape, WorldElement, WorldPatch, WorldView};
 use crate::pair::Link;
 use crate::scene::{BodyId, PatchId};
-use crate::transport::{Looker, Meeting, Shaft, Simd, exact_visibility, exchange, meeting};
+use crate::transport::{
+    Exchange, Looker, Meeting, Shaft, Simd, exact_visibility, exchange, exchange_of_points, meeting,
+};
 
 use super::{Session, Solved};
 
@@ -111,15 +113,42 @@ impl<'a> Sharing<'a> {
     /// Exchange area past occluders of each pair of pieces of both ends, m2, the pieces of the second
     /// end running fastest; an end in one piece is whole. `None` where they exchange nothing.
     pub(super) fn shares(&self, link: &Link, (a, b): (&[Shape], &[Shape])) -> Option<Vec<f64>> {
+        self.shares_that_vary(link, (a, b)).map(|(shares, _)| shares)
+    }
+
+    /// The same, and how each varies over its two pieces without occlusion.
+    pub(super) fn shares_that_vary(
+        &self,
+        link: &Link,
+        (a, b): (&[Shape], &[Shape]),
+    ) -> Option<(Vec<f64>, Vec<Exchange>)> {
         let cut = self.cut(link, (a, b));
-        let mut shares = self.unoccluded(&cut, f64::from(link.carried.exchange_area_m2))?;
+        let exchanges = self.exchanges(&cut);
+        let sum: f64 = exchanges.iter().map(|x| x.area_m2).sum();
+        if sum <= 0.0 {
+            return None;
+        }
+        let whole = f64::from(link.carried.exchange_area_m2);
+        let mut shares: Vec<f64> = exchanges.iter().map(|x| x.area_m2 * whole / sum).collect();
         // Where a link seems to be clear or hidden, some of its pieces may not be.
         let blockers = self.blockers(&cut);
         if !blockers.is_empty() {
             let v = f64::from(link.carried.visibility) / 65_535.0;
             self.hide(&cut, v, &blockers, &mut shares);
         }
-        Some(shares)
+        Some((shares, exchanges))
+    }
+
+    /// Visibility of one end of a link from the whole of the other, looked at as closely as pieces are.
+    pub(super) fn visibility_from(&self, link: &Link, looker: Looker) -> Option<f64> {
+        let whole = [link.a, link.b].map(|id| [self.forest.shape(id)]);
+        let cut = self.cut(link, (&whole[0], &whole[1]));
+        let blockers = self.blockers(&cut);
+        let ends = (&cut.ends.0.whole, &cut.ends.1.whole);
+        let from = if looker == Looker::B { ends.1 } else { ends.0 };
+        let look = |_: &Place, points: u32| self.look(&cut, ends, (looker, points), &blockers);
+        let all = |_| f64::from(link.carried.exchange_area_m2);
+        Some(self.seen_from(&[*from], &all, &look)?[0])
     }
 
     fn cut(&self, link: &Link, (a, b): (&[Shape], &[Shape])) -> Cut {
@@ -141,15 +170,11 @@ impl<'a> Sharing<'a> {
         Cut { ends: (end(link.a, a, on_a), end(link.b, b, on_b)), body, patches }
     }
 
-    /// Exchange area of each pair of pieces without occlusion, m2: as the kernel falls on them, with
-    /// the link's as the sum.
-    fn unoccluded(&self, cut: &Cut, exchange_area_m2: f64) -> Option<Vec<f64>> {
+    /// Exchange of each pair of pieces without occlusion.
+    fn exchanges(&self, cut: &Cut) -> Vec<Exchange> {
         let (one, other) = (&cut.ends.0.pieces, &cut.ends.1.pieces);
         let pairs = one.iter().flat_map(|p| other.iter().map(move |q| (&p.own, &q.own)));
-        let mut shares: Vec<f64> = pairs.map(|(p, q)| self.exchange(p, q)).collect();
-        let sum: f64 = shares.iter().sum();
-        shares.iter_mut().for_each(|share| *share *= exchange_area_m2 / sum);
-        (sum > 0.0).then_some(shares)
+        pairs.map(|(p, q)| self.exchange(p, q)).collect()
     }
 
     /// Takes away from the shares of pieces what occluders hide: each piece is looked at with the
@@ -159,31 +184,23 @@ impl<'a> Sharing<'a> {
         let columns = other.pieces.len();
         let of_row = |k: usize| shares[k * columns..][..columns].iter().sum::<f64>();
         let of_column = |k: usize| shares.iter().skip(k).step_by(columns).sum::<f64>();
-        let look = |ends: (&Place, &Place), looker: Looker, points: u32| {
-            let shaft = self.shaft(cut, ends);
-            let blockers = shaft.those_that_block(blockers);
-            let v = exact_visibility(self.simd, &shaft, &blockers, (looker, points), CLIPPED_MAX)?;
-            let from = match looker {
-                Looker::B => &ends.1.world,
-                _ => &ends.0.world,
-            };
-            let distance = |&patch: &PatchId| {
-                self.view.fixed_box(self.forest.patch_root(patch)).distance(&from.bounds)
-            };
-            let is_near = blockers.iter().any(|patch| distance(patch) < NEAR * from.radius);
-            let from = (from.centre, from.radius);
-            Some(Look { value: v.value, from, is_near, is_clear: blockers.is_empty() })
+        let look = |looker: Looker, points: u32, ends: (&Place, &Place)| {
+            self.look(cut, ends, (looker, points), blockers)
         };
-        let a_sees = self.seen_from(&one.pieces, &of_row, &|p, points| {
-            look((p, &other.whole), Looker::A, points)
+        // An end in one piece sees what the pieces of the other see together.
+        let a_sees = (one.pieces.len() > 1).then(|| {
+            let look = |p: &Place, points: u32| look(Looker::A, points, (p, &other.whole));
+            self.seen_from(&one.pieces, &of_row, &look)
         });
-        let b_sees = self.seen_from(&other.pieces, &of_column, &|q, points| {
-            look((&one.whole, q), Looker::B, points)
+        let b_sees = (other.pieces.len() > 1).then(|| {
+            let look = |q: &Place, points: u32| look(Looker::B, points, (&one.whole, q));
+            self.seen_from(&other.pieces, &of_column, &look)
         });
-        let (Some(a_sees), Some(b_sees)) = (a_sees, b_sees) else {
+        if matches!(a_sees, Some(None)) || matches!(b_sees, Some(None)) {
             // Too many polygons to clip by.
             return shares.iter_mut().for_each(|share| *share *= v);
-        };
+        }
+        let (a_sees, b_sees) = (a_sees.flatten(), b_sees.flatten());
         let wanted = |sees: &Vec<f64>, of: &dyn Fn(usize) -> f64| -> Vec<f64> {
             sees.iter().enumerate().map(|(k, v)| v * of(k)).collect()
         };
@@ -240,18 +257,36 @@ impl<'a> Sharing<'a> {
         blockers
     }
 
-    /// Visibility of the other end from each piece of one; `Some(None)` where there is only one piece,
-    /// `None` where it is not to be had.
-    #[allow(clippy::option_option)]
+    /// What a piece of one end sees of a piece of the other; `None` with too many polygons to clip by.
+    fn look(
+        &self,
+        cut: &Cut,
+        ends: (&Place, &Place),
+        (looker, points): (Looker, u32),
+        blockers: &[PatchId],
+    ) -> Option<Look> {
+        let shaft = self.shaft(cut, ends);
+        let blockers = shaft.those_that_block(blockers);
+        let v = exact_visibility(self.simd, &shaft, &blockers, (looker, points), CLIPPED_MAX)?;
+        let from = match looker {
+            Looker::B => &ends.1.world,
+            _ => &ends.0.world,
+        };
+        let distance = |&patch: &PatchId| {
+            self.view.fixed_box(self.forest.patch_root(patch)).distance(&from.bounds)
+        };
+        let is_near = blockers.iter().any(|patch| distance(patch) < NEAR * from.radius);
+        let from = (from.centre, from.radius);
+        Some(Look { value: v.value, from, is_near, is_clear: blockers.is_empty() })
+    }
+
+    /// Visibility of the other end from each piece of one; `None` where it is not to be had.
     fn seen_from(
         &self,
         pieces: &[Place],
         exchange_area_m2: &dyn Fn(usize) -> f64,
         look: &dyn Fn(&Place, u32) -> Option<Look>,
-    ) -> Option<Option<Vec<f64>>> {
-        if pieces.len() == 1 {
-            return Some(None);
-        }
+    ) -> Option<Vec<f64>> {
         let looks: Vec<Look> = pieces.iter().map(|place| look(place, 0)).collect::<Option<_>>()?;
         let mut out = Vec::with_capacity(pieces.len());
         for (k, (first, place)) in looks.iter().zip(pieces).enumerate() {
@@ -274,7 +309,7 @@ impl<'a> Sharing<'a> {
                 _ => look(place, 8)?.value,
             });
         }
-        Some(Some(out))
+        Some(out)
     }
 
     fn shaft<'b>(&'b self, cut: &Cut, (a, b): (&'b Place, &'b Place)) -> Shaft<'b> {
@@ -283,18 +318,16 @@ impl<'a> Sharing<'a> {
         Shaft { forest: self.forest, view: self.view, a, b, own, patches: cut.patches }
     }
 
-    /// Without occlusion, m2.
-    fn exchange(&self, a: &WorldElement, b: &WorldElement) -> f64 {
+    /// Without occlusion.
+    fn exchange(&self, a: &WorldElement, b: &WorldElement) -> Exchange {
         let d = b.centre - a.centre;
-        let distance2 = d.length_squared();
         let reach = a.radius + b.radius;
-        if reach * reach < POINTS * distance2 {
-            let cosines = d.dot(a.plane.normal).max(0.0) * (-d.dot(b.plane.normal)).max(0.0);
-            return a.area * b.area * cosines / (std::f64::consts::PI * distance2 * distance2);
+        if reach * reach < POINTS * d.length_squared() {
+            return exchange_of_points(a, b);
         }
         match meeting(a, b) {
-            Meeting::Away => 0.0,
-            met => exchange(self.simd, a, b, met).area_m2,
+            Meeting::Away => Exchange::default(),
+            met => exchange(self.simd, a, b, met),
         }
     }
 }

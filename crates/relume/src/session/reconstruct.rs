@@ -1,19 +1,20 @@
-//! What links bring to every leaf, in place of a line through the whole end that they have.
+//! The solution read anew, every leaf with links of its own.
 //!
 //! A leaf below the end of a link inherits a straight line from it. Along edges between walls, and across the
 //! edges of shadows, the truth is steep and bent. Here each link is shared out among the leaves below its ends,
-//! as the kernel falls on them and past what hides it from each. The solution stays as it is: this is
-//! how it is read.
+//! as the kernel falls on them and past what hides it from each, and the solution settles with those links.
+//! The session's own stays as it is.
 
 use rayon::prelude::*;
 
 use crate::element::{ElementId, Forest, Kind, Shape};
-use crate::pair::{Gradients, Link};
-use crate::solver::Surfaces;
+use crate::pair::{self, Carried, Gradients};
+use crate::solver::{Dirty, Link, LinksBuilder, Radiosity, Stop};
+use crate::transport::{Looker, Meeting, meeting};
 
 use super::compare::mean_radiosity;
 use super::pieces::Sharing;
-use super::surfaces::LitForest;
+use super::surfaces::{LitForest, directions};
 use super::{Session, Solved};
 
 /// Links whose line is off by less than this share of the tolerance times the mean radiosity are
@@ -23,85 +24,33 @@ const DIM: f64 = 0.001;
 /// Links that one task looks at.
 const LINKS_AT_ONCE: usize = 512;
 
-/// Times that what corrections change is passed on to those who see it: reflected twice and more it is
-/// below what links err by.
-const PASSES: usize = 3;
+/// Sweeps over everything once leaves have links of their own. What the first of them changes is
+/// below the tolerance, and each passes on less than half of it.
+const SWEEPS: u32 = 8;
 
-/// What a leaf receives of a source beyond its line: irradiance for each unit of radiosity.
-struct More {
-    leaf: u32,
-    source: u32,
-    share: f32,
-}
-
-/// By how much the irradiance of every leaf differs from what it inherits, W/m2; by element, 0 for all
-/// that are no leaves.
-pub(super) fn corrections(session: &Session, solved: &Solved) -> Vec<[f32; 3]> {
+/// The solution with the links of leaves in place of those of their ancestors.
+pub(super) fn solve(session: &Session, solved: &Solved) -> Radiosity {
     let forest = &solved.forest;
-    let surfaces = LitForest::new(&session.scene, forest);
     let at = Reconstruction {
         solved,
         sharing: Sharing::new(session, solved),
         leaves: Leaves::of(forest),
         dim_w_m2: DIM * session.options.tolerance * mean_radiosity(session),
     };
-    let links: Vec<Link> = solved.tree.links().collect();
-    let of_links = |links: &[Link]| {
+    let links: Vec<pair::Link> = solved.tree.links().collect();
+    let of_links = |links: &[pair::Link]| {
         let mut found = Vec::new();
         links.iter().for_each(|link| at.add_link(link, &mut found));
         found
     };
-    let found: Vec<Vec<More>> = links.par_chunks(LINKS_AT_ONCE).map(of_links).collect();
-    let mut out = vec![[0.0; 3]; forest.len()];
-    let mut last: Vec<[f32; 3]> =
-        (0..forest.len() as u32).map(|id| solved.radiosity.linear(id).mean).collect();
-    for pass in 0..=PASSES {
-        let mut arrives = vec![[0.0; 3]; forest.len()];
-        if pass > 0 {
-            at.along_lines(&links, &last, &mut arrives);
-        }
-        for more in found.iter().flatten() {
-            add(&mut arrives[more.leaf as usize], last[more.source as usize], more.share);
-        }
-        // Only leaves count: what reached the others has been handed down.
-        last = vec![[0.0; 3]; forest.len()];
-        for &leaf in &at.leaves.ids {
-            let rho = surfaces.lit(forest.fixed(ElementId(leaf)).0).reflectance;
-            let more = arrives[leaf as usize];
-            add(&mut out[leaf as usize], more, 1.0);
-            last[leaf as usize] = std::array::from_fn(|c| rho[c] * more[c]);
-        }
-        forest.facets().iter().for_each(|&facet| pull(forest, facet, &mut last));
-    }
+    let found: Vec<Vec<(u32, Link)>> = links.par_chunks(LINKS_AT_ONCE).map(of_links).collect();
+    let mut builder = LinksBuilder::new(forest.len());
+    found.iter().flatten().for_each(|(receiver, _)| builder.count(*receiver));
+    let links = builder.fill(|add| found.iter().flatten().for_each(|(to, link)| add(*to, *link)));
+    let mut out = solved.radiosity.clone();
+    let surfaces = LitForest::new(&session.scene, forest);
+    out.solve(&surfaces, &links, Dirty::All, Stop::Sweeps(SWEEPS));
     out
-}
-
-fn add(to: &mut [f32; 3], what: [f32; 3], times: f32) {
-    (0..3).for_each(|c| to[c] += times * what[c]);
-}
-
-/// Gives every element the mean of the leaves below it.
-fn pull(forest: &Forest, id: ElementId, values: &mut [[f32; 3]]) {
-    let children = forest.children(id);
-    if children.is_empty() {
-        return;
-    }
-    let mut sum = [0.0; 3];
-    for child in children {
-        pull(forest, ElementId(child), values);
-        add(&mut sum, values[child as usize], forest.area_m2(ElementId(child)) as f32);
-    }
-    let area = forest.area_m2(id) as f32;
-    values[id.0 as usize] = sum.map(|v| v / area);
-}
-
-/// Hands down what every element receives to its leaves.
-fn push(forest: &Forest, id: ElementId, values: &mut [[f32; 3]]) {
-    let own = values[id.0 as usize];
-    for child in forest.children(id) {
-        add(&mut values[child as usize], own, 1.0);
-        push(forest, ElementId(child), values);
-    }
 }
 
 /// The leaves of a forest in depth-first order, so that those below an element are side by side.
@@ -146,72 +95,98 @@ struct Reconstruction<'a> {
 }
 
 impl Reconstruction<'_> {
-    fn is_between_elements(&self, link: &Link) -> bool {
-        let is_element = |id| self.solved.forest.kind(id) == Kind::Element;
-        link.carried.visibility > 0 && is_element(link.a) && is_element(link.b)
+    fn add_link(&self, link: &pair::Link, found: &mut Vec<(u32, Link)>) {
+        let shared = [(link.a, link.b), (link.b, link.a)].map(|(receiver, source)| {
+            self.share_out(link, receiver, source, found).then_some(receiver.0)
+        });
+        let is_shared = |receiver: u32| shared.contains(&Some(receiver));
+        found.extend(directions(&self.solved.forest, link).filter(|(to, _)| !is_shared(*to)));
     }
 
-    /// What links carry of a radiosity by element, without gradients; at the leaves.
-    fn along_lines(&self, links: &[Link], radiosity: &[[f32; 3]], arrives: &mut [[f32; 3]]) {
-        let forest = &self.solved.forest;
-        for link in links.iter().filter(|link| self.is_between_elements(link)) {
-            let whole = link.carried.exchange_area_past_occluders_m2();
-            for (receiver, source) in [(link.a, link.b), (link.b, link.a)] {
-                let b = radiosity[source.0 as usize];
-                add(&mut arrives[receiver.0 as usize], b, whole / forest.area_m2(receiver) as f32);
-            }
-        }
-        forest.facets().iter().for_each(|&facet| push(forest, facet, arrives));
-    }
-
-    fn add_link(&self, link: &Link, found: &mut Vec<More>) {
-        if self.is_between_elements(link) {
-            let g = link.carried.gradients;
-            self.add(link, (link.a, g.over_a), link.b, found);
-            self.add(link, (link.b, g.over_b), link.a, found);
-        }
-    }
-
-    /// What one end receives.
-    fn add(
+    /// Links of the leaves below a receiver in place of its own; false where its own will do.
+    fn share_out(
         &self,
-        link: &Link,
-        (receiver, over): (ElementId, [i8; 2]),
+        link: &pair::Link,
+        receiver: ElementId,
         source: ElementId,
-        found: &mut Vec<More>,
-    ) {
+        found: &mut Vec<(u32, Link)>,
+    ) -> bool {
         let forest = &self.solved.forest;
+        if forest.kind(receiver) != Kind::Element || forest.kind(source) != Kind::Element {
+            return false;
+        }
+        let sends = self.solved.radiosity.radiosity(source.0);
+        let brightest = f64::from(sends.iter().fold(0.0_f32, |m, b| m.max(*b)));
+        if brightest * self.line_error(link, receiver) <= self.dim_w_m2 {
+            return false;
+        }
         let (ids, shapes) = self.leaves.below(receiver);
         if ids.len() < 2 {
-            return;
-        }
-        let sends = self.solved.radiosity.linear(source.0).mean;
-        let brightest = f64::from(sends.iter().fold(0.0_f32, |m, b| m.max(*b)));
-        let whole = f64::from(link.carried.exchange_area_past_occluders_m2());
-        let (place, area) = (forest.extent(receiver), forest.area_m2(receiver));
-        if brightest * whole / area * self.bend(link) <= self.dim_w_m2 {
-            return;
+            return self.look_again(link, receiver, source, found);
         }
         let other = [forest.shape(source)];
-        let ends = if receiver == link.a { (shapes, &other[..]) } else { (&other[..], shapes) };
-        let Some(shares) = self.sharing.shares(link, ends) else { return };
-        let slope = over.map(|step| f64::from(Gradients::value(step)) / place.radius);
-        for ((leaf, shape), share) in ids.iter().zip(shapes).zip(shares) {
-            let d = shape.centroid() - place.centroid;
-            let line = whole / area * (1.0 + slope[0] * d.x + slope[1] * d.y);
-            let share = (share / shape.area() - line) as f32;
-            found.push(More { leaf: *leaf, source: source.0, share });
+        let is_a = receiver == link.a;
+        let ends = if is_a { (shapes, &other[..]) } else { (&other[..], shapes) };
+        let Some((shares, exchanges)) = self.sharing.shares_that_vary(link, ends) else {
+            return false;
+        };
+        let radius = forest.extent(source).radius;
+        for (((leaf, shape), share), x) in ids.iter().zip(shapes).zip(shares).zip(exchanges) {
+            if share <= 0.0 {
+                continue;
+            }
+            let (own, others) = if is_a { (x.over_a, x.over_b) } else { (x.over_b, x.over_a) };
+            let size = forest.extent(ElementId(*leaf)).radius;
+            let g = Gradients::new((own.gradient, size), (others.gradient, radius));
+            let coupling = (share / shape.area()) as f32;
+            let (over_receiver, over_source) = (g.over_a, g.over_b);
+            found.push((*leaf, Link { source: source.0, coupling, over_receiver, over_source }));
         }
+        true
     }
 
-    /// How far a line may be off, relative to the mean: without occlusion the square of size over
-    /// distance.
-    fn bend(&self, link: &Link) -> f64 {
-        if link.carried.visibility < u16::MAX {
-            return 1.0;
+    /// A link of a leaf with what the leaf itself sees; false where that is known.
+    fn look_again(
+        &self,
+        link: &pair::Link,
+        receiver: ElementId,
+        source: ElementId,
+        found: &mut Vec<(u32, Link)>,
+    ) -> bool {
+        let Carried { exchange_area_m2, visibility, gradients } = link.carried;
+        if visibility == u16::MAX {
+            return false;
         }
+        let (looker, over_receiver, over_source) = match receiver == link.a {
+            true => (Looker::A, gradients.over_a, gradients.over_b),
+            false => (Looker::B, gradients.over_b, gradients.over_a),
+        };
+        let Some(v) = self.sharing.visibility_from(link, looker) else { return false };
+        let area_m2 = self.solved.forest.area_m2(receiver);
+        let coupling = (v * f64::from(exchange_area_m2) / area_m2) as f32;
+        if coupling > 0.0 {
+            let source = source.0;
+            found.push((receiver.0, Link { source, coupling, over_receiver, over_source }));
+        }
+        true
+    }
+
+    /// How far a link's line may be off over a receiver, as a form factor: without occlusion the square
+    /// of size over distance, relative.
+    fn line_error(&self, link: &pair::Link, receiver: ElementId) -> f64 {
         let (a, b) = self.sharing.whole(link);
-        let (size, distance2) = (a.radius.max(b.radius), (b.centre - a.centre).length_squared());
-        (size * size / distance2).min(1.0)
+        let distance2 = (b.centre - a.centre).length_squared();
+        if meeting(&a, &b) == Meeting::Cut {
+            // The part that is in front of the other may be small: what a point there sees at most.
+            let source = if receiver == link.a { &b } else { &a };
+            return (source.area / (std::f64::consts::PI * distance2)).min(1.0);
+        }
+        let factor =
+            f64::from(link.carried.exchange_area_m2) / self.solved.forest.area_m2(receiver);
+        if link.carried.visibility < u16::MAX {
+            return factor;
+        }
+        let size = a.radius.max(b.radius);
+        factor * (size * size / distance2).min(1.0)
     }
 }

@@ -8,7 +8,7 @@ use crate::element::{ElementId, Kind};
 use crate::geometry::Pose;
 use crate::scene::{PatchId, Scene};
 
-use crate::solver::Surfaces;
+use crate::solver::Radiosity;
 
 use super::Solved;
 use super::surfaces::LitForest;
@@ -99,8 +99,8 @@ impl Snapshot {
     }
 }
 
-/// The leaves of a solved forest; `more` by element is added to their irradiance.
-pub(super) fn take(scene: &Arc<Scene>, solved: &Solved, more: Option<&Vec<[f32; 3]>>) -> Snapshot {
+/// The leaves of a solved forest with a solution over it.
+pub(super) fn take(scene: &Arc<Scene>, solved: &Solved, radiosity: &Radiosity) -> Snapshot {
     let forest = &solved.forest;
     let surfaces = LitForest::new(scene, forest);
     let mut leaves = Vec::with_capacity(forest.counts().leaves as usize);
@@ -115,18 +115,12 @@ pub(super) fn take(scene: &Arc<Scene>, solved: &Solved, more: Option<&Vec<[f32; 
                 stack.extend(forest.children(id).rev().map(ElementId));
                 continue;
             }
-            let rho = surfaces.lit(id.0).reflectance;
-            solved.radiosity.irradiances(&surfaces, id.0, &mut |id, h| {
-                let more = more.map_or([0.0; 3], |more| more[id as usize]);
-                let before = h.mean.map(|x| x.max(0.0));
-                let irradiance = std::array::from_fn(|c| (h.mean[c] + more[c]).max(0.0));
-                let radiosity = solved.radiosity.radiosity(id);
-                let brighter = |c: usize| radiosity[c] + rho[c] * (irradiance[c] - before[c]);
+            radiosity.irradiances(&surfaces, id.0, &mut |id, h| {
                 leaves.push(Leaf {
                     corners: forest.shape(ElementId(id)).corners,
-                    irradiance,
+                    irradiance: h.mean.map(|x| x.max(0.0)),
                     irradiance_gradient: h.gradient,
-                    radiosity: std::array::from_fn(brighter),
+                    radiosity: radiosity.radiosity(id),
                 });
             });
         }

@@ -128,7 +128,10 @@ impl Receivers for Forest {
 
 /// Both directions of a link: (receiver, link), for the ends that receive. Links of visibility 0
 /// carry nothing.
-fn directions(forest: &impl Receivers, link: &pair::Link) -> impl Iterator<Item = (u32, Link)> {
+pub(super) fn directions(
+    forest: &impl Receivers,
+    link: &pair::Link,
+) -> impl Iterator<Item = (u32, Link)> {
     let carried = link.carried;
     let exchange = carried.exchange_area_past_occluders_m2();
     let g = carried.gradients;

@@ -35,7 +35,7 @@ pub struct Variation {
 }
 
 /// The exchange of a pair with how unevenly it falls on both ends.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Exchange {
     /// Exchange area without occlusion, m2.
     pub area_m2: f64,
@@ -88,6 +88,26 @@ pub fn exchange(simd: Simd, a: &WorldElement, b: &WorldElement, meeting: Meeting
         over_a: over(a, &grid.points.0, &grid.from_a),
         over_b: over(b, &grid.points.1, &grid.from_b),
     }
+}
+
+/// The same as if each element were a point, with the gradients that follow; no bends.
+///
+/// Error: the square of (sum of the radii / distance), relative.
+pub fn exchange_of_points(a: &WorldElement, b: &WorldElement) -> Exchange {
+    let d = b.centre - a.centre;
+    let r2 = d.length_squared();
+    let (up, down) = (d.dot(a.plane.normal), -d.dot(b.plane.normal));
+    if up <= 0.0 || down <= 0.0 {
+        return Exchange::default();
+    }
+    // K = up down / (pi r^4): its logarithm's gradient in the place of a; in that of b the opposite.
+    let rise = d * (4.0 / r2) - a.plane.normal / up + b.plane.normal / down;
+    let over = |e: &WorldElement, rise: DVec3| {
+        let gradient = DVec2::new(rise.dot(e.axes[0]), rise.dot(e.axes[1]));
+        Variation { gradient, ..Variation::default() }
+    };
+    let area_m2 = a.area * b.area * up * down / (std::f64::consts::PI * r2 * r2);
+    Exchange { area_m2, over_a: over(a, rise), over_b: over(b, -rise) }
 }
 
 /// A weighted linear least-squares fit over points of an element.
@@ -153,8 +173,7 @@ fn near_exchange(simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
         |e: &WorldElement, plane| ConvexPolygon::new(&e.corners[..e.len]).clipped(plane, slack);
     let (of_a, of_b) = (part(a, &b.plane), part(b, &a.plane));
     if of_a.corners().len() < 3 || of_b.corners().len() < 3 {
-        let none = Variation::default();
-        return Exchange { area_m2: 0.0, over_a: none, over_b: none };
+        return Exchange::default();
     }
     let (from_a, over_a) = integrate_polygon(simd, a, &of_a, of_b.corners());
     let (from_b, over_b) = integrate_polygon(simd, b, &of_b, of_a.corners());

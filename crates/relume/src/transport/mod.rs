@@ -10,7 +10,9 @@ mod segments;
 mod visibility;
 
 pub use clip::{FactorPast, Looker, form_factor_past, keep_in_front, visible_form_factor};
-pub use exchange::{Exchange, Meeting, Variation, exchange, light_at, light_exchange, meeting};
+pub use exchange::{
+    Exchange, Meeting, Variation, exchange, exchange_of_points, light_at, light_exchange, meeting,
+};
 pub use kernel::Simd;
 pub use point::form_factor_from_point;
 pub use segments::{SEGMENTS, SegmentBundle};

@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 use super::clusters::{Branch, binary_tree};
 use super::split::{Chart, Extent, Place, Shape};
 use crate::geometry::{Aabb, split_convex};
-use crate::scene::{BodyId, PatchId, Scene};
+use crate::scene::{BodyId, PatchId, Scene, Solid, Solids};
 
 /// Index of a node in a [`Forest`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -141,8 +141,8 @@ struct Fixed {
     patch_roots: Vec<ElementId>,
     body_roots: Vec<ElementId>,
     facets: Vec<ElementId>,
-    /// For each patch the convex solid whose face it is; `NONE` if it is none's.
-    solids: Vec<u32>,
+    /// The convex solids that patches are faces of.
+    solids: Solids,
 }
 
 /// Where elements went when the forest was put together: those that stayed keep their order.
@@ -186,7 +186,7 @@ impl Forest {
             fixed: Arc::new(Fixed {
                 patch_roots: vec![ElementId(NONE); scene.patches.len()],
                 body_roots: vec![ElementId(NONE); scene.bodies.len()],
-                solids: scene.solids().into_iter().map(|s| s.unwrap_or(NONE)).collect(),
+                solids: scene.solids(),
                 ..Fixed::default()
             }),
             vacant: [Vec::new(), Vec::new()],
@@ -526,8 +526,12 @@ impl Forest {
 
     /// The convex solid whose face a patch is, if it is one's.
     pub fn solid(&self, patch: PatchId) -> Option<u32> {
-        let solid = self.fixed.solids[patch.0 as usize];
-        (solid != NONE).then_some(solid)
+        self.fixed.solids.of_patch[patch.0 as usize]
+    }
+
+    /// A convex solid.
+    pub fn solid_shape(&self, solid: u32) -> &Solid {
+        &self.fixed.solids.list[solid as usize]
     }
 
     /// The cluster of a body.

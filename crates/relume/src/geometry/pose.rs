@@ -32,6 +32,11 @@ impl Pose {
         self.rotation.transpose() * (world - self.translation)
     }
 
+    /// The way back.
+    pub fn inverse(&self) -> Pose {
+        Pose { rotation: self.rotation.transpose(), translation: self.inverse_point(DVec3::ZERO) }
+    }
+
     /// Maps a world direction into the body's frame.
     pub fn inverse_direction(&self, world: DVec3) -> DVec3 {
         self.rotation.transpose() * world

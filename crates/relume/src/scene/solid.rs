@@ -10,6 +10,46 @@ use glam::DVec3;
 use super::weld::Weld;
 use super::{BodyId, Scene};
 
+/// A closed convex solid, in its body's frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solid {
+    /// What it is part of.
+    pub body: BodyId,
+    /// Its corners, metres.
+    pub corners: Vec<DVec3>,
+    /// Its faces: patches in one plane are one.
+    pub faces: Vec<SolidFace>,
+    /// Its edges: straight ones, between two faces.
+    pub edges: Vec<SolidEdge>,
+}
+
+/// A face of a [`Solid`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolidFace {
+    /// Outward unit normal.
+    pub normal: DVec3,
+    /// One of the solid's corners that lie on it.
+    pub corner: u32,
+}
+
+/// An edge of a [`Solid`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SolidEdge {
+    /// The corners it runs from and to.
+    pub ends: [u32; 2],
+    /// The faces about which it runs counter-clockwise and clockwise, seen from outside.
+    pub faces: [u32; 2],
+}
+
+/// The convex solids of a scene.
+#[derive(Clone, Debug, Default)]
+pub struct Solids {
+    /// For each patch the solid whose face it is, if it is one's.
+    pub of_patch: Vec<Option<u32>>,
+    /// The solids.
+    pub list: Vec<Solid>,
+}
+
 /// Corners closer together than this share of a body's coordinates are one, and this much a corner may
 /// lie in front of a face: a few roundings of 32-bit numbers.
 const WELDED: f64 = 1e-6;
@@ -18,21 +58,15 @@ const WELDED: f64 = 1e-6;
 const FACES_MAX: usize = 1_024;
 
 impl Scene {
-    /// For each patch the convex solid whose face it is, if it is one's: a closed, convex group of
-    /// one-sided patches of one body that look outwards and meet along whole sides.
-    pub fn solids(&self) -> Vec<Option<u32>> {
-        let mut of_patch = vec![None; self.patches.len()];
-        let mut next = 0;
-        for body in (0..self.bodies.len() as u32).map(BodyId) {
-            for faces in self.solids_of(body) {
-                faces.iter().for_each(|&patch| of_patch[patch as usize] = Some(next));
-                next += 1;
-            }
-        }
-        of_patch
+    /// Its convex solids: closed, convex groups of one-sided patches of one body that look outwards
+    /// and meet along whole sides.
+    pub fn solids(&self) -> Solids {
+        let mut out = Solids { of_patch: vec![None; self.patches.len()], list: Vec::new() };
+        (0..self.bodies.len() as u32).for_each(|body| self.add_solids(BodyId(body), &mut out));
+        out
     }
 
-    fn solids_of(&self, body: BodyId) -> Vec<Vec<u32>> {
+    fn add_solids(&self, body: BodyId, out: &mut Solids) {
         let one_sided = || self.patches_of(body).filter(|(_, patch)| patch.twin.is_none());
         let coordinates = |reach: f64, p: DVec3| reach.max(p.abs().max_element());
         let reach = one_sided().flat_map(|(_, p)| p.corners_in_body()).fold(0.0, coordinates);
@@ -42,20 +76,84 @@ impl Scene {
             Face { patch: id.0, corners, normal: patch.frame.normal, origin: patch.frame.origin }
         };
         let faces: Vec<Face> = one_sided().map(face).collect();
-        let groups = closed(&faces);
-        let is_convex = |group: &Vec<usize>| {
-            let mut corners: Vec<u32> =
-                group.iter().flat_map(|&f| faces[f].corners.iter().copied()).collect();
-            corners.sort_unstable();
-            corners.dedup();
-            group.iter().map(|&f| &faces[f]).all(|face| {
-                let above = |&c: &u32| (weld.points[c as usize] - face.origin).dot(face.normal);
-                corners.iter().all(|c| above(c) <= weld.tolerance)
-            })
-        };
-        let convex = groups.into_iter().filter(|g| g.len() <= FACES_MAX && is_convex(g));
-        convex.map(|group| group.into_iter().map(|f| faces[f].patch).collect()).collect()
+        for group in closed(&faces) {
+            let group: Vec<&Face> = group.into_iter().map(|f| &faces[f]).collect();
+            if group.len() <= FACES_MAX && is_convex(&group, &weld) {
+                let number = out.list.len() as u32;
+                group.iter().for_each(|f| out.of_patch[f.patch as usize] = Some(number));
+                out.list.push(solid(body, &group, &weld));
+            }
+        }
     }
+}
+
+fn is_convex(group: &[&Face], weld: &Weld) -> bool {
+    let mut corners: Vec<u32> = group.iter().flat_map(|f| f.corners.iter().copied()).collect();
+    corners.sort_unstable();
+    corners.dedup();
+    group.iter().all(|face| corners.iter().all(|&c| face.above(weld, c) <= weld.tolerance))
+}
+
+/// Cosine of the angle between normals up to which patches may be one face.
+const ALIKE: f64 = 1.0 - 1e-10;
+
+/// A closed convex group, with faces in one plane made one and edges on one line too.
+fn solid(body: BodyId, group: &[&Face], weld: &Weld) -> Solid {
+    let mut planes: Vec<&Face> = Vec::new();
+    let plane_of = |face: &Face, planes: &[&Face]| {
+        let is_same = |plane: &&Face| {
+            plane.normal.dot(face.normal) > ALIKE
+                && face.corners.iter().all(|&c| plane.above(weld, c).abs() <= weld.tolerance)
+        };
+        planes.iter().position(is_same)
+    };
+    let of_face: Vec<usize> = group
+        .iter()
+        .map(|face| {
+            plane_of(face, &planes).unwrap_or_else(|| {
+                planes.push(face);
+                planes.len() - 1
+            })
+        })
+        .collect();
+    let sides =
+        group.iter().zip(&of_face).flat_map(|(f, &plane)| f.sides().map(move |s| (s, plane)));
+    let left_of: BTreeMap<(u32, u32), usize> = sides.collect();
+    // Between two planes, what runs about the first counter-clockwise.
+    let mut runs: BTreeMap<[usize; 2], Vec<u32>> = BTreeMap::new();
+    for (&(start, end), &left) in &left_of {
+        let right = left_of[&(end, start)];
+        if left < right {
+            runs.entry([left, right]).or_default().extend([start, end]);
+        }
+    }
+    let mut used = Vec::new();
+    let mut number = |c: u32| match used.iter().position(|&u| u == c) {
+        Some(at) => at as u32,
+        None => {
+            used.push(c);
+            used.len() as u32 - 1
+        }
+    };
+    let mut edges = Vec::new();
+    for (faces, corners) in runs {
+        let at = |c: u32| weld.points[c as usize];
+        let along = at(corners[1]) - at(corners[0]);
+        let order =
+            |one: &&u32, other: &&u32| at(**one).dot(along).total_cmp(&at(**other).dot(along));
+        let ends = [corners.iter().min_by(order), corners.iter().max_by(order)];
+        let ends = ends.map(|c| number(*c.expect("a run has two ends")));
+        edges.push(SolidEdge { ends, faces: faces.map(|f| f as u32) });
+    }
+    let corner_of = |plane: usize| {
+        let edge = edges.iter().find(|e| e.faces.contains(&(plane as u32)));
+        edge.expect("faces have edges").ends[0]
+    };
+    let face =
+        |(k, plane): (usize, &&Face)| SolidFace { normal: plane.normal, corner: corner_of(k) };
+    let faces = planes.iter().enumerate().map(face).collect();
+    let corners = used.iter().map(|&c| weld.points[c as usize]).collect();
+    Solid { body, corners, faces, edges }
 }
 
 struct Face {
@@ -67,6 +165,11 @@ struct Face {
 }
 
 impl Face {
+    /// How far a corner is in front of it, metres.
+    fn above(&self, weld: &Weld, corner: u32) -> f64 {
+        (weld.points[corner as usize] - self.origin).dot(self.normal)
+    }
+
     fn sides(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
         let n = self.corners.len();
         (0..n).map(move |k| (self.corners[k], self.corners[(k + 1) % n]))
@@ -120,7 +223,7 @@ mod tests {
         let node = b.node("body", None, DVec3::new(0.1, 0.2, 0.3), DQuat::from_rotation_y(0.3));
         build(&mut b, node);
         let solids = b.build().unwrap().solids();
-        let mut names: Vec<u32> = solids.iter().flatten().copied().collect();
+        let mut names: Vec<u32> = solids.of_patch.iter().flatten().copied().collect();
         let faces = names.len();
         names.sort_unstable();
         names.dedup();

@@ -9,7 +9,7 @@ use crate::element::{ElementId, Forest, Shape, WorldElement, WorldPatch, WorldVi
 use crate::pair::Link;
 use crate::scene::{BodyId, PatchId};
 use crate::transport::{
-    Exchange, Looker, Meeting, Shaft, Simd, exact_visibility, exchange, exchange_of_points, meeting,
+    Exchange, Looker, Meeting, Shaft, Simd, exchange, exchange_of_points, lookout, meeting,
 };
 
 use super::{Session, Solved};
@@ -62,24 +62,31 @@ const POINTS: f64 = 0.01;
 /// Occluding polygons up to which pieces of partly hidden links are looked at by clipping.
 const CLIPPED_MAX: usize = 96;
 
-/// Form factor of a piece to the other end times the spread of visibility over the piece above
-/// which it is looked at from more points, as a share of the tolerance.
-const CLOSER: f64 = 2.5e-3;
+/// Form factor of a piece to the other end times the bend of visibility over the piece above which it
+/// is looked at from more points, as a share of the tolerance.
+const CLOSER: f64 = 7.5e-3;
 
 /// Pieces are side by side if their middles are closer than this share of their radii.
 const BESIDE: f64 = 1.01;
 
+/// Pieces lie opposite each other about a third if the sum of the ways to them is shorter than this share
+/// of one.
+const OPPOSITE: f64 = 0.1;
+
+/// Parts of a piece along each side that are looked from at most.
+const CELLS_MAX: f64 = 8.0;
+
 /// How far apart in their order pieces are asked whether they are side by side.
 const AROUND: usize = 32;
 
-/// Spread of visibility that pieces side by side which agree may have overlooked.
-const UNSEEN: f64 = 0.05;
+/// Bend of visibility that pieces side by side which agree may have overlooked.
+const UNSEEN: f64 = 0.3;
 
 /// The same where what blocks is nearer than this many radii of the piece.
 const NEAR: f64 = 4.0;
 
 /// See [`NEAR`].
-const UNSEEN_NEAR: f64 = 0.25;
+const UNSEEN_NEAR: f64 = 1.5;
 
 /// Steps in which shares are fitted to what every piece sees.
 const FITS: usize = 8;
@@ -139,16 +146,16 @@ impl<'a> Sharing<'a> {
         Some((shares, exchanges))
     }
 
-    /// Visibility of one end of a link from the whole of the other, looked at as closely as pieces are.
+    /// Visibility of one end of a link from the whole of the other, looked at as closely as pieces are;
+    /// `None` past too many polygons to clip by.
     pub(super) fn visibility_from(&self, link: &Link, looker: Looker) -> Option<f64> {
         let whole = [link.a, link.b].map(|id| [self.forest.shape(id)]);
         let cut = self.cut(link, (&whole[0], &whole[1]));
         let blockers = self.blockers(&cut);
-        let ends = (&cut.ends.0.whole, &cut.ends.1.whole);
-        let from = if looker == Looker::B { ends.1 } else { ends.0 };
-        let look = |_: &Place, points: u32| self.look(&cut, ends, (looker, points), &blockers);
+        let from = if looker == Looker::B { &cut.ends.1.whole } else { &cut.ends.0.whole };
         let all = |_| f64::from(link.carried.exchange_area_m2);
-        Some(self.seen_from(&[*from], &all, &look)?[0])
+        let see = || self.seen_from(&cut, looker, std::slice::from_ref(from), &blockers, &all)[0];
+        (blockers.len() <= CLIPPED_MAX).then(see)
     }
 
     fn cut(&self, link: &Link, (a, b): (&[Shape], &[Shape])) -> Cut {
@@ -184,23 +191,14 @@ impl<'a> Sharing<'a> {
         let columns = other.pieces.len();
         let of_row = |k: usize| shares[k * columns..][..columns].iter().sum::<f64>();
         let of_column = |k: usize| shares.iter().skip(k).step_by(columns).sum::<f64>();
-        let look = |looker: Looker, points: u32, ends: (&Place, &Place)| {
-            self.look(cut, ends, (looker, points), blockers)
-        };
-        // An end in one piece sees what the pieces of the other see together.
-        let a_sees = (one.pieces.len() > 1).then(|| {
-            let look = |p: &Place, points: u32| look(Looker::A, points, (p, &other.whole));
-            self.seen_from(&one.pieces, &of_row, &look)
-        });
-        let b_sees = (other.pieces.len() > 1).then(|| {
-            let look = |q: &Place, points: u32| look(Looker::B, points, (&one.whole, q));
-            self.seen_from(&other.pieces, &of_column, &look)
-        });
-        if matches!(a_sees, Some(None)) || matches!(b_sees, Some(None)) {
-            // Too many polygons to clip by.
+        if blockers.len() > CLIPPED_MAX {
             return shares.iter_mut().for_each(|share| *share *= v);
         }
-        let (a_sees, b_sees) = (a_sees.flatten(), b_sees.flatten());
+        // An end in one piece sees what the pieces of the other see together.
+        let a_sees = (one.pieces.len() > 1)
+            .then(|| self.seen_from(cut, Looker::A, &one.pieces, blockers, &of_row));
+        let b_sees = (other.pieces.len() > 1)
+            .then(|| self.seen_from(cut, Looker::B, &other.pieces, blockers, &of_column));
         let wanted = |sees: &Vec<f64>, of: &dyn Fn(usize) -> f64| -> Vec<f64> {
             sees.iter().enumerate().map(|(k, v)| v * of(k)).collect()
         };
@@ -257,59 +255,46 @@ impl<'a> Sharing<'a> {
         blockers
     }
 
-    /// What a piece of one end sees of a piece of the other; `None` with too many polygons to clip by.
-    fn look(
-        &self,
-        cut: &Cut,
-        ends: (&Place, &Place),
-        (looker, points): (Looker, u32),
-        blockers: &[PatchId],
-    ) -> Option<Look> {
-        let shaft = self.shaft(cut, ends);
-        let blockers = shaft.those_that_block(blockers);
-        let v = exact_visibility(self.simd, &shaft, &blockers, (looker, points), CLIPPED_MAX)?;
-        let from = match looker {
-            Looker::B => &ends.1.world,
-            _ => &ends.0.world,
-        };
-        let distance = |&patch: &PatchId| {
-            self.view.fixed_box(self.forest.patch_root(patch)).distance(&from.bounds)
-        };
-        let is_near = blockers.iter().any(|patch| distance(patch) < NEAR * from.radius);
-        let from = (from.centre, from.radius);
-        Some(Look { value: v.value, from, is_near, is_clear: blockers.is_empty() })
-    }
-
-    /// Visibility of the other end from each piece of one; `None` where it is not to be had.
+    /// Visibility of the other end from each piece of one.
     fn seen_from(
         &self,
+        cut: &Cut,
+        looker: Looker,
         pieces: &[Place],
+        blockers: &[PatchId],
         exchange_area_m2: &dyn Fn(usize) -> f64,
-        look: &dyn Fn(&Place, u32) -> Option<Look>,
-    ) -> Option<Vec<f64>> {
-        let looks: Vec<Look> = pieces.iter().map(|place| look(place, 0)).collect::<Option<_>>()?;
-        let mut out = Vec::with_capacity(pieces.len());
-        for (k, (first, place)) in looks.iter().zip(pieces).enumerate() {
+    ) -> Vec<f64> {
+        let whole = (&cut.ends.0.whole, &cut.ends.1.whole);
+        let mut from = lookout(self.simd, &self.shaft(cut, whole), blockers, looker);
+        let values = from.from_middles(pieces.iter().map(|place| &place.own));
+        let looks: Vec<Look> = pieces
+            .iter()
+            .zip(values)
+            .map(|(place, value)| {
+                let ends = if looker == Looker::B { (whole.0, place) } else { (place, whole.1) };
+                let blockers = self.shaft(cut, ends).those_that_block(blockers);
+                let here = &place.world;
+                let distance = |&patch: &PatchId| {
+                    self.view.fixed_box(self.forest.patch_root(patch)).distance(&here.bounds)
+                };
+                let is_near = blockers.iter().any(|patch| distance(patch) < NEAR * here.radius);
+                let is_clear = blockers.is_empty();
+                let value = if is_clear { 1.0 } else { value };
+                Look { value, from: (here.centre, here.radius), is_near, is_clear }
+            })
+            .collect();
+        let look_closer = |(k, (first, place)): (usize, (&Look, &Place))| {
             let factor = exchange_area_m2(k) / place.own.area;
-            let beside = |other: &&Look| {
-                let reach = BESIDE * (first.from.1 + other.from.1);
-                first.from.0.distance_squared(other.from.0) < reach * reach
-            };
-            let differs = |other: &Look| (first.value - other.value).abs();
-            let around = k.saturating_sub(AROUND)..(k + AROUND).min(looks.len());
-            let spread = looks[around].iter().filter(beside).map(differs).fold(0.0, f64::max);
             let unseen = if first.is_near { UNSEEN_NEAR } else { UNSEEN };
+            let error = factor * bend(&looks, k).max(unseen);
+            if first.is_clear || error <= self.closer {
+                return first.value;
+            }
             // The error of n x n points on a function with kinks falls as 1 / n^2.
-            out.push(match factor * spread.max(unseen) {
-                _ if first.is_clear => first.value,
-                s if s <= self.closer => first.value,
-                s if s <= 4.0 * self.closer => look(place, 1)?.value,
-                s if s <= 16.0 * self.closer => look(place, 2)?.value,
-                s if s <= 64.0 * self.closer => look(place, 4)?.value,
-                _ => look(place, 8)?.value,
-            });
-        }
-        Some(out)
+            let cells = (0.5 * (error / self.closer).sqrt()).ceil().min(CELLS_MAX);
+            from.visibility(&place.own, cells as u32)
+        };
+        looks.iter().zip(pieces).enumerate().map(look_closer).collect()
     }
 
     fn shaft<'b>(&'b self, cut: &Cut, (a, b): (&'b Place, &'b Place)) -> Shaft<'b> {
@@ -330,4 +315,25 @@ impl<'a> Sharing<'a> {
             met => exchange(self.simd, a, b, met),
         }
     }
+}
+
+/// How far visibility over a piece is from a straight line: between pieces on opposite sides of it, and
+/// from those that have none opposite from one value.
+fn bend(looks: &[Look], of: usize) -> f64 {
+    let Look { value, from: (middle, radius), .. } = looks[of];
+    let around = of.saturating_sub(AROUND)..(of + AROUND).min(looks.len());
+    let way = |look: &Look| (look.from.0 - middle, look.value - value, look.from.1 + radius);
+    let beside: Vec<(DVec3, f64)> = looks[around]
+        .iter()
+        .map(way)
+        .filter(|(way, _, reach)| way.length_squared() < (BESIDE * reach).powi(2))
+        .map(|(way, rise, _)| (way, rise))
+        .collect();
+    let off = |&(way, rise): &(DVec3, f64)| {
+        let is_opposite = |(back, _): &&(DVec3, f64)| {
+            (*back + way).length_squared() < (OPPOSITE * OPPOSITE) * way.length_squared()
+        };
+        (rise + beside.iter().find(is_opposite).map_or(0.0, |opposite| opposite.1)).abs()
+    };
+    beside.iter().map(off).fold(0.0, f64::max)
 }

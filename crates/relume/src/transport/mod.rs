@@ -5,18 +5,21 @@
 mod clip;
 mod exchange;
 mod kernel;
+mod lookout;
 mod point;
 mod segments;
+mod silhouette;
 mod visibility;
 
-pub use clip::{FactorPast, Looker, form_factor_past, keep_in_front, visible_form_factor};
+pub use clip::keep_in_front;
 pub use exchange::{
     Exchange, Meeting, Variation, exchange, exchange_of_points, light_at, light_exchange, meeting,
 };
 pub use kernel::Simd;
+pub use lookout::{FactorPast, Looker, Lookout, form_factor_past, visible_form_factor};
 pub use point::form_factor_from_point;
 pub use segments::{SEGMENTS, SegmentBundle};
 pub use visibility::{
     CLIPPED_MAX, Candidates, Shaft, Visibility, covers, exact_visibility, light_visibility,
-    segment_is_clear, visibility,
+    lookout, segment_is_clear, visibility,
 };

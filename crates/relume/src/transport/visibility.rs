@@ -5,8 +5,8 @@ use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, Wor
 use crate::geometry::{Aabb, Plane, Pose, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
-use super::clip::{Looker, Polygons, clipped_visibility};
 use super::kernel::Simd;
+use super::lookout::{Between, Looker, Lookout, PlacedSolid, clipped_visibility};
 use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use glam::{DVec2, DVec3};
 
@@ -265,6 +265,52 @@ impl<'a> Shaft<'a> {
         self.forest.children(id).all(|c| self.walk(ElementId(c), keep_m, test, visit))
     }
 
+    /// Blockers in one frame: that of the pair's body if it has one of its own.
+    fn between(&self, blockers: &[PatchId]) -> Between<'a> {
+        let mut out = Between::default();
+        // Solids with how many of their faces there are, and corners of those.
+        let mut solids: Vec<(u32, usize, usize)> = Vec::new();
+        let own =
+            self.own.map(|(own, _, _)| self.view.poses()[own.0 as usize].unwrap_or(Pose::IDENTITY));
+        for &patch in blockers {
+            let (rides, lifted) = self.lifted(patch);
+            let (corners, normal) = (lifted.corners(), lifted.polygon.plane.normal);
+            let solid = self.forest.solid(patch);
+            let count = lifted.polygon.corners.len();
+            match own {
+                Some(pose) if !rides => {
+                    let normal = pose.rotation.transpose() * normal;
+                    out.push(corners.map(|c| pose.inverse_point(c)), normal, solid);
+                }
+                _ => out.push(corners, normal, solid),
+            }
+            if let Some(solid) = solid {
+                match solids.iter_mut().find(|found| found.0 == solid) {
+                    Some((_, faces, corners)) => {
+                        (*faces, *corners) = (*faces + 1, *corners + count)
+                    }
+                    None => solids.push((solid, 1, count)),
+                }
+            }
+        }
+        let ends = [self.patches.0, self.patches.1].map(|patch| self.forest.solid(patch));
+        for (number, faces, corners) in solids {
+            let solid = self.forest.solid_shape(number);
+            // A single face is as good, and a few of a ball are better.
+            if faces < 2 || solid.edges.len() > 2 * corners || ends.contains(&Some(number)) {
+                continue;
+            }
+            let pose = self.view.poses()[solid.body.0 as usize].unwrap_or(Pose::IDENTITY);
+            let pose = match (own, self.own) {
+                (Some(_), Some((body, _, _))) if body == solid.body => Pose::IDENTITY,
+                (Some(own), _) => own.inverse() * pose,
+                _ => pose,
+            };
+            out.push_solid(PlacedSolid { number, solid, pose });
+        }
+        out
+    }
+
     /// The segments of `bundle` (in the world; `own` in the body's frame) that are blocked.
     fn blocked(
         &self,
@@ -316,13 +362,12 @@ pub fn visibility(
 pub const CLIPPED_MAX: usize = 12;
 
 /// Visibility of a pair by clipping, exact from 2 x 2 points in each of `cells` x `cells` parts of
-/// the looker, or from its middle alone if `cells` is 0. Each point counts as a segment. `None` if more
-/// than `most` polygons stand in the shaft.
+/// the looker. Each point counts as a segment. `None` if more than `most` polygons stand in the shaft.
 pub fn exact_visibility(
     simd: Simd,
     shaft: &Shaft<'_>,
     blockers: &[PatchId],
-    (looker, cells): (Looker, u32),
+    looker: (Looker, u32),
     most: usize,
 ) -> Option<Visibility> {
     if blockers.is_empty() {
@@ -331,23 +376,16 @@ pub fn exact_visibility(
     if blockers.len() > most {
         return None;
     }
+    let ends = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
+    Some(clipped_visibility(simd, ends, &shaft.between(blockers), looker))
+}
+
+/// One end of a pair made ready to look at the other past blockers; in the frame of the body that both
+/// ride on, if they do.
+pub fn lookout(simd: Simd, shaft: &Shaft<'_>, blockers: &[PatchId], looker: Looker) -> Lookout {
     let (a, b) = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
-    let mut occluders = Polygons::default();
-    for &patch in blockers {
-        // Everything in one frame: that of the pair's body if it has one of its own.
-        let (rides, lifted) = shaft.lifted(patch);
-        let (corners, normal) = (lifted.corners(), lifted.polygon.plane.normal);
-        let solid = shaft.forest.solid(patch);
-        match shaft.own {
-            Some((own, _, _)) if !rides => {
-                let pose = shaft.view.poses()[own.0 as usize].unwrap_or(Pose::IDENTITY);
-                let normal = pose.rotation.transpose() * normal;
-                occluders.push(corners.map(|c| pose.inverse_point(c)), normal, solid);
-            }
-            _ => occluders.push(corners, normal, solid),
-        }
-    }
-    Some(clipped_visibility(simd, (a, b), &occluders, (looker, cells)))
+    let (looker, other) = if looker == Looker::B { (b, a) } else { (a, b) };
+    Lookout::new(simd, looker, other, &shaft.between(blockers))
 }
 
 /// Visibility of a punctual light (the second end of the shaft) from an element; `segments` come

@@ -1,0 +1,572 @@
+//! What points of an end see of the other: exact from each of a few points, past occluders.
+//!
+//! The part of a polygon that a point sees is a set of convex fragments ([`super::clip`]), whose form factors
+//! are known in closed form. What does not depend on the point is made ready once for many.
+
+use glam::{DVec2, DVec3};
+
+use super::clip::{Cutter, FRAGMENTS_MAX, Occluders, keep_front};
+use super::kernel::{G, Simd};
+use super::point::{EdgeBundles, form_factor_from_point};
+use super::silhouette::Silhouette;
+use super::visibility::Visibility;
+use crate::element::WorldElement;
+use crate::geometry::{Aabb, ConvexPolygon, Plane, Pose};
+use crate::scene::Solid;
+
+/// Edges whose form factors are evaluated together.
+const EDGES_AT_ONCE: usize = 512;
+
+/// What stands between two ends, all in one frame: convex polygons, and solids that some of them are faces of.
+#[derive(Default)]
+pub(super) struct Between<'a> {
+    corners: Vec<DVec3>,
+    ends: Vec<usize>,
+    /// Unit normals, and the convex solids whose faces they are.
+    faces: Vec<(DVec3, Option<u32>)>,
+    solids: Vec<PlacedSolid<'a>>,
+}
+
+/// A solid, and its way into the frame.
+pub(super) struct PlacedSolid<'a> {
+    pub(super) number: u32,
+    pub(super) solid: &'a Solid,
+    pub(super) pose: Pose,
+}
+
+impl<'a> Between<'a> {
+    /// Adds a polygon with its unit normal and the convex solid whose face it is.
+    pub(super) fn push(
+        &mut self,
+        corners: impl Iterator<Item = DVec3>,
+        normal: DVec3,
+        solid: Option<u32>,
+    ) {
+        self.corners.extend(corners);
+        self.ends.push(self.corners.len());
+        self.faces.push((normal, solid));
+    }
+
+    /// Adds a solid, two or more of whose faces were or will be pushed: it may be looked at in their place.
+    pub(super) fn push_solid(&mut self, solid: PlacedSolid<'a>) {
+        self.solids.push(solid);
+    }
+
+    /// Those that hide something from an end: where it is wholly in front of one face of a solid, it is
+    /// outside, and faces that it is wholly behind hide nothing that others do not.
+    fn facing<'b>(
+        &'b self,
+        looker: &'b WorldElement,
+        slack: f64,
+    ) -> impl Iterator<Item = (&'b [DVec3], Option<u32>)> + 'b {
+        let span = move |(corners, (normal, _)): (&[DVec3], &(DVec3, Option<u32>))| {
+            looker.span(&Plane::through(corners[0], *normal))
+        };
+        let all = || self.iter().zip(&self.faces);
+        let is_outside = move |solid: u32| {
+            all().any(|(corners, face)| face.1 == Some(solid) && span((corners, face)).0 > slack)
+        };
+        let hides = move |(corners, face): &(&[DVec3], &(DVec3, Option<u32>))| match face.1 {
+            Some(solid) => span((corners, face)).1 >= -slack || !is_outside(solid),
+            None => true,
+        };
+        all().filter(hides).map(|(corners, face)| (corners, face.1))
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &[DVec3]> {
+        (0..self.ends.len()).map(|k| {
+            let start = if k == 0 { 0 } else { self.ends[k - 1] };
+            &self.corners[start..self.ends[k]]
+        })
+    }
+
+    /// As they are seen from points of the looker's plane: parts in front of both ends' planes, in the
+    /// other's frame.
+    fn seen(
+        &self,
+        looker: &WorldElement,
+        other: &WorldElement,
+        frame: &TargetFrame,
+        slack: f64,
+    ) -> Occluders {
+        let from = frame.place(looker.centre);
+        let raised = |p: &Plane| Plane { normal: p.normal, offset: p.offset + slack };
+        let planes = [raised(&looker.plane), raised(&other.plane)];
+        let mut out = Occluders::default();
+        let mut whole = Vec::new();
+        // The near plane in the frame.
+        let up = frame.direction(looker.plane.normal);
+        let is_low = |c: DVec3| up.dot(c - from) <= slack;
+        for PlacedSolid { number, solid, pose } in &self.solids {
+            // What reaches behind the other's plane hides less than its silhouette.
+            if solid.corners.iter().all(|&c| other.plane.distance(pose.point(c)) >= -slack) {
+                let place = |c: DVec3| frame.place(pose.point(c));
+                let turn = |d: DVec3| frame.direction(pose.direction(d));
+                out.push_solid(Silhouette::new(solid, place, turn, is_low), from);
+                whole.push(*number);
+            }
+        }
+        let (mut part, mut rest) = (Vec::new(), Vec::new());
+        for (corners, solid) in self.facing(looker, slack) {
+            if solid.is_some_and(|solid| whole.contains(&solid)) {
+                continue;
+            }
+            part.clear();
+            part.extend_from_slice(corners);
+            for plane in &planes {
+                keep_front(&mut part, &mut rest, plane);
+            }
+            if part.len() >= 3 {
+                out.push(part.iter().map(|&c| frame.place(c)), from);
+            }
+        }
+        out.largest_first();
+        out
+    }
+}
+
+/// The end of a pair that the other is looked at from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Looker {
+    /// The smaller, unless what blocks is very near it.
+    Best,
+    /// The first.
+    A,
+    /// The second.
+    B,
+}
+
+/// One end of a pair made ready to look at the other.
+pub struct Lookout {
+    simd: Simd,
+    frame: TargetFrame,
+    /// The other's plane.
+    other: Plane,
+    /// The part of the other that faces the looker's plane.
+    target: Vec<DVec2>,
+    between: Occluders,
+    /// The looker's, in the frame.
+    normal: DVec3,
+    cutter: Cutter,
+    looks: Looks,
+}
+
+impl Lookout {
+    pub(super) fn new(
+        simd: Simd,
+        looker: &WorldElement,
+        other: &WorldElement,
+        between: &Between<'_>,
+    ) -> Lookout {
+        let slack = looker.rounding_m + other.rounding_m;
+        let frame = TargetFrame::of(other);
+        let facing = ConvexPolygon::new(&other.corners[..other.len]).clipped(&looker.plane, slack);
+        Lookout {
+            simd,
+            other: other.plane,
+            target: frame.flat(facing.corners()),
+            between: between.seen(looker, other, &frame, slack),
+            normal: frame.direction(looker.plane.normal),
+            frame,
+            cutter: Cutter::default(),
+            looks: Looks::default(),
+        }
+    }
+
+    /// Visibility of the other from a part of the looker: from 2 x 2 Gauss points in each of `cells` x `cells`
+    /// parts of that.
+    pub fn visibility(&mut self, part: &WorldElement, cells: u32) -> f64 {
+        self.look(part, cells).visibility()
+    }
+
+    /// Visibility of the other from the middle of each of some parts of the looker.
+    pub fn from_middles<'a>(&mut self, parts: impl Iterator<Item = &'a WorldElement>) -> Vec<f64> {
+        self.looks.start();
+        parts.for_each(|part| self.look_from(part, part.point(0.5, 0.5)));
+        self.looks.evaluate(self.simd, self.normal);
+        let share = |&(all, clear): &(f64, f64)| if all > 0.0 { clear / all } else { 0.0 };
+        self.looks.points.iter().map(|point| share(point).clamp(0.0, 1.0)).collect()
+    }
+
+    fn look(&mut self, part: &WorldElement, cells: u32) -> &Sums {
+        self.looks.start();
+        let at = |k: u32| (f64::from(k / 2) + G[k as usize & 1]) / f64::from(cells);
+        for k in 0..4 * cells * cells {
+            self.look_from(part, part.point(at(k % (2 * cells)), at(k / (2 * cells))));
+        }
+        self.looks.evaluate(self.simd, self.normal);
+        &self.looks.sums
+    }
+
+    fn look_from(&mut self, part: &WorldElement, point: DVec3) {
+        if self.other.distance(point) > 0.0 && self.target.len() >= 3 {
+            let from = self.frame.place(point);
+            self.cutter.cut(from, &self.target, &self.between);
+            self.looks.push(from, part.offset(point), &self.target, &self.cutter);
+        } else {
+            self.looks.push_nothing();
+        }
+        if self.looks.edges.len() >= EDGES_AT_ONCE {
+            self.looks.evaluate(self.simd, self.normal);
+        }
+    }
+}
+
+/// Visibility of `a` and `b` past convex occluders, all in one frame: from 2 x 2 Gauss points in
+/// each of `cells` x `cells` parts of the looker.
+pub(super) fn clipped_visibility(
+    simd: Simd,
+    (a, b): (&WorldElement, &WorldElement),
+    between: &Between<'_>,
+    (looker, cells): (Looker, u32),
+) -> Visibility {
+    let a_looks = match looker {
+        Looker::Best => looks_best(a, b, between),
+        Looker::A => true,
+        Looker::B => false,
+    };
+    let (looker, other) = if a_looks { (a, b) } else { (b, a) };
+    let mut lookout = Lookout::new(simd, looker, other, between);
+    lookout.looks.with_moments = true;
+    let sums = lookout.look(looker, cells);
+    let value = sums.visibility();
+    let over_looker = gradient(looker, sums.at_looker, sums.at_looker_clear, sums.all, sums.clear);
+    let over_other = gradient(other, sums.at_other, sums.at_other_clear, sums.all, sums.clear);
+    let (gradient_a, gradient_b) =
+        if a_looks { (over_looker, over_other) } else { (over_other, over_looker) };
+    let (of_looker, of_other) = sums.spreads(value);
+    let (spread_a, spread_b) = if a_looks { (of_looker, of_other) } else { (of_other, of_looker) };
+    Visibility {
+        value,
+        gradient_a,
+        gradient_b,
+        spread_a,
+        spread_b,
+        from_a: a_looks,
+        segments: 4 * cells * cells,
+    }
+}
+
+/// How many times as much shadows move over the other end for the larger to be looked from.
+const MUCH: f64 = 16.0;
+
+/// Whether the first end is the one to look from: the smaller, unless shadows move much more for it.
+///
+/// As a point of an end moves over it, a shadow on the other end moves by as much, times the distance of
+/// the occluder from the other by that from the end: the end is best on which that is little against
+/// the size of the other. What nearly touches an end is to be looked at from the other.
+fn looks_best(a: &WorldElement, b: &WorldElement, between: &Between<'_>) -> bool {
+    let around = Aabb::of(between.iter().flatten().copied());
+    let (by_a, by_b) =
+        (a.radius * around.distance(&b.bounds), b.radius * around.distance(&a.bounds));
+    match a.area <= b.area {
+        true => by_a <= MUCH * by_b,
+        false => by_b > MUCH * by_a,
+    }
+}
+
+/// Form factor from a point to the part of a convex polygon (wholly in front of the point's tangent
+/// plane) that convex occluders leave visible; exact up to rounding. Occluders must have been
+/// clipped to between the two.
+pub fn visible_form_factor(
+    point: DVec3,
+    normal: DVec3,
+    target: &ConvexPolygon,
+    occluders: &[ConvexPolygon],
+) -> f64 {
+    let occluders = occluders.iter().map(ConvexPolygon::corners);
+    form_factor_past(point, normal, target.corners(), occluders).factor
+}
+
+/// A form factor past occluders.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FactorPast {
+    /// Form factor from the point to what it sees.
+    pub factor: f64,
+    /// Exact up to rounding; else the target fell into too many pieces, and `factor` counts some
+    /// of what is hidden.
+    pub is_exact: bool,
+}
+
+/// [`visible_form_factor`] for any number of occluders of any number of corners.
+pub fn form_factor_past<'a>(
+    point: DVec3,
+    normal: DVec3,
+    target: &[DVec3],
+    occluders: impl Iterator<Item = &'a [DVec3]>,
+) -> FactorPast {
+    let frame = TargetFrame::of_polygon(target);
+    let from = frame.place(point);
+    let mut between = Occluders::default();
+    for occluder in occluders {
+        between.push(occluder.iter().map(|&c| frame.place(c)), from);
+    }
+    between.largest_first();
+    let mut cutter = Cutter::default();
+    cutter.cut(from, &frame.flat(target), &between);
+    let normal = frame.direction(normal);
+    let mut solid = Vec::new();
+    let mut factor = |piece: &[DVec2]| {
+        solid.clear();
+        solid.extend(piece.iter().map(|c| c.extend(0.0)));
+        form_factor_from_point(from, normal, &solid)
+    };
+    FactorPast {
+        factor: cutter.left.iter().map(&mut factor).sum::<f64>()
+            - cutter.dark.iter().map(&mut factor).sum::<f64>(),
+        is_exact: cutter.left.len() <= FRAGMENTS_MAX,
+    }
+}
+
+/// The frame of a target: the first two axes in its plane, the third towards its front.
+struct TargetFrame {
+    origin: DVec3,
+    axes: [DVec3; 3],
+}
+
+impl TargetFrame {
+    fn of(e: &WorldElement) -> TargetFrame {
+        TargetFrame { origin: e.centre, axes: [e.axes[0], e.axes[1], e.plane.normal] }
+    }
+
+    /// Of a planar polygon with three or more corners.
+    fn of_polygon(c: &[DVec3]) -> TargetFrame {
+        let fan = |k: usize| (c[k] - c[0]).cross(c[k + 1] - c[0]);
+        let up = (1..c.len() - 1).map(fan).sum::<DVec3>().normalize_or_zero();
+        let along = (c[1] - c[0]).normalize_or_zero();
+        TargetFrame { origin: c[0], axes: [along, up.cross(along), up] }
+    }
+
+    fn direction(&self, d: DVec3) -> DVec3 {
+        DVec3::new(d.dot(self.axes[0]), d.dot(self.axes[1]), d.dot(self.axes[2]))
+    }
+
+    fn place(&self, p: DVec3) -> DVec3 {
+        self.direction(p - self.origin)
+    }
+
+    /// Corners of the target within its plane.
+    fn flat(&self, corners: &[DVec3]) -> Vec<DVec2> {
+        corners.iter().map(|&c| self.place(c).truncate()).collect()
+    }
+}
+
+/// What points of the looker see, with form factors evaluated many edges at a time.
+#[derive(Default)]
+struct Looks {
+    sums: Sums,
+    /// Form factors from each point, of the target and of what is clear of it.
+    points: Vec<(f64, f64)>,
+    /// First moments are wanted.
+    with_moments: bool,
+    edges: EdgeBundles,
+    seen: Vec<Seen>,
+}
+
+/// A polygon that a point looks at.
+struct Seen {
+    what: What,
+    /// The point, within its element.
+    at: DVec2,
+    /// The polygon's centroid.
+    centroid: DVec2,
+    /// Where its edges end in the list of edges.
+    edges_end: usize,
+}
+
+#[derive(PartialEq)]
+enum What {
+    /// The whole target; a new point starts. All of it is clear, or pieces that are follow.
+    Target { clear: bool },
+    /// A piece that is clear.
+    Clear,
+    /// A part of what is clear that is not.
+    Dark,
+}
+
+impl Looks {
+    fn start(&mut self) {
+        self.sums = Sums::default();
+        self.points.clear();
+    }
+
+    /// For a point that does not see the target's plane.
+    fn push_nothing(&mut self) {
+        let edges_end = self.edges.len();
+        let what = What::Target { clear: true };
+        self.seen.push(Seen { what, at: DVec2::ZERO, centroid: DVec2::ZERO, edges_end });
+    }
+
+    fn push(&mut self, from: DVec3, at: DVec2, target: &[DVec2], cutter: &Cutter) {
+        self.push_polygon(What::Target { clear: cutter.is_whole }, from, at, target);
+        if !cutter.is_whole {
+            cutter.left.iter().for_each(|c| self.push_polygon(What::Clear, from, at, c));
+        }
+        cutter.dark.iter().for_each(|c| self.push_polygon(What::Dark, from, at, c));
+    }
+
+    fn push_polygon(&mut self, what: What, from: DVec3, at: DVec2, c: &[DVec2]) {
+        let mut p = c[c.len() - 1];
+        for &q in c {
+            self.edges.push(p.extend(0.0) - from, q.extend(0.0) - from);
+            p = q;
+        }
+        let edges_end = self.edges.len();
+        let centroid = if self.with_moments { centroid(c) } else { DVec2::ZERO };
+        self.seen.push(Seen { what, at, centroid, edges_end });
+    }
+
+    /// Adds up what was pushed since the last call.
+    fn evaluate(&mut self, simd: Simd, normal: DVec3) {
+        let shares = self.edges.shares(simd, normal);
+        let mut start = 0;
+        let first = self.points.len();
+        for seen in &self.seen {
+            let f = shares.form_factor(start..seen.edges_end);
+            start = seen.edges_end;
+            let sums = &mut self.sums;
+            if let What::Target { .. } = seen.what {
+                self.points.push((f, 0.0));
+                sums.all += f;
+                sums.at_looker += seen.at * f;
+                sums.at_other += seen.centroid * f;
+            }
+            let clear = match seen.what {
+                What::Target { clear: true } | What::Clear => f,
+                What::Target { clear: false } => continue,
+                What::Dark => -f,
+            };
+            self.points.last_mut().expect("a target comes first").1 += clear;
+            sums.clear += clear;
+            sums.at_looker_clear += seen.at * clear;
+            sums.at_other_clear += seen.centroid * clear;
+        }
+        self.points[first..].iter().for_each(|&(all, clear)| self.sums.finish_point(all, clear));
+        self.seen.clear();
+        self.edges.clear();
+    }
+}
+
+/// Form factors from the points, of all and of what is clear, with first moments on both ends.
+#[derive(Default)]
+struct Sums {
+    all: f64,
+    clear: f64,
+    at_looker: DVec2,
+    at_looker_clear: DVec2,
+    at_other: DVec2,
+    at_other_clear: DVec2,
+    /// Sum over the points of their clear part squared over all.
+    clear2: f64,
+}
+
+impl Sums {
+    fn finish_point(&mut self, all: f64, clear: f64) {
+        self.clear2 += clear * clear / all.max(f64::MIN_POSITIVE);
+    }
+
+    /// The clear part of all.
+    fn visibility(&self) -> f64 {
+        if self.all > 0.0 { (self.clear / self.all).clamp(0.0, 1.0) } else { 0.0 }
+    }
+
+    /// Standard deviations of visibility over the looker (between its points) and over the
+    /// other end (within what each point sees: there it is 0 or 1).
+    fn spreads(&self, value: f64) -> (f64, f64) {
+        if self.all <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let mean_square = self.clear2 / self.all;
+        let between = (mean_square - value * value).max(0.0).sqrt();
+        let within = (value - mean_square).max(0.0).sqrt();
+        (between, within)
+    }
+}
+
+/// What occlusion adds to the relative gradient over an element: the shift of the centre of what
+/// passes, against the element's second moment.
+fn gradient(e: &WorldElement, at: DVec2, at_clear: DVec2, all: f64, clear: f64) -> DVec2 {
+    if clear <= 1e-12 * all {
+        return DVec2::ZERO;
+    }
+    e.gradient_of_shift(at_clear / clear - at / all)
+}
+
+fn centroid(c: &[DVec2]) -> DVec2 {
+    let (mut sum, mut area) = (DVec2::ZERO, 0.0);
+    for k in 1..c.len() - 1 {
+        let twice = (c[k] - c[0]).perp_dot(c[k + 1] - c[0]);
+        sum += (c[0] + c[k] + c[k + 1]) * (twice / 3.0);
+        area += twice;
+    }
+    if area != 0.0 { sum / area } else { c[0] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Aabb;
+
+    fn square(z: f64, lo: f64, hi: f64, up: bool) -> WorldElement {
+        let mut corners =
+            [(lo, lo), (hi, lo), (hi, hi), (lo, hi)].map(|(x, y)| DVec3::new(x, y, z));
+        if !up {
+            corners.reverse();
+        }
+        let normal = if up { DVec3::Z } else { DVec3::NEG_Z };
+        let centre = corners.iter().sum::<DVec3>() / 4.0;
+        WorldElement {
+            corners,
+            len: 4,
+            plane: Plane::through(corners[0], normal),
+            axes: [DVec3::X, normal.cross(DVec3::X)],
+            centre,
+            radius: (corners[0] - centre).length(),
+            area: (hi - lo) * (hi - lo),
+            bounds: Aabb::of(corners),
+            rounding_m: 1e-12,
+        }
+    }
+
+    fn blocker(z: f64, lo: f64, hi: f64) -> Vec<DVec3> {
+        square(z, lo, hi, true).corners.to_vec()
+    }
+
+    fn visibility(a: &WorldElement, b: &WorldElement, occluders: &[Vec<DVec3>]) -> Visibility {
+        let mut polygons = Between::default();
+        for occluder in occluders {
+            polygons.push(occluder.iter().copied(), DVec3::Z, None);
+        }
+        clipped_visibility(Simd::detect(), (a, b), &polygons, (Looker::Best, 1))
+    }
+
+    #[test]
+    fn half_of_a_small_pair_is_hidden_by_a_half_plane() {
+        let (a, b) = (square(0.0, -0.01, 0.01, true), square(1.0, -0.01, 0.01, false));
+        let half: Vec<DVec3> = [(0.0, -9.0), (9.0, -9.0), (9.0, 9.0), (0.0, 9.0)]
+            .map(|(x, y)| DVec3::new(x, y, 0.5))
+            .into();
+        let v = visibility(&a, &b, &[half]);
+        assert!((v.value - 0.5).abs() < 1e-3, "{v:?}");
+        // Points further from the half plane see more.
+        assert!(v.gradient_a.x < 0.0 && v.gradient_a.y.abs() < 1e-6, "{v:?}");
+    }
+
+    #[test]
+    fn overlapping_occluders_hide_their_union() {
+        let (a, b) = (square(0.0, 0.0, 1.0, true), square(2.0, 0.0, 1.0, false));
+        let one = visibility(&a, &b, &[blocker(1.0, 0.2, 0.6)]).value;
+        let twice = visibility(&a, &b, &[blocker(1.0, 0.2, 0.6), blocker(1.0, 0.3, 0.5)]).value;
+        assert!((one - twice).abs() < 1e-12);
+        let more = visibility(&a, &b, &[blocker(1.0, 0.2, 0.6), blocker(0.5, 0.3, 0.8)]);
+        assert!(more.value < one - 0.01);
+    }
+
+    #[test]
+    fn an_occluder_over_everything_hides_everything_and_one_beside_nothing() {
+        let (a, b) = (square(0.0, 0.0, 1.0, true), square(2.0, 0.0, 1.0, false));
+        assert_eq!(visibility(&a, &b, &[blocker(1.0, -9.0, 9.0)]).value, 0.0);
+        assert_eq!(visibility(&a, &b, &[blocker(1.0, 2.0, 3.0)]).value, 1.0);
+        assert_eq!(visibility(&a, &b, &[blocker(2.5, 0.0, 1.0)]).value, 1.0);
+    }
+}

@@ -285,9 +285,12 @@ impl<'a> Sharing<'a> {
             .collect();
         let look_closer = |(k, (first, place)): (usize, (&Look, &Place))| {
             let factor = exchange_area_m2(k) / place.own.area;
+            if first.is_clear || factor <= self.closer {
+                return first.value;
+            }
             let unseen = if first.is_near { UNSEEN_NEAR } else { UNSEEN };
             let error = factor * bend(&looks, k).max(unseen);
-            if first.is_clear || error <= self.closer {
+            if error <= self.closer {
                 return first.value;
             }
             // The error of n x n points on a function with kinks falls as 1 / n^2.

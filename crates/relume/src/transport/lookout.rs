@@ -97,12 +97,14 @@ impl<'a> Between<'a> {
         // The near plane in the frame.
         let up = frame.direction(looker.plane.normal);
         let is_low = |c: DVec3| up.dot(c - from) <= slack;
+        let corners = looker.corners.map(|c| frame.place(c));
         for PlacedSolid { number, solid, pose } in &self.solids {
             // What reaches behind the other's plane hides less than its silhouette.
             if solid.corners.iter().all(|&c| other.plane.distance(pose.point(c)) >= -slack) {
                 let place = |c: DVec3| frame.place(pose.point(c));
                 let turn = |d: DVec3| frame.direction(pose.direction(d));
-                out.push_solid(Silhouette::new(solid, place, turn, is_low), from);
+                let silhouette = Silhouette::new(solid, (place, turn), &corners, is_low);
+                out.push_solid(silhouette, from);
                 whole.push(*number);
             }
         }

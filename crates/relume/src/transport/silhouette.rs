@@ -3,55 +3,86 @@
 
 use glam::DVec3;
 
-use crate::scene::Solid;
+use crate::scene::{Solid, SolidEdge, SolidFace};
 
-/// A solid in some frame, made ready to be looked at from points of one plane, the near one.
+/// A solid in some frame, made ready to be looked at from points of one polygon, the looker.
 pub(super) struct Silhouette {
     corners: Vec<DVec3>,
+    /// Faces that some points of the looker see and others do not.
     faces: Vec<Face>,
-    edges: Vec<Edge>,
+    /// Those that bound the shadow seen from every point.
+    always: Vec<[usize; 2]>,
+    /// Those of which it depends on the point.
+    sometimes: Vec<Edge>,
 }
 
 struct Face {
     normal: DVec3,
     /// One of its corners.
     corner: usize,
-    /// It lies in the near plane, or behind it: no point of the plane sees it.
-    is_low: bool,
 }
 
-/// An edge that is not wholly in the near plane or behind it: those bound nothing in front.
 struct Edge {
+    /// Corners; it runs counter-clockwise about the first face, clockwise about the second.
     ends: [usize; 2],
-    /// It runs counter-clockwise about the first, clockwise about the second.
-    faces: [usize; 2],
+    faces: [Sight; 2],
+}
+
+/// Whether the looker sees a face.
+#[derive(Clone, Copy, PartialEq)]
+enum Sight {
+    All,
+    None,
+    /// It depends on the point: one of the faces that are kept.
+    Some(usize),
 }
 
 impl Silhouette {
-    /// Corners and normals by `place` and `turn` to the frame; `is_low` says of a corner in the frame
-    /// whether it is in the near plane or behind it.
+    /// Corners and normals by `place` and `turn` to the frame, in which the looker's corners are; `is_low`
+    /// says of a corner in the frame whether it is in the looker's plane or behind it.
     pub(super) fn new(
         solid: &Solid,
-        place: impl Fn(DVec3) -> DVec3,
-        turn: impl Fn(DVec3) -> DVec3,
+        (place, turn): (impl Fn(DVec3) -> DVec3, impl Fn(DVec3) -> DVec3),
+        looker: &[DVec3],
         is_low: impl Fn(DVec3) -> bool,
     ) -> Silhouette {
         let corners: Vec<DVec3> = solid.corners.iter().map(|&c| place(c)).collect();
         let low: Vec<bool> = corners.iter().map(|&c| is_low(c)).collect();
-        let mut faces: Vec<Face> = solid
-            .faces
-            .iter()
-            .map(|f| Face { normal: turn(f.normal), corner: f.corner as usize, is_low: true })
-            .collect();
-        let mut edges = Vec::with_capacity(solid.edges.len());
-        for edge in &solid.edges {
-            let (ends, of) = (edge.ends.map(|c| c as usize), edge.faces.map(|f| f as usize));
-            if !ends.iter().all(|&c| low[c]) {
-                of.iter().for_each(|&f| faces[f].is_low = false);
-                edges.push(Edge { ends, faces: of });
+        // An edge in the looker's plane, or behind it, bounds nothing in front; and a face of such edges
+        // nobody sees.
+        let is_high = |edge: &&SolidEdge| !edge.ends.iter().all(|&c| low[c as usize]);
+        let mut is_low = vec![true; solid.faces.len()];
+        for edge in solid.edges.iter().filter(is_high) {
+            edge.faces.iter().for_each(|&f| is_low[f as usize] = false);
+        }
+        let mut faces = Vec::new();
+        let sight = |(face, &is_low): (&SolidFace, &bool)| {
+            let (normal, corner) = (turn(face.normal), face.corner as usize);
+            let above = |p: &DVec3| normal.dot(*p - corners[corner]) > 0.0;
+            let count = looker.iter().filter(|p| above(p)).count();
+            match count {
+                _ if is_low => Sight::None,
+                0 => Sight::None,
+                n if n == looker.len() => Sight::All,
+                _ => {
+                    faces.push(Face { normal, corner });
+                    Sight::Some(faces.len() - 1)
+                }
+            }
+        };
+        let sights: Vec<Sight> = solid.faces.iter().zip(&is_low).map(sight).collect();
+        let (mut always, mut sometimes) = (Vec::new(), Vec::new());
+        for edge in solid.edges.iter().filter(is_high) {
+            let ([p, q], of) =
+                (edge.ends.map(|c| c as usize), edge.faces.map(|f| sights[f as usize]));
+            match of {
+                [Sight::All, Sight::All] | [Sight::None, Sight::None] => {}
+                [Sight::All, Sight::None] => always.push([q, p]),
+                [Sight::None, Sight::All] => always.push([p, q]),
+                _ => sometimes.push(Edge { ends: [p, q], faces: of }),
             }
         }
-        Silhouette { corners, faces, edges }
+        Silhouette { corners, faces, always, sometimes }
     }
 
     /// About the solid angle that it hides from a point.
@@ -62,25 +93,97 @@ impl Silhouette {
         radius2 / away.length_squared().max(f64::MIN_POSITIVE)
     }
 
-    /// Calls `side` with the outward-to-inward normal of each plane through the point that bounds the
-    /// shadow, until it returns false; false then. A point inside, or under a face, has no such plane:
-    /// everything is in the shadow.
+    /// Calls `side` with the normal, into the shadow and of any length, of each plane through the point
+    /// that bounds the shadow, until it returns false; false then. A point inside, or under a face, has no
+    /// such plane: everything is in the shadow.
     pub(super) fn cast(
         &self,
         point: DVec3,
         seen: &mut Vec<bool>,
         mut side: impl FnMut(DVec3) -> bool,
     ) -> bool {
-        let is_seen = |f: &Face| !f.is_low && f.normal.dot(point - self.corners[f.corner]) > 0.0;
+        let mut between =
+            |p: usize, q: usize| side((self.corners[p] - point).cross(self.corners[q] - point));
+        if !self.always.iter().all(|&[p, q]| between(p, q)) {
+            return false;
+        }
         seen.clear();
+        let is_seen = |f: &Face| f.normal.dot(point - self.corners[f.corner]) > 0.0;
         seen.extend(self.faces.iter().map(is_seen));
-        self.edges.iter().all(|edge| {
-            let [left, right] = edge.faces.map(|f| seen[f]);
-            if left == right {
-                return true;
-            }
-            let [p, q] = edge.ends.map(|c| self.corners[c] - point);
-            side(if left { q.cross(p) } else { p.cross(q) })
+        self.sometimes.iter().all(|edge| {
+            let [p, q] = edge.ends;
+            let [left, right] = edge.faces.map(|sight| match sight {
+                Sight::All => true,
+                Sight::None => false,
+                Sight::Some(face) => seen[face],
+            });
+            left == right || if left { between(q, p) } else { between(p, q) }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::scene::SceneBuilder;
+
+    fn cuboid() -> Solid {
+        let mut b = SceneBuilder::new("box");
+        let node = b.node("box", None, DVec3::ZERO, glam::DQuat::IDENTITY);
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        b.cuboid(node, "box", grey, DVec3::splat(-1.0), DVec3::ONE);
+        b.build().unwrap().solids().list.remove(0)
+    }
+
+    fn point() -> impl Strategy<Value = DVec3> {
+        prop::array::uniform3(-3.0..3.0).prop_map(DVec3::from)
+    }
+
+    /// Whether the way from one point on through another meets the box of half size 1.
+    fn meets(from: DVec3, way: DVec3) -> bool {
+        let (low, high) = ((-DVec3::ONE - from) / way, (DVec3::ONE - from) / way);
+        let (enter, leave) = (low.min(high).max_element(), low.max(high).min_element());
+        enter <= leave && leave >= 0.0
+    }
+
+    proptest! {
+        /// A ray is within all sides of the shadow if and only if it meets the solid.
+        #[test]
+        fn a_shadow_is_where_rays_meet_the_solid(
+            looker in prop::array::uniform3(point()),
+            share in prop::array::uniform3(0.01..1.0),
+            to in point(),
+        ) {
+            let sum: f64 = share.iter().sum();
+            let from: DVec3 = looker.iter().zip(share).map(|(p, s)| *p * (s / sum)).sum();
+            let identity = |p: DVec3| p;
+            let solid = Silhouette::new(&cuboid(), (identity, identity), &looker, |_| false);
+            let is_in = solid.cast(from, &mut Vec::new(), |n| n.dot(to - from) >= 0.0);
+            prop_assert_eq!(is_in, meets(from, to - from));
+        }
+    }
+
+    #[test]
+    fn under_a_box_everything_is_dark_and_beside_it_only_what_is_behind() {
+        let looker =
+            [DVec3::new(-2.0, -1.0, 0.0), DVec3::new(2.0, -1.0, 0.5), DVec3::new(0.0, -1.0, -0.5)];
+        let on_floor = |p: DVec3| p.y <= -1.0 + 1e-9;
+        let identity = |p: DVec3| p;
+        let solid = Silhouette::new(&cuboid(), (identity, identity), &looker, on_floor);
+        let sides = |from: DVec3, to: DVec3| {
+            let mut count = 0;
+            let is_in = solid.cast(from, &mut Vec::new(), |n| {
+                count += 1;
+                n.dot(to - from) >= 0.0
+            });
+            (is_in, count)
+        };
+        assert_eq!(sides(DVec3::new(0.5, -1.0, 0.0), DVec3::new(9.0, 3.0, 0.0)), (true, 0));
+        let beside = DVec3::new(-1.5, -1.0, 0.0);
+        assert!(sides(beside, DVec3::new(1.0, 0.5, 0.0)).0);
+        assert!(!sides(beside, DVec3::new(1.0, 9.5, 0.0)).0);
+        assert!(!sides(beside, DVec3::new(-9.0, 0.5, 0.0)).0);
     }
 }

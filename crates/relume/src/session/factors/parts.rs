@@ -13,7 +13,7 @@ use crate::scene::{BodyId, Joined, Part, Scene};
 use crate::session::pieces::Sharing;
 
 use super::fragments::{Fragments, Spread};
-use super::sum::{Fixed, Sign, Upper, mirrored, plus};
+use super::sum::{Fixed, Sign, Upper, add, mirrored, plus};
 use super::{Factors, Grouping, Session, Solved, areas};
 
 /// Form factors between groups of the patches of a scene, from a session that solves the scene of
@@ -75,20 +75,19 @@ impl PartFactors {
             links.into_par_iter().partition(|link| !movers.meet(solved, link))
         };
         let rest = named(&solved.forest, &rest);
-        let sums = match self.resting.take() {
-            None => {
-                let none = vec![Vec::new(); self.grouping.names.len()];
-                plus(&none, &links_of(&rest), &spread, (&fixed, Sign::Plus))
-            }
+        let mut sums = vec![Vec::new(); self.grouping.names.len()];
+        match self.resting.take() {
+            None => add(&mut sums, &links_of(&rest), &spread, (&fixed, Sign::Plus)),
             Some(before) => {
                 let (gone, new) = differences(&before.links, &rest);
                 // Where a link rested there was no mover, but there may be one now.
                 let sharing = spread.sharing.of_forest(&before.forest, &movers.moves);
                 let of_old = Spread { sharing, fragments: &before.fragments };
-                let sums = plus(&before.sums, &gone, &of_old, (&fixed, Sign::Minus));
-                plus(&sums, &new, &spread, (&fixed, Sign::Plus))
+                sums = before.sums;
+                add(&mut sums, &gone, &of_old, (&fixed, Sign::Minus));
+                add(&mut sums, &new, &spread, (&fixed, Sign::Plus));
             }
-        };
+        }
         let all = plus(&sums, &moving, &spread, (&fixed, Sign::Plus));
         let factors = mirrored(areas(solved, &self.scene, &self.grouping), &all, &fixed);
         let forest = solved.forest.clone();

@@ -44,6 +44,12 @@ struct Buckets {
     entries: Vec<(u32, u64)>,
 }
 
+impl Buckets {
+    fn row(&self, row: usize) -> &[(u32, u64)] {
+        &self.entries[self.starts[row]..self.starts[row + 1]]
+    }
+}
+
 /// Sums by row, then by ascending column from the row's own on; without zeros.
 pub(super) type Upper = Vec<Vec<(u32, u64)>>;
 
@@ -95,50 +101,90 @@ fn contributions(
     Buckets { starts, entries }
 }
 
-/// Sums to which those of links are added; zeros vanish.
+/// Adds those of links to sums; zeros vanish.
+pub(super) fn add(to: &mut Upper, links: &[Link], spread: &Spread<'_>, how: (&Fixed, Sign)) {
+    let added = contributions(to.len(), links, spread, how);
+    to.par_chunks_mut(ROWS_AT_ONCE).enumerate().for_each(|(task, rows)| {
+        let mut merger = Merger::new(added.starts.len() - 1);
+        for (k, row) in rows.iter_mut().enumerate() {
+            let number = task * ROWS_AT_ONCE + k;
+            if !added.row(number).is_empty() {
+                *row = merger.merged(number, row, added.row(number));
+            }
+        }
+    });
+}
+
+/// The same sums with those of links.
 pub(super) fn plus(
     before: &Upper,
     links: &[Link],
     spread: &Spread<'_>,
     how: (&Fixed, Sign),
 ) -> Upper {
-    merged(before, &contributions(before.len(), links, spread, how))
+    let added = contributions(before.len(), links, spread, how);
+    let merge = |(task, rows): (usize, &[Vec<(u32, u64)>])| {
+        let mut merger = Merger::new(before.len());
+        let row = |(k, row): (usize, &Vec<(u32, u64)>)| {
+            let number = task * ROWS_AT_ONCE + k;
+            merger.merged(number, row, added.row(number))
+        };
+        rows.iter().enumerate().map(row).collect::<Vec<_>>()
+    };
+    before.par_chunks(ROWS_AT_ONCE).enumerate().flat_map_iter(merge).collect()
 }
 
 /// Rows that one task sums.
 const ROWS_AT_ONCE: usize = 64;
 
-/// Sums of the entries of each row by column, with those there were before.
-fn merged(before: &Upper, buckets: &Buckets) -> Upper {
-    let rows: Vec<usize> = (0..before.len()).collect();
-    let sum_rows = |rows: &[usize]| {
-        let mut sums = vec![0_u64; before.len()];
-        let mut met = vec![false; before.len()];
-        let mut touched = Vec::new();
-        let mut sum_row = |row: usize| {
-            let added = &buckets.entries[buckets.starts[row]..buckets.starts[row + 1]];
-            if added.is_empty() {
-                return before[row].clone();
+/// Of so many columns one must have been met for going through all to be quicker than sorting.
+const DENSE: usize = 16;
+
+/// Sums up the entries of a row by column.
+struct Merger {
+    sums: Vec<u64>,
+    met: Vec<bool>,
+    touched: Vec<u32>,
+}
+
+impl Merger {
+    fn new(columns: usize) -> Merger {
+        Merger { sums: vec![0; columns], met: vec![false; columns], touched: Vec::new() }
+    }
+
+    fn merged(
+        &mut self,
+        row: usize,
+        before: &[(u32, u64)],
+        added: &[(u32, u64)],
+    ) -> Vec<(u32, u64)> {
+        if added.is_empty() {
+            return before.to_vec();
+        }
+        let Merger { sums, met, touched } = self;
+        for &(column, value) in before.iter().chain(added) {
+            let at = column as usize;
+            if !std::mem::replace(&mut met[at], true) {
+                touched.push(column);
             }
-            for &(column, value) in before[row].iter().chain(added) {
-                let at = column as usize;
-                if !std::mem::replace(&mut met[at], true) {
-                    touched.push(column);
-                }
-                sums[at] = sums[at].wrapping_add(value);
-            }
-            touched.sort_unstable();
-            let take = |c: &u32| {
-                met[*c as usize] = false;
-                (*c, std::mem::take(&mut sums[*c as usize]))
-            };
-            let out = touched.iter().map(take).filter(|(_, sum)| *sum > 0).collect();
+            sums[at] = sums[at].wrapping_add(value);
+        }
+        if touched.len() * DENSE > met.len() {
             touched.clear();
-            out
-        };
-        rows.iter().map(|&row| sum_row(row)).collect::<Vec<_>>()
-    };
-    rows.par_chunks(ROWS_AT_ONCE).flat_map_iter(sum_rows).collect()
+            touched.extend((row as u32..met.len() as u32).filter(|&c| met[c as usize]));
+        } else {
+            touched.sort_unstable();
+        }
+        let mut out = Vec::with_capacity(touched.len());
+        for column in touched.drain(..) {
+            met[column as usize] = false;
+            let sum = std::mem::take(&mut sums[column as usize]);
+            if sum > 0 {
+                out.push((column, sum));
+            }
+        }
+        out
+    }
 }
 
 /// Both triangles of a symmetric matrix whose upper one is given.
@@ -156,23 +202,43 @@ pub(super) fn mirrored(area_m2: Vec<f64>, upper: &[Vec<(u32, u64)>], fixed: &Fix
     for row in 1..=groups {
         offsets[row] += offsets[row - 1];
     }
-    let mut next = offsets.clone();
     let mut columns = vec![0; offsets[groups]];
     let mut exchange_m2 = vec![0.0; offsets[groups]];
-    let mut put = |row: usize, column: u32, value: f64| {
-        (columns[next[row]], exchange_m2[next[row]]) = (column, value);
-        next[row] += 1;
-    };
-    // Row by row, so that columns ascend: what is left of the diagonal comes from rows above.
-    for (row, entries) in upper.iter().enumerate() {
-        for &(column, whole) in entries {
-            let value = fixed.area_m2(whole);
-            put(row, column, value);
-            if column as usize != row {
-                put(column as usize, row as u32, value);
+    let (mut columns_left, mut values_left) = (&mut columns[..], &mut exchange_m2[..]);
+    let mut tasks = Vec::new();
+    for first in (0..groups).step_by(ROWS_AT_ONCE) {
+        let rows = first..(first + ROWS_AT_ONCE).min(groups);
+        let len = offsets[rows.end] - offsets[rows.start];
+        let (columns, values);
+        (columns, columns_left) = columns_left.split_at_mut(len);
+        (values, values_left) = values_left.split_at_mut(len);
+        tasks.push((rows, columns, values));
+    }
+    tasks.into_par_iter().for_each(|(rows, columns, values)| {
+        let start = offsets[rows.start];
+        let mut next: Vec<usize> = offsets[rows.clone()].iter().map(|o| o - start).collect();
+        let mut put = |row: usize, column: usize, whole: u64| {
+            let next = &mut next[row - rows.start];
+            (columns[*next], values[*next]) = (column as u32, fixed.area_m2(whole));
+            *next += 1;
+        };
+        // Row by row, so that columns ascend: what is left of the diagonal comes from rows above.
+        for (row, entries) in upper[..rows.end].iter().enumerate() {
+            let of_tasks = entries.partition_point(|e| (e.0 as usize) < rows.start);
+            for &(column, whole) in &entries[of_tasks..] {
+                let column = column as usize;
+                if column >= rows.end {
+                    break;
+                }
+                if column != row {
+                    put(column, row, whole);
+                }
+            }
+            if rows.contains(&row) {
+                entries.iter().for_each(|&(column, whole)| put(row, column as usize, whole));
             }
         }
-    }
+    });
     let inverse = |a: &f64| if *a > 0.0 { 1.0 / a } else { 0.0 };
     let left = area_m2.iter().map(inverse).collect();
     Factors { area_m2, offsets, columns, exchange_m2, left, right: vec![1.0; groups] }

@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
+use rayon::prelude::*;
 use relume::scene::Scene;
 use relume::session::{self, Closure, Factors, FrameReport, Grouping, PartFactors};
 use relume_picture::export::{self, Npz, WholeFile, probe, write_atomically};
@@ -178,12 +179,13 @@ struct RowSums {
 fn row_sums(factors: &Factors, things: &Things) -> (RowSums, f64) {
     let mut out = RowSums { min: f64::INFINITY, max: f64::NEG_INFINITY, ..RowSums::default() };
     let (mut squares, mut rows, mut escaped, mut area) = (0.0, 0, 0.0, 0.0);
-    for group in 0..factors.len() as u32 {
-        let a = factors.area_m2[group as usize];
+    let sums: Vec<f64> =
+        (0..factors.len() as u32).into_par_iter().map(|group| factors.row_sum(group)).collect();
+    for (group, sum) in sums.into_iter().enumerate() {
+        let (a, group) = (factors.area_m2[group], group as u32);
         if a == 0.0 {
             continue;
         }
-        let sum = factors.row_sum(group);
         if sum < out.min {
             (out.min, out.min_of) = (sum, things.name(group).to_owned());
         }
@@ -226,7 +228,7 @@ fn frames(
             session.step(frame, clip.time_of(frame)).map_err(|error| step_failure(error, ""))?;
         let summing = now();
         let mut factors = sums.factors(&session);
-        let (sums, escapes) = row_sums(&factors, things);
+        let (row_sums, escapes) = row_sums(&factors, things);
         factors.close(closure(args.closure)).map_err(|open| not_closed(frame, &open, things))?;
         let seconds_summing = summing.elapsed().as_secs_f64();
         let kept = before.as_ref().filter(|_| args.changed_only);
@@ -237,12 +239,14 @@ fn frames(
             links: report.links,
             entries: factors.entries(),
             written,
-            row_sums: sums,
+            row_sums,
             escapes,
             seconds: report.seconds.total,
             seconds_summing,
         });
-        before = Some(factors);
+        if let Some(gone) = before.replace(factors) {
+            sums.recycle(gone);
+        }
         progress.finish_frame();
     }
     Ok(out)

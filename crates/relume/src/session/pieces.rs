@@ -64,7 +64,7 @@ const CLIPPED_MAX: usize = 96;
 
 /// Form factor of a piece to the other end times the bend of visibility over the piece above which it
 /// is looked at from more points, as a share of the tolerance.
-const CLOSER: f64 = 7.5e-3;
+const CLOSER: f64 = 0.01;
 
 /// Pieces are side by side if their middles are closer than this share of their radii.
 const BESIDE: f64 = 1.01;
@@ -80,7 +80,7 @@ const CELLS_MAX: f64 = 8.0;
 const AROUND: usize = 32;
 
 /// Bend of visibility that pieces side by side which agree may have overlooked.
-const UNSEEN: f64 = 0.3;
+const UNSEEN: f64 = 0.6;
 
 /// The same where what blocks is nearer than this many radii of the piece.
 const NEAR: f64 = 4.0;
@@ -223,7 +223,9 @@ impl<'a> Sharing<'a> {
             let b = b_sees.as_ref().map_or(v, |sees| sees[k % columns]);
             *share *= (a + b - v).clamp(SEEN_MIN, 1.0);
         }
-        for _ in 0..FITS {
+        // To one side alone they fit at once.
+        let fits = if rows.is_some() && down.is_some() { FITS } else { 1 };
+        for _ in 0..fits {
             if let Some(rows) = &rows {
                 for (row, wanted) in shares.chunks_mut(columns).zip(rows) {
                     let sum: f64 = row.iter().sum();

@@ -204,7 +204,8 @@ impl Lookout {
         if self.other.distance(point) > 0.0 && self.target.len() >= 3 {
             let from = self.frame.place(point);
             self.cutter.cut(from, &self.target, &self.between);
-            self.looks.push(from, part.offset(point), &self.target, &self.cutter);
+            let at = if self.looks.with_moments { part.offset(point) } else { DVec2::ZERO };
+            self.looks.push(from, at, &self.target, &self.cutter);
         } else {
             self.looks.push_nothing();
         }
@@ -430,8 +431,10 @@ impl Looks {
             if let What::Target { .. } = seen.what {
                 self.points.push((f, 0.0));
                 sums.all += f;
-                sums.at_looker += seen.at * f;
-                sums.at_other += seen.centroid * f;
+                if self.with_moments {
+                    sums.at_looker += seen.at * f;
+                    sums.at_other += seen.centroid * f;
+                }
             }
             let clear = match seen.what {
                 What::Target { clear: true } | What::Clear => f,
@@ -440,8 +443,10 @@ impl Looks {
             };
             self.points.last_mut().expect("a target comes first").1 += clear;
             sums.clear += clear;
-            sums.at_looker_clear += seen.at * clear;
-            sums.at_other_clear += seen.centroid * clear;
+            if self.with_moments {
+                sums.at_looker_clear += seen.at * clear;
+                sums.at_other_clear += seen.centroid * clear;
+            }
         }
         self.points[first..].iter().for_each(|&(all, clear)| self.sums.finish_point(all, clear));
         self.seen.clear();

@@ -15,7 +15,7 @@ pub use grouping::Grouping;
 pub use parts::PartFactors;
 
 use fragments::{Fragments, Spread};
-use sum::{Fixed, Sign, mirrored, plus};
+use sum::{Fixed, Room, Sign, mirrored, plus};
 
 /// What is done to form factors so that rows sum to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -228,7 +228,7 @@ impl Session {
         let spread = Spread { sharing: Sharing::new(self, solved), fragments: &fragments };
         let none = vec![Vec::new(); grouping.names.len()];
         let upper = plus(&none, &links, &spread, (&fixed, Sign::Plus));
-        mirrored(areas(solved, &self.scene, grouping), &upper, &fixed)
+        mirrored(areas(solved, &self.scene, grouping), &upper, &fixed, Room::default())
     }
 }
 
@@ -256,7 +256,7 @@ mod tests {
         let upper: Vec<Vec<(u32, u64)>> = (0..3)
             .map(|r| (r..3).map(|c| (c as u32, whole(rows[r][c]))).filter(|e| e.1 > 0).collect())
             .collect();
-        mirrored(vec![1.0, 2.0, 4.0], &upper, &fixed)
+        mirrored(vec![1.0, 2.0, 4.0], &upper, &fixed, Room::default())
     }
 
     /// Rows sum to 1.02, 0.97 and 0.995.

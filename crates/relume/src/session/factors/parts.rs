@@ -13,7 +13,7 @@ use crate::scene::{BodyId, Joined, Part, Scene};
 use crate::session::pieces::Sharing;
 
 use super::fragments::{Fragments, Spread};
-use super::sum::{Fixed, Sign, Upper, add, mirrored, plus};
+use super::sum::{Fixed, Room, Sign, Upper, add, mirrored, plus};
 use super::{Factors, Grouping, Session, Solved, areas};
 
 /// Form factors between groups of the patches of a scene, from a session that solves the scene of
@@ -28,6 +28,7 @@ pub struct PartFactors {
     parts: Vec<Vec<Part>>,
     grouping: Grouping,
     resting: Option<Resting>,
+    room: Room,
 }
 
 /// Sums over links that nothing moving has to do with.
@@ -54,7 +55,7 @@ impl PartFactors {
     pub fn new(scene: &Arc<Scene>, joined: &Joined, grouping: Grouping) -> PartFactors {
         assert_eq!(grouping.of_patch.len(), scene.patches.len());
         let (scene, parts) = (Arc::clone(scene), joined.parts.clone());
-        PartFactors { scene, parts, grouping, resting: None }
+        PartFactors { scene, parts, grouping, resting: None, room: Room::default() }
     }
 
     /// Form factors at the present instant of the session; the same, bit for bit, whatever came before.
@@ -89,10 +90,16 @@ impl PartFactors {
             }
         }
         let all = plus(&sums, &moving, &spread, (&fixed, Sign::Plus));
-        let factors = mirrored(areas(solved, &self.scene, &self.grouping), &all, &fixed);
+        let room = std::mem::take(&mut self.room);
+        let factors = mirrored(areas(solved, &self.scene, &self.grouping), &all, &fixed, room);
         let forest = solved.forest.clone();
         self.resting = Some(Resting { sums, links: rest, forest, fragments });
         factors
+    }
+
+    /// Takes back a table that is not needed any more, whose room the next one may have.
+    pub fn recycle(&mut self, factors: Factors) {
+        self.room = factors.into();
     }
 }
 

@@ -187,8 +187,26 @@ impl Merger {
     }
 }
 
+/// Room that a table had: pages that are there already are half the price of filling one.
+#[derive(Default)]
+pub(super) struct Room {
+    columns: Vec<u32>,
+    exchange_m2: Vec<f64>,
+}
+
+impl From<Factors> for Room {
+    fn from(factors: Factors) -> Room {
+        Room { columns: factors.columns, exchange_m2: factors.exchange_m2 }
+    }
+}
+
 /// Both triangles of a symmetric matrix whose upper one is given.
-pub(super) fn mirrored(area_m2: Vec<f64>, upper: &[Vec<(u32, u64)>], fixed: &Fixed) -> Factors {
+pub(super) fn mirrored(
+    area_m2: Vec<f64>,
+    upper: &[Vec<(u32, u64)>],
+    fixed: &Fixed,
+    room: Room,
+) -> Factors {
     let groups = area_m2.len();
     let mut offsets = vec![0; groups + 1];
     for (row, entries) in upper.iter().enumerate() {
@@ -202,8 +220,10 @@ pub(super) fn mirrored(area_m2: Vec<f64>, upper: &[Vec<(u32, u64)>], fixed: &Fix
     for row in 1..=groups {
         offsets[row] += offsets[row - 1];
     }
-    let mut columns = vec![0; offsets[groups]];
-    let mut exchange_m2 = vec![0.0; offsets[groups]];
+    // Every entry is written below.
+    let Room { mut columns, mut exchange_m2 } = room;
+    columns.resize(offsets[groups], 0);
+    exchange_m2.resize(offsets[groups], 0.0);
     let (mut columns_left, mut values_left) = (&mut columns[..], &mut exchange_m2[..]);
     let mut tasks = Vec::new();
     for first in (0..groups).step_by(ROWS_AT_ONCE) {

@@ -339,7 +339,7 @@ impl Placed<'_> {
             let brings = self.brings(brightness, ends, x.area_m2);
             let limit = CLOSE_SHARE * threshold;
             most = if brings > limit { CLIPPED_MAX_CLOSE } else { CLIPPED_MAX_REST };
-            if (CLIPPED_MAX_REST + 1..=CLIPPED_MAX_CLOSE).contains(&blockers.len()) {
+            if (CLIPPED_MAX_REST + 1..=CLIPPED_MAX_CLOSE).contains(&shaft.occluders(&blockers)) {
                 way = Margin::between(brings.max(limit), brings.min(limit));
             }
         }
@@ -407,13 +407,12 @@ impl Placed<'_> {
         } else {
             // The error of n x n points on a function with kinks falls as 1 / n^2.
             let spread = if v.from_a { v.spread_a } else { v.spread_b };
-            let cells = match stake * spread.max(UNSEEN) {
-                s if s <= CLOSER => return v,
-                s if s <= 4.0 * CLOSER => 2,
-                s if s <= 16.0 * CLOSER => 4,
-                _ => 8,
-            };
-            let from = (Looker::Best, cells);
+            let error = stake * spread.max(UNSEEN);
+            if error <= CLOSER {
+                return v;
+            }
+            let cells = (error / CLOSER).sqrt().ceil().min(CELLS_MAX);
+            let from = (Looker::Best, cells as u32);
             exact_visibility(self.simd, shaft, blockers, from, blockers.len()).unwrap_or(v)
         };
         Visibility { segments: v.segments + again.segments, ..again }
@@ -556,10 +555,10 @@ impl Places {
     }
 }
 
-/// Where a pair brings this many thresholds or more, any number of polygons is clipped in reason.
+/// Where a pair brings this many thresholds or more, any number of occluders is clipped in reason.
 const CLOSE_SHARE: f64 = 2.0;
 
-/// Occluding polygons up to which pairs are clipped that bring so much.
+/// Occluders up to which pairs are clipped that bring so much.
 const CLIPPED_MAX_CLOSE: usize = 96;
 
 /// The same for pairs that bring less: sampling a few of their shares of light does little harm.
@@ -570,6 +569,9 @@ const UNSEEN: f64 = 0.05;
 
 /// Thresholds below this ask for no more points a link: elements shrink instead.
 const FINEST: f64 = 0.005;
+
+/// Parts of a looker along each side from which it looks at most.
+const CELLS_MAX: f64 = 8.0;
 
 /// Stake times spread of visibility above which a link is clipped from more points.
 const CLOSER: f64 = 0.05;

@@ -213,27 +213,33 @@ impl<'a> Look<'a> {
             children.for_each(|child| self.add_element(ElementId(child), &in_the_way, sum));
             return;
         }
-        let factor = if in_the_way.is_empty() {
-            form_factor_from_point(self.point, self.normal, seen)
+        let b = self.solved.radiosity.linear(id.0);
+        let (factor, b) = if in_the_way.is_empty() {
+            (form_factor_from_point(self.point, self.normal, seen), b.mean)
         } else {
-            self.factor_past(seen, &in_the_way, SPLITS)
+            // The part in view may be much brighter or darker than the rest.
+            let (factor, moment) = self.factor_past(seen, &in_the_way, SPLITS);
+            let at = e.offset(moment / factor.max(f64::MIN_POSITIVE)) / e.radius;
+            (factor, b.at(at.x as f32, at.y as f32).map(|b| b.max(0.0)))
         };
-        let b = self.solved.radiosity.radiosity(id.0);
-        (0..3).for_each(|c| sum[c] += factor * f64::from(b[c]));
+        if factor > 0.0 {
+            (0..3).for_each(|c| sum[c] += factor * f64::from(b[c]));
+        }
     }
 
-    fn factor_past(&self, seen: &[DVec3], occluders: &[&Occluder], splits: u32) -> f64 {
+    /// The form factor to what is seen of a polygon past occluders, and that times the middle of it.
+    fn factor_past(&self, seen: &[DVec3], occluders: &[&Occluder], splits: u32) -> (f64, DVec3) {
         let polygons = occluders.iter().map(|o| o.corners.as_slice());
         let found = form_factor_past(self.point, self.normal, seen, polygons);
         if found.is_exact {
-            return found.factor;
+            return (found.factor, found.middle * found.factor);
         }
         let middle = seen.iter().sum::<DVec3>() / seen.len() as f64;
         if splits == 0 {
             let view = &self.solved.view;
             let clear = segment_is_clear(view, self.forest, self.point, middle, self.slack_m);
             let f = form_factor_from_point(self.point, self.normal, seen);
-            return if clear { f } else { 0.0 };
+            return if clear { (f, middle * f) } else { (0.0, DVec3::ZERO) };
         }
         // Towards the corners: each part is a quadrilateral.
         let n = seen.len();
@@ -245,7 +251,7 @@ impl<'a> Look<'a> {
             let rest: Vec<&Occluder> = occluders.iter().filter(hides).copied().collect();
             self.factor_past(&part, &rest, splits - 1)
         };
-        (0..n).map(part).sum()
+        (0..n).map(part).fold((0.0, DVec3::ZERO), |sum, part| (sum.0 + part.0, sum.1 + part.1))
     }
 }
 

@@ -204,7 +204,7 @@ impl Lookout {
         if self.other.distance(point) > 0.0 && self.target.len() >= 3 {
             let from = self.frame.place(point);
             self.cutter.cut(from, &self.target, &self.between);
-            let at = if self.looks.with_moments { part.offset(point) } else { DVec2::ZERO };
+            let at = if self.looks.moments.is_some() { part.offset(point) } else { DVec2::ZERO };
             self.looks.push(from, at, &self.target, &self.cutter);
         } else {
             self.looks.push_nothing();
@@ -230,7 +230,7 @@ pub(super) fn clipped_visibility(
     };
     let (looker, other) = if a_looks { (a, b) } else { (b, a) };
     let mut lookout = Lookout::new(simd, looker, other, between);
-    lookout.looks.with_moments = true;
+    lookout.looks.moments = Some(lookout.normal);
     let sums = lookout.look(looker, cells);
     let value = sums.visibility();
     let over_looker = gradient(looker, sums.at_looker, sums.at_looker_clear, sums.all, sums.clear);
@@ -268,30 +268,21 @@ fn looks_best(a: &WorldElement, b: &WorldElement, between: &Between<'_>) -> bool
     }
 }
 
-/// Form factor from a point to the part of a convex polygon (wholly in front of the point's tangent
-/// plane) that convex occluders leave visible; exact up to rounding. Occluders must have been
-/// clipped to between the two.
-pub fn visible_form_factor(
-    point: DVec3,
-    normal: DVec3,
-    target: &ConvexPolygon,
-    occluders: &[ConvexPolygon],
-) -> f64 {
-    let occluders = occluders.iter().map(ConvexPolygon::corners);
-    form_factor_past(point, normal, target.corners(), occluders).factor
-}
-
 /// A form factor past occluders.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FactorPast {
     /// Form factor from the point to what it sees.
     pub factor: f64,
+    /// The middle of what it sees, weighed as it arrives; of no meaning where it sees nothing.
+    pub middle: DVec3,
     /// Exact up to rounding; else the target fell into too many pieces, and `factor` counts some
     /// of what is hidden.
     pub is_exact: bool,
 }
 
-/// [`visible_form_factor`] for any number of occluders of any number of corners.
+/// Form factor from a point to the part of a convex polygon (wholly in front of the point's tangent
+/// plane) that convex occluders leave visible; exact up to rounding. Occluders must have been
+/// clipped to between the two.
 pub fn form_factor_past<'a>(
     point: DVec3,
     normal: DVec3,
@@ -309,16 +300,18 @@ pub fn form_factor_past<'a>(
     cutter.cut(from, &frame.flat(target), &between);
     let normal = frame.direction(normal);
     let mut solid = Vec::new();
-    let mut factor = |piece: &[DVec2]| {
+    let (mut factor, mut moment) = (0.0, DVec2::ZERO);
+    let mut add = |piece: &[DVec2], sign: f64| {
         solid.clear();
         solid.extend(piece.iter().map(|c| c.extend(0.0)));
-        form_factor_from_point(from, normal, &solid)
+        let sent = sign * form_factor_from_point(from, normal, &solid);
+        factor += sent;
+        moment += middle_of_sent(piece, from, normal) * sent;
     };
-    FactorPast {
-        factor: cutter.left.iter().map(&mut factor).sum::<f64>()
-            - cutter.dark.iter().map(&mut factor).sum::<f64>(),
-        is_exact: cutter.left.len() <= FRAGMENTS_MAX,
-    }
+    cutter.left.iter().for_each(|piece| add(piece, 1.0));
+    cutter.dark.iter().for_each(|piece| add(piece, -1.0));
+    let middle = frame.point(if factor > 0.0 { moment / factor } else { DVec2::ZERO });
+    FactorPast { factor, middle, is_exact: cutter.left.len() <= FRAGMENTS_MAX }
 }
 
 /// The frame of a target: the first two axes in its plane, the third towards its front.
@@ -348,6 +341,11 @@ impl TargetFrame {
         self.direction(p - self.origin)
     }
 
+    /// A point of the target's plane.
+    fn point(&self, p: DVec2) -> DVec3 {
+        self.origin + self.axes[0] * p.x + self.axes[1] * p.y
+    }
+
     /// Corners of the target within its plane.
     fn flat(&self, corners: &[DVec3]) -> Vec<DVec2> {
         corners.iter().map(|&c| self.place(c).truncate()).collect()
@@ -360,8 +358,8 @@ struct Looks {
     sums: Sums,
     /// Form factors from each point, of the target and of what is clear of it.
     points: Vec<(f64, f64)>,
-    /// First moments are wanted.
-    with_moments: bool,
+    /// If first moments are wanted, the looker's normal.
+    moments: Option<DVec3>,
     edges: EdgeBundles,
     seen: Vec<Seen>,
 }
@@ -371,8 +369,8 @@ struct Seen {
     what: What,
     /// The point, within its element.
     at: DVec2,
-    /// The polygon's centroid.
-    centroid: DVec2,
+    /// The middle of what the polygon sends.
+    middle: DVec2,
     /// Where its edges end in the list of edges.
     edges_end: usize,
 }
@@ -397,7 +395,7 @@ impl Looks {
     fn push_nothing(&mut self) {
         let edges_end = self.edges.len();
         let what = What::Target { clear: true };
-        self.seen.push(Seen { what, at: DVec2::ZERO, centroid: DVec2::ZERO, edges_end });
+        self.seen.push(Seen { what, at: DVec2::ZERO, middle: DVec2::ZERO, edges_end });
     }
 
     fn push(&mut self, from: DVec3, at: DVec2, target: &[DVec2], cutter: &Cutter) {
@@ -415,8 +413,8 @@ impl Looks {
             p = q;
         }
         let edges_end = self.edges.len();
-        let centroid = if self.with_moments { centroid(c) } else { DVec2::ZERO };
-        self.seen.push(Seen { what, at, centroid, edges_end });
+        let middle = self.moments.map_or(DVec2::ZERO, |normal| middle_of_sent(c, from, normal));
+        self.seen.push(Seen { what, at, middle, edges_end });
     }
 
     /// Adds up what was pushed since the last call.
@@ -431,9 +429,9 @@ impl Looks {
             if let What::Target { .. } = seen.what {
                 self.points.push((f, 0.0));
                 sums.all += f;
-                if self.with_moments {
+                if self.moments.is_some() {
                     sums.at_looker += seen.at * f;
-                    sums.at_other += seen.centroid * f;
+                    sums.at_other += seen.middle * f;
                 }
             }
             let clear = match seen.what {
@@ -443,9 +441,9 @@ impl Looks {
             };
             self.points.last_mut().expect("a target comes first").1 += clear;
             sums.clear += clear;
-            if self.with_moments {
+            if self.moments.is_some() {
                 sums.at_looker_clear += seen.at * clear;
-                sums.at_other_clear += seen.centroid * clear;
+                sums.at_other_clear += seen.middle * clear;
             }
         }
         self.points[first..].iter().for_each(|&(all, clear)| self.sums.finish_point(all, clear));
@@ -499,14 +497,20 @@ fn gradient(e: &WorldElement, at: DVec2, at_clear: DVec2, all: f64, clear: f64) 
     e.gradient_of_shift(at_clear / clear - at / all)
 }
 
-fn centroid(c: &[DVec2]) -> DVec2 {
-    let (mut sum, mut area) = (DVec2::ZERO, 0.0);
+/// The middle of what a polygon sends to a point with a normal: of its triangles, each with the kernel at its
+/// middle.
+fn middle_of_sent(c: &[DVec2], from: DVec3, normal: DVec3) -> DVec2 {
+    let (mut sum, mut weight) = (DVec2::ZERO, 0.0);
     for k in 1..c.len() - 1 {
         let twice = (c[k] - c[0]).perp_dot(c[k + 1] - c[0]);
-        sum += (c[0] + c[k] + c[k + 1]) * (twice / 3.0);
-        area += twice;
+        let middle = (c[0] + c[k] + c[k + 1]) / 3.0;
+        let way = middle.extend(0.0) - from;
+        let r2 = way.length_squared();
+        let sent = twice * normal.dot(way).max(0.0) / (r2 * r2);
+        sum += middle * sent;
+        weight += sent;
     }
-    if area != 0.0 { sum / area } else { c[0] }
+    if weight != 0.0 { sum / weight } else { c[0] }
 }
 
 #[cfg(test)]

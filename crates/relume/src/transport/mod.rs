@@ -16,7 +16,7 @@ pub use exchange::{
     Exchange, Meeting, Variation, exchange, exchange_of_points, light_at, light_exchange, meeting,
 };
 pub use kernel::Simd;
-pub use lookout::{FactorPast, Looker, Lookout, form_factor_past, visible_form_factor};
+pub use lookout::{FactorPast, Looker, Lookout, form_factor_past};
 pub use point::form_factor_from_point;
 pub use segments::{SEGMENTS, SegmentBundle};
 pub use visibility::{

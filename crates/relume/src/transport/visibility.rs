@@ -215,6 +215,20 @@ impl<'a> Shaft<'a> {
         blockers.iter().copied().filter(blocks).collect()
     }
 
+    /// How many occluders patches make up: the faces of a solid are one.
+    pub fn occluders(&self, blockers: &[PatchId]) -> usize {
+        let mut solids: Vec<u32> = Vec::new();
+        let is_first = |patch: &&PatchId| match self.forest.solid(**patch) {
+            Some(solid) if solids.contains(&solid) => false,
+            Some(solid) => {
+                solids.push(solid);
+                true
+            }
+            None => true,
+        };
+        blockers.iter().filter(is_first).count()
+    }
+
     /// Whether anything at or below `id` may block segments of this pair or of one below it,
     /// what rides on `except` aside.
     pub fn is_entered_by(&self, id: ElementId, except: Option<BodyId>) -> bool {
@@ -357,12 +371,12 @@ pub fn visibility(
     tally.finish(1 << log2_count, a, b)
 }
 
-/// Occluding polygons up to which partial visibility is found by clipping where nothing is known of
-/// the light.
+/// Occluders up to which partial visibility is found by clipping where nothing is known of the light.
 pub const CLIPPED_MAX: usize = 12;
 
 /// Visibility of a pair by clipping, exact from 2 x 2 points in each of `cells` x `cells` parts of
-/// the looker. Each point counts as a segment. `None` if more than `most` polygons stand in the shaft.
+/// the looker. Each point counts as a segment. `None` if more than `most` occluders stand in the shaft
+/// ([`Shaft::occluders`]).
 pub fn exact_visibility(
     simd: Simd,
     shaft: &Shaft<'_>,
@@ -373,7 +387,7 @@ pub fn exact_visibility(
     if blockers.is_empty() {
         return Some(Visibility::CLEAR);
     }
-    if blockers.len() > most {
+    if shaft.occluders(blockers) > most {
         return None;
     }
     let ends = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));

@@ -9,7 +9,7 @@ use crate::event::{Foresight, Lookahead, Tick};
 use crate::geometry::Aabb;
 use crate::pair::{
     Carried, CullReason, Finding, Gradients, Hierarchy, Judge, Judgement, Margin, Outlook, Side,
-    Stale, Verdict,
+    Stale, Verdict, in_steps,
 };
 
 use super::certificate::FlatOutlook;
@@ -333,7 +333,7 @@ impl FlatPlaced<'_> {
         };
         let carried = Carried {
             exchange_area_m2: exchange as f32,
-            visibility: (visibility * 65_535.0).round() as u16,
+            visibility: in_steps(visibility),
             gradients: match self.constant {
                 true => Gradients::default(),
                 false => gradients(ends, &blockers),

@@ -20,7 +20,7 @@ use super::margin::Margin;
 use super::oracle::{End, Oracle, Side, estimate};
 use super::outlook::{Finding, Outlook};
 use super::since::Since;
-use super::tree::{Carried, CullReason, Gradients};
+use super::tree::{Carried, CullReason, Gradients, in_steps};
 use super::update::{Hierarchy, Judge, Judgement, Stale, Verdict};
 
 /// How far pairs are decided.
@@ -195,7 +195,7 @@ fn carrying(
         (x.over_a.gradient + v.gradient_a, a.radius),
         (x.over_b.gradient + v.gradient_b, b.radius),
     );
-    let visibility = (v.value * 65_535.0).round() as u16;
+    let visibility = in_steps(v.value);
     let carried = Carried { exchange_area_m2: x.area_m2 as f32, visibility, gradients };
     Judgement { verdict, carried, margin: Margin::FIRM, segments: v.segments }
 }
@@ -568,7 +568,7 @@ const CLIPPED_MAX_REST: usize = 4;
 const UNSEEN: f64 = 0.05;
 
 /// Thresholds below this ask for no more points a link: elements shrink instead.
-const FINEST: f64 = 0.005;
+const FINEST: f64 = 0.002;
 
 /// Parts of a looker along each side from which it looks at most.
 const CELLS_MAX: f64 = 8.0;

@@ -21,7 +21,9 @@ pub use margin::{Margin, Shift};
 pub use oracle::{Oracle, Side};
 pub use outlook::Finding;
 pub use since::Since;
-pub use tree::{Carried, CullReason, Gradients, Link, PairId, PairTree, State, StateCounts};
+pub use tree::{
+    Carried, CullReason, Gradients, Link, PairId, PairTree, State, StateCounts, in_steps,
+};
 // The plane has certificates of its own.
 pub(crate) use outlook::{Moves, Outlook};
 

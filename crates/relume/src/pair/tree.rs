@@ -85,6 +85,13 @@ pub struct Gradients {
     pub over_b: [i8; 2],
 }
 
+/// A visibility from 0 to 1 in 65,535ths. One half, the commonest value between 0 and 1, would be a tie:
+/// ties, and what rounding makes of them, always go down.
+pub fn in_steps(visibility: f64) -> u16 {
+    const TIE: f64 = 1e-6;
+    (visibility * 65_535.0 + (0.5 - TIE)).floor() as u16
+}
+
 impl Gradients {
     /// The largest that is told from larger ones.
     pub const MAX: f32 = 4.0;
@@ -570,6 +577,14 @@ mod tests {
         assert_eq!(tree.link(PairTree::ROOT).unwrap().carried, carried);
         assert_eq!(tree.margin(PairTree::ROOT), margin);
         assert_eq!(carried.visibility(), 1.0);
+    }
+
+    #[test]
+    fn one_half_is_one_value_however_it_was_summed() {
+        for noise in [-1e-12, 0.0, 1e-12] {
+            assert_eq!(in_steps(0.5 + noise), 32_767);
+        }
+        assert_eq!((in_steps(0.0), in_steps(1.0), in_steps(1.0 - 1e-12)), (0, 65_535, 65_535));
     }
 
     #[test]

@@ -85,12 +85,41 @@ impl Silhouette {
         Silhouette { corners, faces, always, sometimes }
     }
 
-    /// About the solid angle that it hides from a point.
+    /// About twice the solid angle that it hides from a point, as that of a polygon is estimated.
     pub(super) fn size(&self, from: DVec3) -> f64 {
         let away = self.corners.iter().sum::<DVec3>() / self.corners.len() as f64 - from;
-        let about = |c: &DVec3| (*c - from - away).length_squared();
-        let radius2 = self.corners.iter().map(about).fold(0.0, f64::max);
-        radius2 / away.length_squared().max(f64::MIN_POSITIVE)
+        let r2 = away.length_squared().max(f64::MIN_POSITIVE);
+        // Twice the area within the outline, but for edges that bound nothing in front.
+        let mut area = DVec3::ZERO;
+        let sides = self.always.iter().copied();
+        for [p, q] in sides.chain(self.outline(from, &mut Vec::new())) {
+            area += (self.corners[p] - from).cross(self.corners[q] - from);
+        }
+        area.dot(away).abs() / (r2 * r2.sqrt())
+    }
+
+    /// Which of the edges that bound the shadow of some points bound that of this one.
+    fn outline<'a>(
+        &'a self,
+        point: DVec3,
+        seen: &'a mut Vec<bool>,
+    ) -> impl Iterator<Item = [usize; 2]> + 'a {
+        seen.clear();
+        let is_seen = |f: &Face| f.normal.dot(point - self.corners[f.corner]) > 0.0;
+        seen.extend(self.faces.iter().map(is_seen));
+        self.sometimes.iter().filter_map(|edge| {
+            let [p, q] = edge.ends;
+            let sees = |sight| match sight {
+                Sight::All => true,
+                Sight::None => false,
+                Sight::Some(face) => seen[face],
+            };
+            match edge.faces.map(sees) {
+                [true, false] => Some([q, p]),
+                [false, true] => Some([p, q]),
+                _ => None,
+            }
+        })
     }
 
     /// Calls `side` with the normal, into the shadow and of any length, of each plane through the point
@@ -103,22 +132,8 @@ impl Silhouette {
         mut side: impl FnMut(DVec3) -> bool,
     ) -> bool {
         let mut between =
-            |p: usize, q: usize| side((self.corners[p] - point).cross(self.corners[q] - point));
-        if !self.always.iter().all(|&[p, q]| between(p, q)) {
-            return false;
-        }
-        seen.clear();
-        let is_seen = |f: &Face| f.normal.dot(point - self.corners[f.corner]) > 0.0;
-        seen.extend(self.faces.iter().map(is_seen));
-        self.sometimes.iter().all(|edge| {
-            let [p, q] = edge.ends;
-            let [left, right] = edge.faces.map(|sight| match sight {
-                Sight::All => true,
-                Sight::None => false,
-                Sight::Some(face) => seen[face],
-            });
-            left == right || if left { between(q, p) } else { between(p, q) }
-        })
+            |[p, q]: [usize; 2]| side((self.corners[p] - point).cross(self.corners[q] - point));
+        self.always.iter().all(|&ends| between(ends)) && self.outline(point, seen).all(between)
     }
 }
 

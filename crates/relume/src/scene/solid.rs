@@ -54,6 +54,9 @@ pub struct Solids {
 /// lie in front of a face: a few roundings of 32-bit numbers.
 const WELDED: f64 = 1e-6;
 
+/// How far behind each face of a solid its furthest corner is at least, in weld tolerances.
+const THICK: f64 = 16.0;
+
 /// Faces beyond which nobody looks whether a solid is convex.
 const FACES_MAX: usize = 1_024;
 
@@ -72,33 +75,48 @@ impl Scene {
         let reach = one_sided().flat_map(|(_, p)| p.corners_in_body()).fold(0.0, coordinates);
         let mut weld = Weld::new(WELDED * reach);
         let face = |(id, patch): (super::PatchId, &super::Patch)| {
-            let corners = patch.corners_in_body().map(|c| weld.vertex(c)).collect();
+            let mut corners: Vec<u32> = patch.corners_in_body().map(|c| weld.vertex(c)).collect();
+            corners.dedup();
+            if corners.len() > 1 && corners.first() == corners.last() {
+                corners.pop();
+            }
             Face { patch: id.0, corners, normal: patch.frame.normal, origin: patch.frame.origin }
         };
-        let faces: Vec<Face> = one_sided().map(face).collect();
+        // What is thinner than the tolerance has no sides to meet others along.
+        let faces: Vec<Face> = one_sided().map(face).filter(|f| f.corners.len() > 2).collect();
         for group in closed(&faces) {
             let group: Vec<&Face> = group.into_iter().map(|f| &faces[f]).collect();
-            if group.len() <= FACES_MAX && is_convex(&group, &weld) {
+            if group.len() <= FACES_MAX
+                && is_convex(&group, &weld)
+                && let Some(solid) = solid(body, &group, &weld)
+            {
                 let number = out.list.len() as u32;
                 group.iter().for_each(|f| out.of_patch[f.patch as usize] = Some(number));
-                out.list.push(solid(body, &group, &weld));
+                out.list.push(solid);
             }
         }
     }
 }
 
+/// Whether no corner is in front of a face, and some are clearly behind each: two polygons back to back
+/// close nothing in.
 fn is_convex(group: &[&Face], weld: &Weld) -> bool {
     let mut corners: Vec<u32> = group.iter().flat_map(|f| f.corners.iter().copied()).collect();
     corners.sort_unstable();
     corners.dedup();
-    group.iter().all(|face| corners.iter().all(|&c| face.above(weld, c) <= weld.tolerance))
+    group.iter().all(|face| {
+        let above = |c: &u32| face.above(weld, *c);
+        corners.iter().all(|c| above(c) <= weld.tolerance)
+            && corners.iter().any(|c| above(c) < -THICK * weld.tolerance)
+    })
 }
 
 /// Cosine of the angle between normals up to which patches may be one face.
 const ALIKE: f64 = 1.0 - 1e-10;
 
-/// A closed convex group, with faces in one plane made one and edges on one line too.
-fn solid(body: BodyId, group: &[&Face], weld: &Weld) -> Solid {
+/// A closed convex group, with faces in one plane made one and edges on one line too; `None` if a face is
+/// left without edges.
+fn solid(body: BodyId, group: &[&Face], weld: &Weld) -> Option<Solid> {
     let mut planes: Vec<&Face> = Vec::new();
     let plane_of = |face: &Face, planes: &[&Face]| {
         let is_same = |plane: &&Face| {
@@ -145,15 +163,13 @@ fn solid(body: BodyId, group: &[&Face], weld: &Weld) -> Solid {
         let ends = ends.map(|c| number(*c.expect("a run has two ends")));
         edges.push(SolidEdge { ends, faces: faces.map(|f| f as u32) });
     }
-    let corner_of = |plane: usize| {
-        let edge = edges.iter().find(|e| e.faces.contains(&(plane as u32)));
-        edge.expect("faces have edges").ends[0]
+    let face = |(k, plane): (usize, &&Face)| {
+        let edge = edges.iter().find(|e| e.faces.contains(&(k as u32)))?;
+        Some(SolidFace { normal: plane.normal, corner: edge.ends[0] })
     };
-    let face =
-        |(k, plane): (usize, &&Face)| SolidFace { normal: plane.normal, corner: corner_of(k) };
-    let faces = planes.iter().enumerate().map(face).collect();
+    let faces = planes.iter().enumerate().map(face).collect::<Option<_>>()?;
     let corners = used.iter().map(|&c| weld.points[c as usize]).collect();
-    Solid { body, corners, faces, edges }
+    Some(Solid { body, corners, faces, edges })
 }
 
 struct Face {
@@ -250,6 +266,59 @@ mod tests {
             b.cuboid(node, "thin", thin, -half, half);
         };
         assert_eq!(found(thin), (0, 0));
+    }
+
+    #[test]
+    fn sheets_and_needles_are_not_solids() {
+        let square = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
+        let back = [square[3], square[2], square[1], square[0]];
+        let sheet = |b: &mut SceneBuilder, node| {
+            let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+            b.polygon(node, "front", grey, &square);
+            b.polygon(node, "back", grey, &back);
+        };
+        assert_eq!(found(sheet), (0, 0));
+        let far = DVec3::splat(100.0);
+        let needle = |b: &mut SceneBuilder, node| {
+            let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+            b.polygon(node, "wall", grey, &square.map(|c| far + c * 0.5));
+            b.polygon(node, "needle", grey, &[DVec3::ZERO, DVec3::Y * 5e-5, DVec3::X]);
+        };
+        assert_eq!(found(needle), (0, 0));
+    }
+
+    #[test]
+    fn cells_of_a_box_make_six_faces_and_twelve_edges() {
+        let mut b = SceneBuilder::new("cells");
+        let node = b.node("box", None, DVec3::ZERO, DQuat::IDENTITY);
+        for k in 0..2 {
+            // Two halves of a box side by side, without what is between them.
+            let grey = b.material(["grey", "gray"][k], [0.5; 3], [0.0; 3]);
+            let x = |at: f64| k as f64 + at;
+            let p = |at: f64, y: f64, z: f64| DVec3::new(x(at), y, z);
+            let quads = [
+                [p(0., 0., 0.), p(0., 1., 0.), p(1., 1., 0.), p(1., 0., 0.)],
+                [p(0., 0., 1.), p(1., 0., 1.), p(1., 1., 1.), p(0., 1., 1.)],
+                [p(0., 0., 0.), p(1., 0., 0.), p(1., 0., 1.), p(0., 0., 1.)],
+                [p(0., 1., 0.), p(0., 1., 1.), p(1., 1., 1.), p(1., 1., 0.)],
+            ];
+            quads.iter().for_each(|quad| b.polygon(node, "side", grey, quad));
+            let at = k as f64;
+            let mut end = [p(at, 0., 0.), p(at, 0., 1.), p(at, 1., 1.), p(at, 1., 0.)];
+            if k == 1 {
+                end.reverse();
+            }
+            b.polygon(node, "end", grey, &end);
+        }
+        let solids = b.build().unwrap().solids();
+        assert_eq!(solids.of_patch, vec![Some(0); 10]);
+        let [solid] = &solids.list[..] else { panic!("{solids:?}") };
+        assert_eq!((solid.corners.len(), solid.faces.len(), solid.edges.len()), (8, 6, 12));
+        for edge in &solid.edges {
+            let [p, q] = edge.ends.map(|c| solid.corners[c as usize]);
+            let [left, right] = edge.faces.map(|f| solid.faces[f as usize].normal);
+            assert!(left.cross(right).dot(q - p) > 0.0, "{edge:?}");
+        }
     }
 
     #[test]

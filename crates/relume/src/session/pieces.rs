@@ -59,7 +59,7 @@ struct Look {
 /// (sum of the radii / distance)^2 above which two pieces are not points.
 const POINTS: f64 = 0.01;
 
-/// Occluding polygons up to which pieces of partly hidden links are looked at by clipping.
+/// Occluders up to which pieces of partly hidden links are looked at by clipping.
 const CLIPPED_MAX: usize = 96;
 
 /// Form factor of a piece to the other end times the bend of visibility over the piece above which it
@@ -152,10 +152,11 @@ impl<'a> Sharing<'a> {
         let whole = [link.a, link.b].map(|id| [self.forest.shape(id)]);
         let cut = self.cut(link, (&whole[0], &whole[1]));
         let blockers = self.blockers(&cut);
-        let from = if looker == Looker::B { &cut.ends.1.whole } else { &cut.ends.0.whole };
+        let ends = (&cut.ends.0.whole, &cut.ends.1.whole);
+        let from = if looker == Looker::B { ends.1 } else { ends.0 };
         let all = |_| f64::from(link.carried.exchange_area_m2);
         let see = || self.seen_from(&cut, looker, std::slice::from_ref(from), &blockers, &all)[0];
-        (blockers.len() <= CLIPPED_MAX).then(see)
+        (self.shaft(&cut, ends).occluders(&blockers) <= CLIPPED_MAX).then(see)
     }
 
     fn cut(&self, link: &Link, (a, b): (&[Shape], &[Shape])) -> Cut {
@@ -191,7 +192,7 @@ impl<'a> Sharing<'a> {
         let columns = other.pieces.len();
         let of_row = |k: usize| shares[k * columns..][..columns].iter().sum::<f64>();
         let of_column = |k: usize| shares.iter().skip(k).step_by(columns).sum::<f64>();
-        if blockers.len() > CLIPPED_MAX {
+        if self.shaft(cut, (&one.whole, &other.whole)).occluders(blockers) > CLIPPED_MAX {
             return shares.iter_mut().for_each(|share| *share *= v);
         }
         // An end in one piece sees what the pieces of the other see together.
@@ -275,14 +276,19 @@ impl<'a> Sharing<'a> {
             .map(|(place, value)| {
                 let ends = if looker == Looker::B { (whole.0, place) } else { (place, whole.1) };
                 let blockers = self.shaft(cut, ends).those_that_block(blockers);
-                let here = &place.world;
+                // Within one body as it is in that body's frame.
                 let distance = |&patch: &PatchId| {
-                    self.view.fixed_box(self.forest.patch_root(patch)).distance(&here.bounds)
+                    let root = self.forest.patch_root(patch);
+                    match cut.body == Some(self.view.patch(patch).body) {
+                        true => self.view.box_in_body(root).distance(&place.own.bounds),
+                        false => self.view.fixed_box(root).distance(&place.world.bounds),
+                    }
                 };
-                let is_near = blockers.iter().any(|patch| distance(patch) < NEAR * here.radius);
+                let radius = place.own.radius;
+                let is_near = blockers.iter().any(|patch| distance(patch) < NEAR * radius);
                 let is_clear = blockers.is_empty();
                 let value = if is_clear { 1.0 } else { value };
-                Look { value, from: (here.centre, here.radius), is_near, is_clear }
+                Look { value, from: (place.own.centre, radius), is_near, is_clear }
             })
             .collect();
         let look_closer = |(k, (first, place)): (usize, (&Look, &Place))| {

@@ -14,6 +14,9 @@ use crate::element::WorldElement;
 use crate::geometry::{Aabb, ConvexPolygon, Plane, Pose};
 use crate::scene::Solid;
 
+/// Share of a form factor below which what is left of it is rounding.
+const NOTHING: f64 = 1e-12;
+
 /// Edges whose form factors are evaluated together.
 const EDGES_AT_ONCE: usize = 512;
 
@@ -53,12 +56,13 @@ impl<'a> Between<'a> {
     }
 
     /// Those that hide something from an end: where it is wholly in front of one face of a solid, it is
-    /// outside, and faces that it is wholly behind hide nothing that others do not.
+    /// outside, and faces that it is wholly behind hide nothing that others do not. `without` the faces of some solids.
     fn facing<'b>(
         &'b self,
         looker: &'b WorldElement,
         slack: f64,
-    ) -> impl Iterator<Item = (&'b [DVec3], Option<u32>)> + 'b {
+        without: &'b [u32],
+    ) -> impl Iterator<Item = &'b [DVec3]> + 'b {
         let span = move |(corners, (normal, _)): (&[DVec3], &(DVec3, Option<u32>))| {
             looker.span(&Plane::through(corners[0], *normal))
         };
@@ -67,10 +71,11 @@ impl<'a> Between<'a> {
             all().any(|(corners, face)| face.1 == Some(solid) && span((corners, face)).0 > slack)
         };
         let hides = move |(corners, face): &(&[DVec3], &(DVec3, Option<u32>))| match face.1 {
+            Some(solid) if without.contains(&solid) => false,
             Some(solid) => span((corners, face)).1 >= -slack || !is_outside(solid),
             None => true,
         };
-        all().filter(hides).map(|(corners, face)| (corners, face.1))
+        all().filter(hides).map(|(corners, _)| corners)
     }
 
     fn iter(&self) -> impl Iterator<Item = &[DVec3]> {
@@ -109,10 +114,7 @@ impl<'a> Between<'a> {
             }
         }
         let (mut part, mut rest) = (Vec::new(), Vec::new());
-        for (corners, solid) in self.facing(looker, slack) {
-            if solid.is_some_and(|solid| whole.contains(&solid)) {
-                continue;
-            }
+        for corners in self.facing(looker, slack, &whole) {
             part.clear();
             part.extend_from_slice(corners);
             for plane in &planes {
@@ -297,7 +299,8 @@ pub fn form_factor_past<'a>(
     }
     between.largest_first();
     let mut cutter = Cutter::default();
-    cutter.cut(from, &frame.flat(target), &between);
+    let flat = frame.flat(target);
+    cutter.cut(from, &flat, &between);
     let normal = frame.direction(normal);
     let mut solid = Vec::new();
     let (mut factor, mut moment) = (0.0, DVec2::ZERO);
@@ -310,7 +313,10 @@ pub fn form_factor_past<'a>(
     };
     cutter.left.iter().for_each(|piece| add(piece, 1.0));
     cutter.dark.iter().for_each(|piece| add(piece, -1.0));
-    let middle = frame.point(if factor > 0.0 { moment / factor } else { DVec2::ZERO });
+    // A sliver's middle is the difference of two estimates: it is on the target all the same.
+    let low = flat.iter().copied().fold(flat[0], DVec2::min);
+    let high = flat.iter().copied().fold(flat[0], DVec2::max);
+    let middle = frame.point((moment / factor.max(f64::MIN_POSITIVE)).clamp(low, high));
     FactorPast { factor, middle, is_exact: cutter.left.len() <= FRAGMENTS_MAX }
 }
 
@@ -440,13 +446,18 @@ impl Looks {
                 What::Dark => -f,
             };
             self.points.last_mut().expect("a target comes first").1 += clear;
-            sums.clear += clear;
             if self.moments.is_some() {
                 sums.at_looker_clear += seen.at * clear;
                 sums.at_other_clear += seen.middle * clear;
             }
         }
-        self.points[first..].iter().for_each(|&(all, clear)| self.sums.finish_point(all, clear));
+        for (all, clear) in &mut self.points[first..] {
+            // What is hidden by several is taken off in several parts.
+            if *clear <= NOTHING * *all {
+                *clear = 0.0;
+            }
+            self.sums.finish_point(*all, *clear);
+        }
         self.seen.clear();
         self.edges.clear();
     }
@@ -467,6 +478,7 @@ struct Sums {
 
 impl Sums {
     fn finish_point(&mut self, all: f64, clear: f64) {
+        self.clear += clear;
         self.clear2 += clear * clear / all.max(f64::MIN_POSITIVE);
     }
 
@@ -491,10 +503,11 @@ impl Sums {
 /// What occlusion adds to the relative gradient over an element: the shift of the centre of what
 /// passes, against the element's second moment.
 fn gradient(e: &WorldElement, at: DVec2, at_clear: DVec2, all: f64, clear: f64) -> DVec2 {
-    if clear <= 1e-12 * all {
+    if clear <= NOTHING * all {
         return DVec2::ZERO;
     }
-    e.gradient_of_shift(at_clear / clear - at / all)
+    // A sliver's middle is the difference of two estimates: it is within the element all the same.
+    e.gradient_of_shift((at_clear / clear - at / all).clamp_length_max(e.radius))
 }
 
 /// The middle of what a polygon sends to a point with a normal: of its triangles, each with the kernel at its

@@ -215,18 +215,34 @@ impl<'a> Shaft<'a> {
         blockers.iter().copied().filter(blocks).collect()
     }
 
-    /// How many occluders patches make up: the faces of a solid are one.
+    /// How many occluders blockers make up: solids that hide with their silhouettes count as one for every
+    /// eight of their faces, which may have to be clipped one by one after all.
     pub fn occluders(&self, blockers: &[PatchId]) -> usize {
-        let mut solids: Vec<u32> = Vec::new();
-        let is_first = |patch: &&PatchId| match self.forest.solid(**patch) {
-            Some(solid) if solids.contains(&solid) => false,
-            Some(solid) => {
-                solids.push(solid);
-                true
+        let whole = self.whole_solids(blockers);
+        let faces: usize = whole.iter().map(|(_, faces)| faces).sum();
+        blockers.len() - faces + whole.iter().map(|(_, faces)| 1 + faces / 8).sum::<usize>()
+    }
+
+    /// The solids that hide more cheaply with their silhouettes than with those of their faces that are
+    /// among some blockers, and how many those are. Not an end's own, of which no face is in the way.
+    fn whole_solids(&self, blockers: &[PatchId]) -> Vec<(u32, usize)> {
+        // With how many faces there are, and corners of those.
+        let mut solids: Vec<(u32, usize, usize)> = Vec::new();
+        for &patch in blockers {
+            let Some(solid) = self.forest.solid(patch) else { continue };
+            let count = self.view.occluder(patch).corners.len();
+            match solids.iter_mut().find(|found| found.0 == solid) {
+                Some((_, faces, corners)) => (*faces, *corners) = (*faces + 1, *corners + count),
+                None => solids.push((solid, 1, count)),
             }
-            None => true,
+        }
+        let ends = [self.patches.0, self.patches.1].map(|patch| self.forest.solid(patch));
+        let is_cheaper = |&(solid, faces, corners): &(u32, usize, usize)| {
+            // A single face is as good, and a few of a ball are better.
+            let edges = self.forest.solid_shape(solid).edges.len();
+            faces >= 2 && edges <= 2 * corners && !ends.contains(&Some(solid))
         };
-        blockers.iter().filter(is_first).count()
+        solids.into_iter().filter(is_cheaper).map(|(solid, faces, _)| (solid, faces)).collect()
     }
 
     /// Whether anything at or below `id` may block segments of this pair or of one below it,
@@ -282,15 +298,12 @@ impl<'a> Shaft<'a> {
     /// Blockers in one frame: that of the pair's body if it has one of its own.
     fn between(&self, blockers: &[PatchId]) -> Between<'a> {
         let mut out = Between::default();
-        // Solids with how many of their faces there are, and corners of those.
-        let mut solids: Vec<(u32, usize, usize)> = Vec::new();
         let own =
             self.own.map(|(own, _, _)| self.view.poses()[own.0 as usize].unwrap_or(Pose::IDENTITY));
         for &patch in blockers {
             let (rides, lifted) = self.lifted(patch);
             let (corners, normal) = (lifted.corners(), lifted.polygon.plane.normal);
             let solid = self.forest.solid(patch);
-            let count = lifted.polygon.corners.len();
             match own {
                 Some(pose) if !rides => {
                     let normal = pose.rotation.transpose() * normal;
@@ -298,22 +311,9 @@ impl<'a> Shaft<'a> {
                 }
                 _ => out.push(corners, normal, solid),
             }
-            if let Some(solid) = solid {
-                match solids.iter_mut().find(|found| found.0 == solid) {
-                    Some((_, faces, corners)) => {
-                        (*faces, *corners) = (*faces + 1, *corners + count)
-                    }
-                    None => solids.push((solid, 1, count)),
-                }
-            }
         }
-        let ends = [self.patches.0, self.patches.1].map(|patch| self.forest.solid(patch));
-        for (number, faces, corners) in solids {
+        for (number, _) in self.whole_solids(blockers) {
             let solid = self.forest.solid_shape(number);
-            // A single face is as good, and a few of a ball are better.
-            if faces < 2 || solid.edges.len() > 2 * corners || ends.contains(&Some(number)) {
-                continue;
-            }
             let pose = self.view.poses()[solid.body.0 as usize].unwrap_or(Pose::IDENTITY);
             let pose = match (own, self.own) {
                 (Some(_), Some((body, _, _))) if body == solid.body => Pose::IDENTITY,

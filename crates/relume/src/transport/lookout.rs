@@ -3,6 +3,8 @@
 //! The part of a polygon that a point sees is a set of convex fragments ([`super::clip`]), whose form factors
 //! are known in closed form. What does not depend on the point is made ready once for many.
 
+use std::cell::Cell;
+
 use glam::{DVec2, DVec3};
 
 use super::clip::{Cutter, FRAGMENTS_MAX, Occluders, keep_front};
@@ -151,8 +153,24 @@ pub struct Lookout {
     between: Occluders,
     /// The looker's, in the frame.
     normal: DVec3,
+    room: Room,
+}
+
+/// What looking fills and empties: made once a thread, since most lookouts look only a few times.
+#[derive(Default)]
+struct Room {
     cutter: Cutter,
     looks: Looks,
+}
+
+thread_local! {
+    static ROOM: Cell<Room> = Cell::default();
+}
+
+impl Drop for Lookout {
+    fn drop(&mut self) {
+        ROOM.set(std::mem::take(&mut self.room));
+    }
 }
 
 impl Lookout {
@@ -165,6 +183,7 @@ impl Lookout {
         let slack = looker.rounding_m + other.rounding_m;
         let frame = TargetFrame::of(other);
         let facing = ConvexPolygon::new(&other.corners[..other.len]).clipped(&looker.plane, slack);
+        let room = ROOM.take();
         Lookout {
             simd,
             other: other.plane,
@@ -172,8 +191,7 @@ impl Lookout {
             between: between.seen(looker, other, &frame, slack),
             normal: frame.direction(looker.plane.normal),
             frame,
-            cutter: Cutter::default(),
-            looks: Looks::default(),
+            room: Room { looks: Looks { moments: None, ..room.looks }, ..room },
         }
     }
 
@@ -185,34 +203,35 @@ impl Lookout {
 
     /// Visibility of the other from the middle of each of some parts of the looker.
     pub fn from_middles<'a>(&mut self, parts: impl Iterator<Item = &'a WorldElement>) -> Vec<f64> {
-        self.looks.start();
+        self.room.looks.start();
         parts.for_each(|part| self.look_from(part, part.point(0.5, 0.5)));
-        self.looks.evaluate(self.simd, self.normal);
+        self.room.looks.evaluate(self.simd, self.normal);
         let share = |&(all, clear): &(f64, f64)| if all > 0.0 { clear / all } else { 0.0 };
-        self.looks.points.iter().map(|point| share(point).clamp(0.0, 1.0)).collect()
+        self.room.looks.points.iter().map(|point| share(point).clamp(0.0, 1.0)).collect()
     }
 
     fn look(&mut self, part: &WorldElement, cells: u32) -> &Sums {
-        self.looks.start();
+        self.room.looks.start();
         let at = |k: u32| (f64::from(k / 2) + G[k as usize & 1]) / f64::from(cells);
         for k in 0..4 * cells * cells {
             self.look_from(part, part.point(at(k % (2 * cells)), at(k / (2 * cells))));
         }
-        self.looks.evaluate(self.simd, self.normal);
-        &self.looks.sums
+        self.room.looks.evaluate(self.simd, self.normal);
+        &self.room.looks.sums
     }
 
     fn look_from(&mut self, part: &WorldElement, point: DVec3) {
         if self.other.distance(point) > 0.0 && self.target.len() >= 3 {
             let from = self.frame.place(point);
-            self.cutter.cut(from, &self.target, &self.between);
-            let at = if self.looks.moments.is_some() { part.offset(point) } else { DVec2::ZERO };
-            self.looks.push(from, at, &self.target, &self.cutter);
+            self.room.cutter.cut(from, &self.target, &self.between);
+            let at =
+                if self.room.looks.moments.is_some() { part.offset(point) } else { DVec2::ZERO };
+            self.room.looks.push(from, at, &self.target, &self.room.cutter);
         } else {
-            self.looks.push_nothing();
+            self.room.looks.push_nothing();
         }
-        if self.looks.edges.len() >= EDGES_AT_ONCE {
-            self.looks.evaluate(self.simd, self.normal);
+        if self.room.looks.edges.len() >= EDGES_AT_ONCE {
+            self.room.looks.evaluate(self.simd, self.normal);
         }
     }
 }
@@ -232,7 +251,7 @@ pub(super) fn clipped_visibility(
     };
     let (looker, other) = if a_looks { (a, b) } else { (b, a) };
     let mut lookout = Lookout::new(simd, looker, other, between);
-    lookout.looks.moments = Some(lookout.normal);
+    lookout.room.looks.moments = Some(lookout.normal);
     let sums = lookout.look(looker, cells);
     let value = sums.visibility();
     let over_looker = gradient(looker, sums.at_looker, sums.at_looker_clear, sums.all, sums.clear);
@@ -395,6 +414,8 @@ impl Looks {
     fn start(&mut self) {
         self.sums = Sums::default();
         self.points.clear();
+        self.edges.clear();
+        self.seen.clear();
     }
 
     /// For a point that does not see the target's plane.

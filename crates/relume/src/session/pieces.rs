@@ -147,7 +147,7 @@ impl<'a> Sharing<'a> {
     }
 
     /// Visibility of one end of a link from the whole of the other, looked at as closely as pieces are;
-    /// `None` past too many polygons to clip by.
+    /// `None` past too many occluders to clip by.
     pub(super) fn visibility_from(&self, link: &Link, looker: Looker) -> Option<f64> {
         let whole = [link.a, link.b].map(|id| [self.forest.shape(id)]);
         let cut = self.cut(link, (&whole[0], &whole[1]));

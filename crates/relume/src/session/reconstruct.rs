@@ -122,7 +122,9 @@ impl Reconstruction<'_> {
         }
         let (ids, shapes) = self.leaves.below(receiver);
         if ids.len() < 2 {
-            return self.look_again(link, receiver, source, found);
+            let Some(own) = self.look_again(link, receiver, source) else { return false };
+            found.push((receiver.0, own));
+            return true;
         }
         let other = [forest.shape(source)];
         let is_a = receiver == link.a;
@@ -145,30 +147,20 @@ impl Reconstruction<'_> {
         true
     }
 
-    /// A link of a leaf with what the leaf itself sees; false where that is known.
-    fn look_again(
-        &self,
-        link: &pair::Link,
-        receiver: ElementId,
-        source: ElementId,
-        found: &mut Vec<(u32, Link)>,
-    ) -> bool {
+    /// The link of a leaf with what the leaf itself sees; `None` where that is known.
+    fn look_again(&self, link: &pair::Link, leaf: ElementId, source: ElementId) -> Option<Link> {
         let Carried { exchange_area_m2, visibility, gradients } = link.carried;
         if visibility == u16::MAX {
-            return false;
+            return None;
         }
-        let (looker, over_receiver, over_source) = match receiver == link.a {
+        let (looker, over_receiver, over_source) = match leaf == link.a {
             true => (Looker::A, gradients.over_a, gradients.over_b),
             false => (Looker::B, gradients.over_b, gradients.over_a),
         };
-        let Some(v) = self.sharing.visibility_from(link, looker) else { return false };
-        let area_m2 = self.solved.forest.area_m2(receiver);
+        let v = self.sharing.visibility_from(link, looker)?;
+        let area_m2 = self.solved.forest.area_m2(leaf);
         let coupling = (v * f64::from(exchange_area_m2) / area_m2) as f32;
-        if coupling > 0.0 {
-            let source = source.0;
-            found.push((receiver.0, Link { source, coupling, over_receiver, over_source }));
-        }
-        true
+        Some(Link { source: source.0, coupling, over_receiver, over_source })
     }
 
     /// How far a link's line may be off over a receiver, as a form factor: without occlusion the square

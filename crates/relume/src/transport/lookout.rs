@@ -195,13 +195,16 @@ impl Lookout {
         }
     }
 
-    /// Visibility of the other from a part of the looker: from 2 x 2 Gauss points in each of `cells` x `cells`
-    /// parts of that.
+    /// Visibility of the other from a part of the looker, in [0, 1]: from 2 x 2 Gauss points in each of
+    /// `cells` x `cells` parts of that.
+    ///
+    /// Error: exact from each point; over the part it falls with the square of `cells`, as V has kinks.
     pub fn visibility(&mut self, part: &WorldElement, cells: u32) -> f64 {
         self.look(part, cells).visibility()
     }
 
-    /// Visibility of the other from the middle of each of some parts of the looker.
+    /// Visibility of the other from the middle of each of some parts of the looker, in [0, 1]; 0 where a
+    /// middle does not face the other.
     pub fn from_middles<'a>(&mut self, parts: impl Iterator<Item = &'a WorldElement>) -> Vec<f64> {
         self.room.looks.start();
         parts.for_each(|part| self.look_from(part, part.point(0.5, 0.5)));

@@ -221,8 +221,12 @@ fn patch_means_of_the_static_room() {
             "static room at {tolerance}: RMS {off:.4}, bias {bias:+.5}; reconstructed {anew:.4}, {slant:+.5}; {} links",
             report.links
         );
-        assert!(off <= tolerance && bias.abs() < 0.25 * tolerance, "{tolerance}: {off} {bias}");
-        assert!(anew < 0.5 * off && slant.abs() < 0.05 * tolerance, "{tolerance}: {anew} {slant}");
+        // Without bends three times as much.
+        assert!(
+            off <= 0.2 * tolerance && bias.abs() < 0.05 * tolerance,
+            "{tolerance}: {off} {bias}"
+        );
+        assert!(anew < off && slant.abs() < 0.05 * tolerance, "{tolerance}: {anew} {slant}");
         found.push(off);
     }
     assert!(found[2] < found[1] && found[1] < found[0], "{found:?} does not fall");

@@ -9,8 +9,8 @@ use crate::event::{Foresight, Lookahead, Tick};
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
 use crate::scene::{BodyId, LightKind, PatchId};
 use crate::transport::{
-    CLIPPED_MAX, Exchange, Looker, Meeting, SEGMENTS, SegmentBundle, Shaft, Simd, Visibility,
-    exact_visibility, exchange, light_at, light_exchange, light_visibility, meeting, visibility,
+    CLIPPED_MAX, Clipping, Exchange, Looker, Meeting, SegmentBundle, Shaft, Simd, Visibility,
+    clipping, exchange, light_at, light_exchange, light_visibility, meeting, visibility,
 };
 
 use super::brightness::Brightness;
@@ -332,6 +332,7 @@ impl Placed<'_> {
             }
         }
         let blockers = shaft.blockers(candidates);
+        let occluders = shaft.occluders(&blockers);
         let mut most = CLIPPED_MAX;
         let mut way = Margin::ENDLESS;
         if let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle) {
@@ -339,12 +340,17 @@ impl Placed<'_> {
             let brings = self.brings(brightness, ends, x.area_m2);
             let limit = CLOSE_SHARE * threshold;
             most = if brings > limit { CLIPPED_MAX_CLOSE } else { CLIPPED_MAX_REST };
-            if (CLIPPED_MAX_REST + 1..=CLIPPED_MAX_CLOSE).contains(&shaft.occluders(&blockers)) {
+            if (CLIPPED_MAX_REST + 1..=CLIPPED_MAX_CLOSE).contains(&occluders) {
                 way = Margin::between(brings.max(limit), brings.min(limit));
             }
         }
-        let v = exact_visibility(self.simd, shaft, &blockers, (Looker::Best, 1), most)
-            .unwrap_or_else(|| visibility(self.simd, shaft, &blockers, key, 4));
+        let mut clipped = (1..=most)
+            .contains(&occluders)
+            .then(|| clipping(self.simd, shaft, &blockers, Looker::Best));
+        let v = match &mut clipped {
+            Some(clipped) => clipped.visibility(1),
+            None => visibility(self.simd, shaft, &blockers, key, 4),
+        };
         let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
         else {
             let verdict = match self.stage {
@@ -369,7 +375,14 @@ impl Placed<'_> {
             }
             margin.error = way.min(Margin::between(threshold, e.error));
         }
-        let v = self.settle(v, shaft, &blockers, key, stake);
+        let v = match &mut clipped {
+            Some(clipped) => look_closer(v, clipped, stake),
+            None if v.segments == 0 => v,
+            None => {
+                let again = visibility(self.simd, shaft, &blockers, key, 6);
+                Visibility { segments: v.segments + again.segments, ..again }
+            }
+        };
         Judgement { margin, ..carrying(Verdict::Link, &x, &v, (place_a, place_b)) }
     }
 
@@ -387,35 +400,6 @@ impl Placed<'_> {
             arrives / known / (area * brightness.reference_area_m2()).sqrt()
         };
         one_way(a, b.0).max(one_way(b, a.0))
-    }
-
-    /// A link that is partly blocked is looked at more closely, the more so the larger
-    /// its form factor: `stake` is that over what a link may err by.
-    fn settle(
-        &self,
-        v: Visibility,
-        shaft: &Shaft<'_>,
-        blockers: &[PatchId],
-        key: u64,
-        stake: f64,
-    ) -> Visibility {
-        if blockers.is_empty() || v.segments == 0 {
-            return v;
-        }
-        let again = if v.segments >= SEGMENTS as u32 {
-            visibility(self.simd, shaft, blockers, key, 6)
-        } else {
-            // The error of n x n points on a function with kinks falls as 1 / n^2.
-            let spread = if v.from_a { v.spread_a } else { v.spread_b };
-            let error = stake * spread.max(UNSEEN);
-            if error <= CLOSER {
-                return v;
-            }
-            let cells = (error / CLOSER).sqrt().ceil().min(CELLS_MAX);
-            let from = (Looker::Best, cells as u32);
-            exact_visibility(self.simd, shaft, blockers, from, blockers.len()).unwrap_or(v)
-        };
-        Visibility { segments: v.segments + again.segments, ..again }
     }
 
     /// Whether an end is above the level at which the coarse solution links.
@@ -553,6 +537,20 @@ impl Places {
             None => at.shaft((own_a, own_b), None, self.patches),
         }
     }
+}
+
+/// A link that is partly hidden is looked at from more points, the more so the larger its form factor:
+/// `stake` is that over what a link may err by.
+fn look_closer(v: Visibility, clipped: &mut Clipping<'_>, stake: f64) -> Visibility {
+    // The error of n x n points on a function with kinks falls as 1 / n^2.
+    let spread = if v.from_a { v.spread_a } else { v.spread_b };
+    let error = stake * spread.max(UNSEEN);
+    if error <= CLOSER {
+        return v;
+    }
+    let cells = (error / CLOSER).sqrt().ceil().min(CELLS_MAX);
+    let again = clipped.visibility(cells as u32);
+    Visibility { segments: v.segments + again.segments, ..again }
 }
 
 /// Where a pair brings this many thresholds or more, any number of occluders is clipped in reason.

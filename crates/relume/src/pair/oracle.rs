@@ -40,7 +40,7 @@ pub(super) struct End {
 
 /// Share of a source's reflected radiosity by which it may vary over a reference-sized element
 /// beyond its gradient.
-const SOURCE_VARIATION: f64 = 0.1;
+const SOURCE_VARIATION: f64 = 0.2;
 
 /// Errors of a link, each relative to its threshold's unit.
 #[derive(Clone, Copy, Debug)]
@@ -73,11 +73,15 @@ const PREFERENCE: f64 = 1.5;
 
 /// Weight of the variation of visibility over a receiver, for emitted light: few of a receiver's
 /// links have the edge of a lamp's shadow within it, while all have a bend.
-const EDGE_EMITTED: f64 = 0.1;
+const EDGE_EMITTED: f64 = 0.2;
 
 /// The same for reflected light: where something nearly touches a receiver, it hides many sources
 /// along the same edge, and their errors have one sign.
 const EDGE_REFLECTED: f64 = 2.0;
+
+/// Weight of the variation of the kernel over a receiver beyond its gradient: most of it is found again
+/// when the solution is read.
+const BENT: f64 = 0.5;
 
 /// Weight of the sampling error of V: it is independent from link to link and averages out.
 const NOISE: f64 = 0.2;
@@ -104,7 +108,7 @@ pub(super) fn estimate(
     };
     let sends = |over: &Variation, spread: f64| length(v.value * (over.slope + over.bend), spread);
     let over = |over: &Variation, edge: f64| Uneven {
-        bend: v.value * over.bend,
+        bend: BENT * v.value * over.bend,
         edge,
         sends: sends(over, edge),
     };

@@ -12,6 +12,7 @@ use crate::transport::Simd;
 
 mod advance;
 mod ahead;
+mod bends;
 mod coarse;
 mod compact;
 mod compare;
@@ -214,7 +215,7 @@ impl Session {
     /// Before the first [`Session::step`].
     pub fn snapshot(&self) -> Snapshot {
         let solved = self.solved.as_ref().expect("a step comes before a snapshot");
-        snapshot::take(&self.scene, solved, &solved.radiosity)
+        snapshot::take(self, solved, (&solved.links, &solved.radiosity))
     }
 
     /// The present solution settled anew with links of every leaf's own in place of those above it: along
@@ -228,7 +229,8 @@ impl Session {
     /// Before the first [`Session::step`].
     pub fn reconstruction(&self) -> Snapshot {
         let solved = self.solved.as_ref().expect("a step comes before a snapshot");
-        snapshot::take(&self.scene, solved, &reconstruct::solve(self, solved))
+        let (links, radiosity) = reconstruct::solve(self, solved);
+        snapshot::take(self, solved, (&links, &radiosity))
     }
 
     /// The pair tree of the present solution, with the forest its elements are in.

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::element::{ElementId, Forest, Kind, Shape};
 use crate::pair::{self, Carried, Gradients};
-use crate::solver::{Dirty, Link, LinksBuilder, Radiosity, Stop};
+use crate::solver::{Dirty, Link, Links, LinksBuilder, Radiosity, Stop};
 use crate::transport::{Looker, Meeting, meeting};
 
 use super::compare::mean_radiosity;
@@ -29,7 +29,7 @@ const LINKS_AT_ONCE: usize = 512;
 const SWEEPS: u32 = 8;
 
 /// The solution with the links of leaves in place of those of their ancestors.
-pub(super) fn solve(session: &Session, solved: &Solved) -> Radiosity {
+pub(super) fn solve(session: &Session, solved: &Solved) -> (Links, Radiosity) {
     let forest = &solved.forest;
     let at = Reconstruction {
         solved,
@@ -50,7 +50,7 @@ pub(super) fn solve(session: &Session, solved: &Solved) -> Radiosity {
     let mut out = solved.radiosity.clone();
     let surfaces = LitForest::new(&session.scene, forest);
     out.solve(&surfaces, &links, Dirty::All, Stop::Sweeps(SWEEPS));
-    out
+    (links, out)
 }
 
 /// The leaves of a forest in depth-first order, so that those below an element are side by side.

@@ -8,10 +8,11 @@ use crate::element::{ElementId, Kind};
 use crate::geometry::Pose;
 use crate::scene::{PatchId, Scene};
 
-use crate::solver::Radiosity;
+use crate::solver::{Links, Radiosity, Surfaces};
 
-use super::Solved;
+use super::bends::Bends;
 use super::surfaces::LitForest;
+use super::{Session, Solved};
 
 /// The solution at one instant.
 #[derive(Clone, Debug)]
@@ -100,9 +101,14 @@ impl Snapshot {
 }
 
 /// The leaves of a solved forest with a solution over it.
-pub(super) fn take(scene: &Arc<Scene>, solved: &Solved, radiosity: &Radiosity) -> Snapshot {
-    let forest = &solved.forest;
+pub(super) fn take(
+    session: &Session,
+    solved: &Solved,
+    (links, radiosity): (&Links, &Radiosity),
+) -> Snapshot {
+    let (scene, forest) = (&session.scene, &solved.forest);
     let surfaces = LitForest::new(scene, forest);
+    let bends = Bends::new(session.simd, solved, (links, radiosity));
     let mut leaves = Vec::with_capacity(forest.counts().leaves as usize);
     let mut leaf_offsets = vec![0];
     for (k, patch) in scene.patches.iter().enumerate() {
@@ -115,12 +121,18 @@ pub(super) fn take(scene: &Arc<Scene>, solved: &Solved, radiosity: &Radiosity) -
                 stack.extend(forest.children(id).rev().map(ElementId));
                 continue;
             }
+            let lit = surfaces.lit(id.0);
             radiosity.irradiances(&surfaces, id.0, &mut |id, h| {
+                let mut h = *h;
+                bends.add(&surfaces, id, &mut h);
+                let irradiance = h.mean.map(|x| x.max(0.0));
                 leaves.push(Leaf {
                     corners: forest.shape(ElementId(id)).corners,
-                    irradiance: h.mean.map(|x| x.max(0.0)),
+                    irradiance,
                     irradiance_gradient: h.gradient,
-                    radiosity: radiosity.radiosity(id),
+                    radiosity: std::array::from_fn(|c| {
+                        lit.exitance[c] + lit.reflectance[c] * irradiance[c]
+                    }),
                 });
             });
         }

@@ -242,8 +242,7 @@ impl Looker<'_> {
         }
         let mut sum = 0.0;
         for k in 0..16 {
-            let p = DVec3::new(points.x[k], points.y[k], points.z[k]);
-            fit.add(self.e.offset(p), weights[k], factors[k]);
+            fit.add(self.e.offset(points.point(k)), weights[k], factors[k]);
             sum += weights[k] * factors[k];
         }
         sum

@@ -239,38 +239,56 @@ impl Lookout {
     }
 }
 
-/// Visibility of `a` and `b` past convex occluders, all in one frame: from 2 x 2 Gauss points in
-/// each of `cells` x `cells` parts of the looker.
-pub(super) fn clipped_visibility(
-    simd: Simd,
-    (a, b): (&WorldElement, &WorldElement),
-    between: &Between<'_>,
-    (looker, cells): (Looker, u32),
-) -> Visibility {
-    let a_looks = match looker {
-        Looker::Best => looks_best(a, b, between),
-        Looker::A => true,
-        Looker::B => false,
-    };
-    let (looker, other) = if a_looks { (a, b) } else { (b, a) };
-    let mut lookout = Lookout::new(simd, looker, other, between);
-    lookout.room.looks.moments = Some(lookout.normal);
-    let sums = lookout.look(looker, cells);
-    let value = sums.visibility();
-    let over_looker = gradient(looker, sums.at_looker, sums.at_looker_clear, sums.all, sums.clear);
-    let over_other = gradient(other, sums.at_other, sums.at_other_clear, sums.all, sums.clear);
-    let (gradient_a, gradient_b) =
-        if a_looks { (over_looker, over_other) } else { (over_other, over_looker) };
-    let (of_looker, of_other) = sums.spreads(value);
-    let (spread_a, spread_b) = if a_looks { (of_looker, of_other) } else { (of_other, of_looker) };
-    Visibility {
-        value,
-        gradient_a,
-        gradient_b,
-        spread_a,
-        spread_b,
-        from_a: a_looks,
-        segments: 4 * cells * cells,
+/// A pair that is partly hidden, made ready to be clipped as seen from one of its ends.
+pub struct Clipping<'a> {
+    looker: &'a WorldElement,
+    other: &'a WorldElement,
+    a_looks: bool,
+    lookout: Lookout,
+}
+
+impl<'a> Clipping<'a> {
+    /// Of two elements past convex occluders, all in one frame.
+    pub(super) fn new(
+        simd: Simd,
+        (a, b): (&'a WorldElement, &'a WorldElement),
+        between: &Between<'_>,
+        looker: Looker,
+    ) -> Clipping<'a> {
+        let a_looks = match looker {
+            Looker::Best => looks_best(a, b, between),
+            Looker::A => true,
+            Looker::B => false,
+        };
+        let (looker, other) = if a_looks { (a, b) } else { (b, a) };
+        let mut lookout = Lookout::new(simd, looker, other, between);
+        lookout.room.looks.moments = Some(lookout.normal);
+        Clipping { looker, other, a_looks, lookout }
+    }
+
+    /// Visibility, exact from 2 x 2 Gauss points in each of `cells` x `cells` parts of the looker. Each point
+    /// counts as a segment.
+    pub fn visibility(&mut self, cells: u32) -> Visibility {
+        let Clipping { looker, other, a_looks, ref mut lookout } = *self;
+        let sums = lookout.look(looker, cells);
+        let value = sums.visibility();
+        let over_looker =
+            gradient(looker, sums.at_looker, sums.at_looker_clear, sums.all, sums.clear);
+        let over_other = gradient(other, sums.at_other, sums.at_other_clear, sums.all, sums.clear);
+        let (of_looker, of_other) = sums.spreads(value);
+        let (gradient_a, gradient_b) =
+            if a_looks { (over_looker, over_other) } else { (over_other, over_looker) };
+        let (spread_a, spread_b) =
+            if a_looks { (of_looker, of_other) } else { (of_other, of_looker) };
+        Visibility {
+            value,
+            gradient_a,
+            gradient_b,
+            spread_a,
+            spread_b,
+            from_a: a_looks,
+            segments: 4 * cells * cells,
+        }
     }
 }
 
@@ -585,7 +603,7 @@ mod tests {
         for occluder in occluders {
             polygons.push(occluder.iter().copied(), DVec3::Z, None);
         }
-        clipped_visibility(Simd::detect(), (a, b), &polygons, (Looker::Best, 1))
+        Clipping::new(Simd::detect(), (a, b), &polygons, Looker::Best).visibility(1)
     }
 
     #[test]

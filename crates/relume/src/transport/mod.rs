@@ -2,6 +2,7 @@
 //!
 //! Nothing here knows radiosity, time or the pair tree.
 
+mod bend;
 mod clip;
 mod exchange;
 mod kernel;
@@ -11,15 +12,16 @@ mod segments;
 mod silhouette;
 mod visibility;
 
+pub use bend::{Bend, Receiver, Sender};
 pub use clip::keep_in_front;
 pub use exchange::{
     Exchange, Meeting, Variation, exchange, exchange_of_points, light_at, light_exchange, meeting,
 };
 pub use kernel::Simd;
-pub use lookout::{FactorPast, Looker, Lookout, form_factor_past};
+pub use lookout::{Clipping, FactorPast, Looker, Lookout, form_factor_past};
 pub use point::form_factor_from_point;
 pub use segments::{SEGMENTS, SegmentBundle};
 pub use visibility::{
-    CLIPPED_MAX, Candidates, Shaft, Visibility, covers, exact_visibility, light_visibility,
-    lookout, segment_is_clear, visibility,
+    CLIPPED_MAX, Candidates, Shaft, Visibility, clipping, covers, light_visibility, lookout,
+    segment_is_clear, visibility,
 };

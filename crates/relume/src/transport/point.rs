@@ -18,6 +18,12 @@ pub(super) struct PointBundle {
     pub(super) z: [f64; LANES],
 }
 
+impl PointBundle {
+    pub(super) fn point(&self, k: usize) -> DVec3 {
+        DVec3::new(self.x[k], self.y[k], self.z[k])
+    }
+}
+
 /// atan(t) / t for t in [0, tan(pi/8)] as a polynomial in t^2; error below 1e-15 (Chebyshev fit).
 const ATAN: [f64; 10] = [
     0.999_999_999_999_999,

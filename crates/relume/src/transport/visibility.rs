@@ -6,7 +6,7 @@ use crate::geometry::{Aabb, Plane, Pose, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
 use super::kernel::Simd;
-use super::lookout::{Between, Looker, Lookout, PlacedSolid, clipped_visibility};
+use super::lookout::{Between, Clipping, Looker, Lookout, PlacedSolid};
 use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use glam::{DVec2, DVec3};
 
@@ -374,24 +374,16 @@ pub fn visibility(
 /// Occluders up to which partial visibility is found by clipping where nothing is known of the light.
 pub const CLIPPED_MAX: usize = 12;
 
-/// Visibility of a pair by clipping, exact from 2 x 2 points in each of `cells` x `cells` parts of
-/// the looker. Each point counts as a segment. `None` if more than `most` occluders stand in the shaft
-/// ([`Shaft::occluders`]).
-pub fn exact_visibility(
+/// A pair made ready to be clipped past its blockers ([`Shaft::occluders`] says how many that are): in the
+/// frame of the body that both ends ride on, if they do.
+pub fn clipping<'a>(
     simd: Simd,
-    shaft: &Shaft<'_>,
+    shaft: &Shaft<'a>,
     blockers: &[PatchId],
-    looker: (Looker, u32),
-    most: usize,
-) -> Option<Visibility> {
-    if blockers.is_empty() {
-        return Some(Visibility::CLEAR);
-    }
-    if shaft.occluders(blockers) > most {
-        return None;
-    }
+    looker: Looker,
+) -> Clipping<'a> {
     let ends = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
-    Some(clipped_visibility(simd, ends, &shaft.between(blockers), looker))
+    Clipping::new(simd, ends, &shaft.between(blockers), looker)
 }
 
 /// One end of a pair made ready to look at the other past blockers; in the frame of the body that both
@@ -573,10 +565,8 @@ mod tests {
         let key = |k: u64| k.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let trace = |k| visibility(Simd::detect(), &shaft, &blockers, key(k), 6).value;
         let traced = (1..=16).map(trace).sum::<f64>() / 16.0;
-        let clipped =
-            exact_visibility(Simd::detect(), &shaft, &blockers, (Looker::Best, 8), CLIPPED_MAX)
-                .unwrap()
-                .value;
+        assert!(shaft.occluders(&blockers) <= CLIPPED_MAX);
+        let clipped = clipping(Simd::detect(), &shaft, &blockers, Looker::Best).visibility(8).value;
         assert!((traced - clipped).abs() < 0.04, "{traced} {clipped}");
         clipped
     }

@@ -542,12 +542,11 @@ impl Places {
 /// A link that is partly hidden is looked at from more points, the more so the larger its form factor:
 /// `stake` is that over what a link may err by.
 fn look_closer(v: Visibility, clipped: &mut Clipping<'_>, stake: f64) -> Visibility {
-    // The error of n x n points on a function with kinks falls as 1 / n^2.
-    let spread = if v.from_a { v.spread_a } else { v.spread_b };
-    let error = stake * spread.max(UNSEEN);
+    let error = stake * clipped.doubt();
     if error <= CLOSER {
         return v;
     }
+    // The error of n x n points on a function with kinks falls as 1 / n^2.
     let cells = (error / CLOSER).sqrt().ceil().min(CELLS_MAX);
     let again = clipped.visibility(cells as u32);
     Visibility { segments: v.segments + again.segments, ..again }
@@ -562,16 +561,13 @@ const CLIPPED_MAX_CLOSE: usize = 96;
 /// The same for pairs that bring less: sampling a few of their shares of light does little harm.
 const CLIPPED_MAX_REST: usize = 4;
 
-/// Spread of visibility that four points which agree may have overlooked.
-const UNSEEN: f64 = 0.05;
-
 /// Thresholds below this ask for no more points a link: elements shrink instead.
 const FINEST: f64 = 0.002;
 
 /// Parts of a looker along each side from which it looks at most.
 const CELLS_MAX: f64 = 8.0;
 
-/// Stake times spread of visibility above which a link is clipped from more points.
+/// Stake times doubt of visibility above which a link is clipped from more points.
 const CLOSER: f64 = 0.05;
 
 /// A punctual light as the far end of a shaft.

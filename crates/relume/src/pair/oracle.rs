@@ -77,7 +77,7 @@ const EDGE_EMITTED: f64 = 0.2;
 
 /// The same for reflected light: where something nearly touches a receiver, it hides many sources
 /// along the same edge, and their errors have one sign.
-const EDGE_REFLECTED: f64 = 2.0;
+const EDGE_REFLECTED: f64 = 3.0;
 
 /// Weight of the variation of the kernel over a receiver beyond its gradient: most of it is found again
 /// when the solution is read.

@@ -286,11 +286,40 @@ impl<'a> Clipping<'a> {
             gradient_b,
             spread_a,
             spread_b,
-            from_a: a_looks,
             segments: 4 * cells * cells,
         }
     }
+
+    /// How far V may be off after the last look from four points: about its root mean square.
+    ///
+    /// V is smooth over an end while part of the other is seen, and has kinks where that begins and ends. So
+    /// four points that all see a part are nearly exact; four that see all of it, or nothing, may have
+    /// overlooked something. Measured on 47,000 links of three scenes.
+    pub fn doubt(&self) -> f64 {
+        let sums = &self.lookout.room.looks.sums;
+        let spread = sums.spreads(sums.visibility()).0;
+        match (sums.bright, sums.dark, sums.points) {
+            (0, 0, _) => SMOOTH * spread + UNSEEN_SMOOTH,
+            (bright, dark, all) if bright == all || dark == all => UNSEEN,
+            _ => (KINKED * spread).max(UNSEEN_KINKED),
+        }
+    }
 }
+
+/// How far V is off relative to its spread over four points that all see a part of the other end.
+const SMOOTH: f64 = 0.06;
+
+/// How far it is off where their spread is nothing.
+const UNSEEN_SMOOTH: f64 = 0.002;
+
+/// The same where some points see all of the other end or nothing.
+const KINKED: f64 = 0.33;
+
+/// See [`KINKED`].
+const UNSEEN_KINKED: f64 = 0.05;
+
+/// The same where all points see all of it, or all nothing.
+const UNSEEN: f64 = 0.075;
 
 /// How many times as much shadows move over the other end for the larger to be looked from.
 const MUCH: f64 = 16.0;
@@ -516,10 +545,17 @@ struct Sums {
     at_other_clear: DVec2,
     /// Sum over the points of their clear part squared over all.
     clear2: f64,
+    /// Points, those that see all of the other end, and those that see nothing of it.
+    points: u32,
+    bright: u32,
+    dark: u32,
 }
 
 impl Sums {
     fn finish_point(&mut self, all: f64, clear: f64) {
+        self.points += 1;
+        self.dark += u32::from(clear <= 0.0);
+        self.bright += u32::from(clear > 0.0 && clear >= all * (1.0 - NOTHING));
         self.clear += clear;
         self.clear2 += clear * clear / all.max(f64::MIN_POSITIVE);
     }

@@ -27,8 +27,6 @@ pub struct Visibility {
     pub spread_a: f64,
     /// Standard deviation between the quadrants of the second end, absolute.
     pub spread_b: f64,
-    /// Whether it was clipped as seen from points of the first end, not of the second.
-    pub from_a: bool,
     /// Segments traced; 0 where the shaft is empty, and then `value` is exactly 1.
     pub segments: u32,
 }
@@ -41,7 +39,6 @@ impl Visibility {
         gradient_b: DVec2::ZERO,
         spread_a: 0.0,
         spread_b: 0.0,
-        from_a: true,
         segments: 0,
     };
 }
@@ -479,7 +476,6 @@ impl Tally {
             gradient_b: self.b.gradient(b),
             spread_a: self.a.spread(value),
             spread_b: self.b.spread(value),
-            from_a: true,
             segments,
         }
     }

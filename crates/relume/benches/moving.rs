@@ -6,6 +6,8 @@
 //!   the paper's form-factor oracle must divide to be as accurate as the error oracle, and what a
 //!   cold build of that costs, in frames of the error oracle.
 //! - *mover*: a small cube in the furnished room of the cold bench.
+//! - *box*: the room of `room_box_static.glb` with its box sliding. What a frame costs, its reading included, at which error of the
+//!   path-traced patch means (`tests/data/room_box_static.csv`, of the first frame).
 //!
 //! One thread. Frames and cold builds take turns, so that whatever else the machine does hits both:
 //! compare ratios, not seconds. `benches/data` holds the sequences as `relume demo` writes them.
@@ -42,6 +44,9 @@ fn main() {
         small_mover("on the floor", 0.01);
         small_mover("in the air", 1.2);
     }
+    if asked("box") {
+        moving_box();
+    }
 }
 
 // ---- A moving lamp.
@@ -70,7 +75,7 @@ const SHARES: [f64; 4] = [1.0 / 250.0, 1.0 / 1000.0, 1.0 / 4000.0, 1.0 / 16000.0
 const FINER_FRAMES: u32 = 9;
 
 /// Links beyond which the paper's oracle is not refined further.
-const LINKS_MAX: u64 = 600_000;
+const LINKS_MAX: u64 = 1_000_000;
 
 /// The norms in which two oracles are called equal: cells along a side of a patch, and what errors
 /// are relative to. The first is the one that counts.
@@ -316,7 +321,66 @@ fn small_mover(place: &str, above_m: f64) {
     println!("  nothing moved: {:.1} microseconds a frame", 1e6 * median(still));
 }
 
-// ---- Both.
+// ---- A moving box.
+
+/// Points along a side of a patch over which irradiance is averaged.
+const POINTS: u32 = 32;
+
+fn moving_box() {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let path = here.join("benches/data/moving_box.glb");
+    let scene = Arc::new(import(&path, &ImportOptions::default()).expect("a valid scene"));
+    let rows = rows(&here.join("tests/data/room_box_static.csv"));
+    let pool = pool(1);
+    println!("\nmoving box: {} patch means, {BOX_FRAMES} frames, one thread", rows.len());
+    println!(
+        "tolerance     links   leaves   error   cold build   frame and its reading (quartiles)"
+    );
+    for tolerance in [0.15, 0.1, 0.05, 0.036, 0.02, 0.014, 0.01] {
+        let own = fixed(Oracle::Error, tolerance);
+        let cold = cold(&scene, &own, 0, &pool);
+        let (mut session, report) = (cold.session, cold.report);
+        let error = patch_means_error(&session.snapshot(), &rows);
+        let frame = |frame| {
+            let start = Instant::now();
+            step(&mut session, frame, &pool);
+            pool.install(|| session.snapshot());
+            start.elapsed().as_secs_f64()
+        };
+        let [low, middle, high] = quartiles((1..BOX_FRAMES).map(frame)).map(|s| 1e3 * s);
+        println!(
+            "{tolerance:<9} {:>9} {:>8} {:>5.2} % {:>9.1} ms {middle:>9.1} ms ({low:.1} to {high:.1})",
+            report.links,
+            report.leaves,
+            100.0 * error,
+            1e3 * cold.seconds,
+        );
+    }
+}
+
+/// Frames of the moving box.
+const BOX_FRAMES: u32 = 24;
+
+fn rows(path: &Path) -> Vec<Vec<f64>> {
+    let text = std::fs::read_to_string(path).expect("a table");
+    let numbers = |line: &str| line.split(',').map(|n| n.parse().ok()).collect();
+    text.lines().filter_map(numbers).collect()
+}
+
+/// Root mean square of the relative errors of patch means.
+fn patch_means_error(snapshot: &Snapshot, rows: &[Vec<f64>]) -> f64 {
+    let off2 = |row: &Vec<f64>| {
+        let three = |k: usize| DVec3::new(row[k], row[k + 1], row[k + 2]);
+        let part = |k: u32| (f64::from(k) + 0.5) / f64::from(POINTS);
+        let at = |k: u32| three(0) + three(3) * part(k % POINTS) + three(6) * part(k / POINTS);
+        let found = |k| snapshot.irradiance_at(at(k), three(9)).expect("it lies on the room")[0];
+        let mean = (0..POINTS * POINTS).map(found).sum::<f64>() / f64::from(POINTS * POINTS);
+        (mean / row[12] - 1.0).powi(2)
+    };
+    (rows.iter().map(off2).sum::<f64>() / rows.len() as f64).sqrt()
+}
+
+// ---- All.
 
 /// Options of all that is measured: row sums and energies, a pass over all links, are left out.
 fn fixed(oracle: Oracle, tolerance: f64) -> Options {

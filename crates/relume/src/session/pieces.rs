@@ -88,6 +88,10 @@ const NEAR: f64 = 4.0;
 /// See [`NEAR`].
 const UNSEEN_NEAR: f64 = 1.5;
 
+/// The same where a piece and those beside it all see a part of the other end: V has kinks only where that
+/// begins and ends.
+const UNSEEN_PARTLY: f64 = 0.05;
+
 /// Steps in which shares are fitted to what every piece sees.
 const FITS: usize = 8;
 
@@ -296,8 +300,13 @@ impl<'a> Sharing<'a> {
             if first.is_clear || factor <= self.closer {
                 return first.value;
             }
-            let unseen = if first.is_near { UNSEEN_NEAR } else { UNSEEN };
-            let error = factor * bend(&looks, k).max(unseen);
+            let (bend, is_partly) = bend(&looks, k);
+            let unseen = match first.is_near {
+                _ if is_partly => UNSEEN_PARTLY,
+                true => UNSEEN_NEAR,
+                false => UNSEEN,
+            };
+            let error = factor * bend.max(unseen);
             if error <= self.closer {
                 return first.value;
             }
@@ -329,16 +338,20 @@ impl<'a> Sharing<'a> {
 }
 
 /// How far visibility over a piece is from a straight line: between pieces on opposite sides of it, and
-/// from those that have none opposite from one value.
-fn bend(looks: &[Look], of: usize) -> f64 {
+/// from those that have none opposite from one value. And whether all of them see a part of the other end.
+fn bend(looks: &[Look], of: usize) -> (f64, bool) {
     let Look { value, from: (middle, radius), .. } = looks[of];
     let around = of.saturating_sub(AROUND)..(of + AROUND).min(looks.len());
     let way = |look: &Look| (look.from.0 - middle, look.value - value, look.from.1 + radius);
+    let mut is_partly = value > 0.0 && value < 1.0;
     let beside: Vec<(DVec3, f64)> = looks[around]
         .iter()
         .map(way)
         .filter(|(way, _, reach)| way.length_squared() < (BESIDE * reach).powi(2))
-        .map(|(way, rise, _)| (way, rise))
+        .map(|(way, rise, _)| {
+            is_partly &= rise + value > 0.0 && rise + value < 1.0;
+            (way, rise)
+        })
         .collect();
     let off = |&(way, rise): &(DVec3, f64)| {
         let is_opposite = |(back, _): &&(DVec3, f64)| {
@@ -346,5 +359,5 @@ fn bend(looks: &[Look], of: usize) -> f64 {
         };
         (rise + beside.iter().find(is_opposite).map_or(0.0, |opposite| opposite.1)).abs()
     };
-    beside.iter().map(off).fold(0.0, f64::max)
+    (beside.iter().map(off).fold(0.0, f64::max), is_partly)
 }

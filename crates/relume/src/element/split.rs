@@ -53,6 +53,20 @@ impl Shape {
         [e.x * e.x + f.x * f.x, e.x * e.y + f.x * f.y, e.y * e.y + f.y * f.y].map(|v| v / 12.0)
     }
 
+    /// The same, exact for any quadrilateral: that of two triangles.
+    pub fn exact_second_moment(&self) -> [f64; 3] {
+        let [a, b, c, d] = self.corners.map(|c| c - self.centroid());
+        let (one, two) = ((b - a).perp_dot(c - a), (c - a).perp_dot(d - a));
+        let of = |f: fn(DVec2, DVec2) -> f64| {
+            let mean = |p: DVec2, q: DVec2, r: DVec2| {
+                let s = p + q + r;
+                (f(p, p) + f(q, q) + f(r, r) + f(s, s)) / 12.0
+            };
+            (one * mean(a, b, c) + two * mean(a, c, d)) / (one + two)
+        };
+        [of(|p, q| p.x * q.x), of(|p, q| p.x * q.y), of(|p, q| p.y * q.y)]
+    }
+
     /// Centroid, radius and second moment at once.
     pub fn extent(&self) -> Extent {
         let centroid = self.centroid();

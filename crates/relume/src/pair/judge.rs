@@ -9,8 +9,8 @@ use crate::event::{Foresight, Lookahead, Tick};
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
 use crate::scene::{BodyId, LightKind, PatchId};
 use crate::transport::{
-    CLIPPED_MAX, Clipping, Exchange, Looker, Meeting, SegmentBundle, Shaft, Simd, Visibility,
-    clipping, exchange, light_at, light_exchange, light_visibility, meeting, visibility,
+    CLIPPED_MAX, Clipping, Exchange, Meeting, SegmentBundle, Shaft, Simd, Visibility, clipping,
+    exchange, light_at, light_exchange, light_visibility, meeting, visibility,
 };
 
 use super::brightness::Brightness;
@@ -344,12 +344,11 @@ impl Placed<'_> {
                 way = Margin::between(brings.max(limit), brings.min(limit));
             }
         }
-        let mut clipped = (1..=most)
-            .contains(&occluders)
-            .then(|| clipping(self.simd, shaft, &blockers, Looker::Best));
-        let v = match &mut clipped {
-            Some(clipped) => clipped.visibility(1),
-            None => visibility(self.simd, shaft, &blockers, key, 4),
+        let mut clipped =
+            (1..=most).contains(&occluders).then(|| clipping(self.simd, shaft, &blockers));
+        let (v, doubt) = match &mut clipped {
+            Some(clipped) => clipped.first_look(),
+            None => (visibility(self.simd, shaft, &blockers, key, 4), 0.0),
         };
         let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
         else {
@@ -376,7 +375,7 @@ impl Placed<'_> {
             margin.error = way.min(Margin::between(threshold, e.error));
         }
         let v = match &mut clipped {
-            Some(clipped) => look_closer(v, clipped, stake),
+            Some(clipped) => look_closer(v, clipped, stake * doubt),
             None if v.segments == 0 => v,
             None => {
                 let again = visibility(self.simd, shaft, &blockers, key, 6);
@@ -539,10 +538,9 @@ impl Places {
     }
 }
 
-/// A link that is partly hidden is looked at from more points, the more so the larger its form factor:
-/// `stake` is that over what a link may err by.
-fn look_closer(v: Visibility, clipped: &mut Clipping<'_>, stake: f64) -> Visibility {
-    let error = stake * clipped.doubt();
+/// A link that is partly hidden is looked at from more points, the more so the larger its `error`: how far V
+/// may be off times the form factor, over what a link may err by.
+fn look_closer(v: Visibility, clipped: &mut Clipping<'_>, error: f64) -> Visibility {
     if error <= CLOSER {
         return v;
     }

@@ -301,10 +301,12 @@ impl<'a> Sharing<'a> {
                 return first.value;
             }
             let (bend, is_partly) = bend(&looks, k);
-            let unseen = match first.is_near {
-                _ if is_partly => UNSEEN_PARTLY,
-                true => UNSEEN_NEAR,
-                false => UNSEEN,
+            let unseen = if is_partly {
+                UNSEEN_PARTLY
+            } else if first.is_near {
+                UNSEEN_NEAR
+            } else {
+                UNSEEN
             };
             let error = factor * bend.max(unseen);
             if error <= self.closer {
@@ -359,5 +361,6 @@ fn bend(looks: &[Look], of: usize) -> (f64, bool) {
         };
         (rise + beside.iter().find(is_opposite).map_or(0.0, |opposite| opposite.1)).abs()
     };
-    (beside.iter().map(off).fold(0.0, f64::max), is_partly)
+    // One piece alone has seen nothing but its own middle.
+    (beside.iter().map(off).fold(0.0, f64::max), is_partly && beside.len() > 1)
 }

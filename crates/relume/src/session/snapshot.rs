@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use crate::element::{ElementId, Kind};
 use crate::geometry::Pose;
@@ -108,36 +109,45 @@ pub(super) fn take(
 ) -> Snapshot {
     let (scene, forest) = (&session.scene, &solved.forest);
     let surfaces = LitForest::new(scene, forest);
-    let bends = Bends::new(session.simd, solved, (links, radiosity));
-    let mut leaves = Vec::with_capacity(forest.counts().leaves as usize);
-    let mut leaf_offsets = vec![0];
-    for (k, patch) in scene.patches.iter().enumerate() {
+    let bends = Bends { simd: session.simd, solved, links, radiosity };
+    let of_facet = |facet: ElementId, out: &mut Vec<Leaf>| {
+        let lit = surfaces.lit(facet.0);
+        let mut bent = bends.of_leaves(facet.0).into_iter();
+        radiosity.irradiances(&surfaces, facet.0, &mut |id, h| {
+            let h = h.plus(&bent.next().expect("the same leaves"));
+            let irradiance = h.mean.map(|x| x.max(0.0));
+            out.push(Leaf {
+                corners: forest.shape(ElementId(id)).corners,
+                irradiance,
+                irradiance_gradient: h.gradient,
+                radiosity: std::array::from_fn(|c| {
+                    lit.exitance[c] + lit.reflectance[c] * irradiance[c]
+                }),
+            });
+        });
+    };
+    let of_patch = |k: usize| {
+        let mut out = Vec::new();
         let mut stack = vec![forest.patch_root(PatchId(k as u32))];
-        if !solved.view.is_present(patch.body) {
+        if !solved.view.is_present(scene.patches[k].body) {
             stack.clear();
         }
         while let Some(id) = stack.pop() {
-            if forest.kind(id) == Kind::Polygon {
-                stack.extend(forest.children(id).rev().map(ElementId));
-                continue;
+            match forest.kind(id) {
+                Kind::Polygon => stack.extend(forest.children(id).rev().map(ElementId)),
+                _ => of_facet(id, &mut out),
             }
-            let lit = surfaces.lit(id.0);
-            radiosity.irradiances(&surfaces, id.0, &mut |id, h| {
-                let mut h = *h;
-                bends.add(&surfaces, id, &mut h);
-                let irradiance = h.mean.map(|x| x.max(0.0));
-                leaves.push(Leaf {
-                    corners: forest.shape(ElementId(id)).corners,
-                    irradiance,
-                    irradiance_gradient: h.gradient,
-                    radiosity: std::array::from_fn(|c| {
-                        lit.exitance[c] + lit.reflectance[c] * irradiance[c]
-                    }),
-                });
-            });
         }
-        leaf_offsets.push(leaves.len() as u32);
-    }
+        out
+    };
+    let by_patch: Vec<Vec<Leaf>> = (0..scene.patches.len()).into_par_iter().map(of_patch).collect();
+    let mut leaf_offsets = vec![0];
+    let mut end = 0;
+    leaf_offsets.extend(by_patch.iter().map(|leaves| {
+        end += leaves.len() as u32;
+        end
+    }));
+    let leaves = by_patch.concat();
     Snapshot {
         scene: Arc::clone(scene),
         time_s: solved.time_s,

@@ -36,7 +36,8 @@ impl Linear {
         self
     }
 
-    pub(super) fn plus(mut self, other: &Linear) -> Linear {
+    /// The sum, in the same units.
+    pub fn plus(mut self, other: &Linear) -> Linear {
         for c in 0..3 {
             self.mean[c] += other.mean[c];
             self.gradient[0][c] += other.gradient[0][c];

@@ -134,8 +134,6 @@ impl<'a> Between<'a> {
 /// The end of a pair that the other is looked at from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Looker {
-    /// The smaller, unless what blocks is very near it.
-    Best,
     /// The first.
     A,
     /// The second.
@@ -239,7 +237,8 @@ impl Lookout {
     }
 }
 
-/// A pair that is partly hidden, made ready to be clipped as seen from one of its ends.
+/// A pair that is partly hidden, made ready to be clipped as seen from one of its ends: the smaller, unless
+/// what blocks is very near it.
 pub struct Clipping<'a> {
     looker: &'a WorldElement,
     other: &'a WorldElement,
@@ -253,13 +252,8 @@ impl<'a> Clipping<'a> {
         simd: Simd,
         (a, b): (&'a WorldElement, &'a WorldElement),
         between: &Between<'_>,
-        looker: Looker,
     ) -> Clipping<'a> {
-        let a_looks = match looker {
-            Looker::Best => looks_best(a, b, between),
-            Looker::A => true,
-            Looker::B => false,
-        };
+        let a_looks = looks_best(a, b, between);
         let (looker, other) = if a_looks { (a, b) } else { (b, a) };
         let mut lookout = Lookout::new(simd, looker, other, between);
         lookout.room.looks.moments = Some(lookout.normal);
@@ -290,19 +284,21 @@ impl<'a> Clipping<'a> {
         }
     }
 
-    /// How far V may be off after the last look from four points: about its root mean square.
+    /// Visibility from four points, and how far it may be off: about its root mean square.
     ///
     /// V is smooth over an end while part of the other is seen, and has kinks where that begins and ends. So
     /// four points that all see a part are nearly exact; four that see all of it, or nothing, may have
-    /// overlooked something. Measured on 47,000 links of three scenes.
-    pub fn doubt(&self) -> f64 {
+    /// overlooked something. Measured on 47,000 links of three scenes (docs/exchange.md).
+    pub fn first_look(&mut self) -> (Visibility, f64) {
+        let v = self.visibility(1);
         let sums = &self.lookout.room.looks.sums;
         let spread = sums.spreads(sums.visibility()).0;
-        match (sums.bright, sums.dark, sums.points) {
+        let doubt = match (sums.bright, sums.dark, sums.points) {
             (0, 0, _) => SMOOTH * spread + UNSEEN_SMOOTH,
             (bright, dark, all) if bright == all || dark == all => UNSEEN,
             _ => (KINKED * spread).max(UNSEEN_KINKED),
-        }
+        };
+        (v, doubt)
     }
 }
 
@@ -639,7 +635,7 @@ mod tests {
         for occluder in occluders {
             polygons.push(occluder.iter().copied(), DVec3::Z, None);
         }
-        Clipping::new(Simd::detect(), (a, b), &polygons, Looker::Best).visibility(1)
+        Clipping::new(Simd::detect(), (a, b), &polygons).visibility(1)
     }
 
     #[test]

@@ -12,7 +12,7 @@ mod segments;
 mod silhouette;
 mod visibility;
 
-pub use bend::{Bend, Receiver, Sender};
+pub use bend::{Bend, Receiver};
 pub use clip::keep_in_front;
 pub use exchange::{
     Exchange, Meeting, Variation, exchange, exchange_of_points, light_at, light_exchange, meeting,

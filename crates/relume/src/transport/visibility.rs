@@ -373,14 +373,9 @@ pub const CLIPPED_MAX: usize = 12;
 
 /// A pair made ready to be clipped past its blockers ([`Shaft::occluders`] says how many that are): in the
 /// frame of the body that both ends ride on, if they do.
-pub fn clipping<'a>(
-    simd: Simd,
-    shaft: &Shaft<'a>,
-    blockers: &[PatchId],
-    looker: Looker,
-) -> Clipping<'a> {
+pub fn clipping<'a>(simd: Simd, shaft: &Shaft<'a>, blockers: &[PatchId]) -> Clipping<'a> {
     let ends = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
-    Clipping::new(simd, ends, &shaft.between(blockers), looker)
+    Clipping::new(simd, ends, &shaft.between(blockers))
 }
 
 /// One end of a pair made ready to look at the other past blockers; in the frame of the body that both
@@ -562,7 +557,7 @@ mod tests {
         let trace = |k| visibility(Simd::detect(), &shaft, &blockers, key(k), 6).value;
         let traced = (1..=16).map(trace).sum::<f64>() / 16.0;
         assert!(shaft.occluders(&blockers) <= CLIPPED_MAX);
-        let clipped = clipping(Simd::detect(), &shaft, &blockers, Looker::Best).visibility(8).value;
+        let clipped = clipping(Simd::detect(), &shaft, &blockers).visibility(8).value;
         assert!((traced - clipped).abs() < 0.04, "{traced} {clipped}");
         clipped
     }

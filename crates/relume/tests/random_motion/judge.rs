@@ -111,7 +111,8 @@ pub(crate) fn agree(
     let mean = if area > 0.0 { flux / area } else { 0.0 };
     // The bound rests on row sums of at most 1; they keep to that up to the links' errors.
     let passed_on = (rho_max * (1.0 + two.row_sum_error.unwrap().rms)).min(0.9);
-    let bound = (one.residual + two.residual) / (1.0 - passed_on) * mean;
+    // Read with bends, which may add as much as they are of what arrives.
+    let bound = 2.0 * (one.residual + two.residual) / (1.0 - passed_on) * mean;
     let mut used = 0.0_f64;
     for (l, m) in warm.leaves.iter().zip(&cold.leaves) {
         if l.corners != m.corners {

@@ -566,7 +566,7 @@ const FINEST: f64 = 0.002;
 const CELLS_MAX: f64 = 8.0;
 
 /// Stake times doubt of visibility above which a link is clipped from more points.
-const CLOSER: f64 = 0.035;
+const CLOSER: f64 = 0.03;
 
 /// A punctual light as the far end of a shaft.
 pub(super) struct LightPlace {

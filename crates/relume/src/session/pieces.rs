@@ -90,7 +90,7 @@ const UNSEEN_NEAR: f64 = 1.5;
 
 /// The same where a piece and those beside it all see a part of the other end: V has kinks only where that
 /// begins and ends.
-const UNSEEN_PARTLY: f64 = 0.05;
+const UNSEEN_PARTLY: f64 = 0.2;
 
 /// Steps in which shares are fitted to what every piece sees.
 const FITS: usize = 8;

@@ -182,7 +182,9 @@ proptest! {
         };
         let there: Vec<Segment> = blockers.iter().map(turned).collect();
         let found = visible_exchange(&turned(&a), &turned(&b), &there);
-        prop_assert!((whole - found).abs() < 1e-10, "{} {}", whole, found);
+        // A blocker that cuts an end is cut off at 1e-12 of the coordinates before it, which grow with the move:
+        // seen from near by that is a hundred times as much.
+        prop_assert!((whole - found).abs() < 1e-9, "{} {}", whole, found);
     }
 }
 

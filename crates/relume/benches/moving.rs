@@ -10,7 +10,7 @@
 //!   path-traced patch means (`tests/data/room_box_static.csv`, of the first frame).
 //!
 //! One thread. Frames and cold builds take turns, so that whatever else the machine does hits both:
-//! compare ratios, not seconds. `benches/data` holds the sequences as `relume demo` writes them.
+//! compare ratios, not seconds. `benches/data` holds the sequences as `relume demo` writes them, and the moving box.
 
 #![allow(missing_docs, clippy::disallowed_methods, clippy::disallowed_types)]
 

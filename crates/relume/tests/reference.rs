@@ -213,7 +213,8 @@ fn patch_means(snapshot: &Snapshot) -> (f64, f64) {
 #[test]
 fn patch_means_of_the_static_room() {
     let mut found = Vec::new();
-    for tolerance in [0.1, 0.05, 0.02] {
+    // Without bends 1.3, 0.8 and 0.64 %.
+    for (tolerance, most) in [(0.1, 0.009), (0.05, 0.007), (0.02, 0.004)] {
         let (session, report) = solved(shipped("room_box_static.glb"), at_tolerance(tolerance));
         let (off, bias) = patch_means(&session.snapshot());
         let (anew, slant) = patch_means(&session.reconstruction());
@@ -221,11 +222,7 @@ fn patch_means_of_the_static_room() {
             "static room at {tolerance}: RMS {off:.4}, bias {bias:+.5}; reconstructed {anew:.4}, {slant:+.5}; {} links",
             report.links
         );
-        // Without bends three times as much.
-        assert!(
-            off <= 0.2 * tolerance && bias.abs() < 0.05 * tolerance,
-            "{tolerance}: {off} {bias}"
-        );
+        assert!(off <= most && bias.abs() < 0.05 * tolerance, "{tolerance}: {off} {bias}");
         assert!(anew < off && slant.abs() < 0.05 * tolerance, "{tolerance}: {anew} {slant}");
         found.push(off);
     }

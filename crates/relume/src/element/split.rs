@@ -53,7 +53,7 @@ impl Shape {
         [e.x * e.x + f.x * f.x, e.x * e.y + f.x * f.y, e.y * e.y + f.y * f.y].map(|v| v / 12.0)
     }
 
-    /// The same, exact for any quadrilateral: that of two triangles.
+    /// [`Shape::second_moment`], m2, exact for any quadrilateral: that of two triangles.
     pub fn exact_second_moment(&self) -> [f64; 3] {
         let [a, b, c, d] = self.corners.map(|c| c - self.centroid());
         let (one, two) = ((b - a).perp_dot(c - a), (c - a).perp_dot(d - a));

@@ -9,8 +9,8 @@ use super::point::{LANES, PointBundle, form_factors_from_points};
 use crate::element::{WorldElement, WorldLight, bilinear_area};
 use crate::geometry::ConvexPolygon;
 
-/// How much of each of three parabolas is in what arrives over an element, relative to its mean: see
-/// [`Receiver::polynomial`].
+/// How much of each of three parabolas is in what arrives over an element, relative to its mean, with lengths in
+/// radii of the element: see [`Receiver::polynomial`].
 pub type Bend = [f64; 3];
 
 /// (Sum of the radii / distance)^2 from which what arrives is known in closed form only.
@@ -119,8 +119,8 @@ impl<'a> Receiver<'a> {
         self.fitted(&std::array::from_fn(sent))
     }
 
-    /// Coefficients of 1, x, y, x x, x y and y y, where x and y are offsets from the centroid along the axes of
-    /// the patch, metres: of mean 0 and no slope over the element.
+    /// Coefficients of 1, x, y (1/m), x x, x y and y y (1/m2), in the unit of what the bend is multiplied with, where x
+    /// and y are offsets from the centroid along the axes of the patch, metres: of mean 0 and no slope over the element.
     pub fn polynomial(&self, bend: Bend) -> [f64; 6] {
         let per_m = 1.0 / self.element.radius;
         let line = |n: usize| -(0..3).map(|m| bend[m] * self.lines[m][n]).sum::<f64>();

@@ -291,12 +291,16 @@ impl<'a> Clipping<'a> {
     /// overlooked something. Measured on 47,000 links of three scenes (docs/exchange.md).
     pub fn first_look(&mut self) -> (Visibility, f64) {
         let v = self.visibility(1);
-        let sums = &self.lookout.room.looks.sums;
-        let spread = sums.spreads(sums.visibility()).0;
-        let doubt = match (sums.bright, sums.dark, sums.points) {
-            (0, 0, _) => SMOOTH * spread + UNSEEN_SMOOTH,
-            (bright, dark, all) if bright == all || dark == all => UNSEEN,
-            _ => (KINKED * spread).max(UNSEEN_KINKED),
+        let spread = if self.a_looks { v.spread_a } else { v.spread_b };
+        let points = &self.lookout.room.looks.points;
+        let sees_nothing = |&(_, clear): &(f64, f64)| clear <= 0.0;
+        let sees_all = |&(all, clear): &(f64, f64)| clear > 0.0 && clear >= all * (1.0 - NOTHING);
+        let doubt = if points.iter().all(sees_nothing) || points.iter().all(sees_all) {
+            UNSEEN
+        } else if points.iter().any(|p| sees_nothing(p) || sees_all(p)) {
+            (KINKED * spread).max(UNSEEN_KINKED)
+        } else {
+            SMOOTH * spread + UNSEEN_SMOOTH
         };
         (v, doubt)
     }
@@ -541,17 +545,10 @@ struct Sums {
     at_other_clear: DVec2,
     /// Sum over the points of their clear part squared over all.
     clear2: f64,
-    /// Points, those that see all of the other end, and those that see nothing of it.
-    points: u32,
-    bright: u32,
-    dark: u32,
 }
 
 impl Sums {
     fn finish_point(&mut self, all: f64, clear: f64) {
-        self.points += 1;
-        self.dark += u32::from(clear <= 0.0);
-        self.bright += u32::from(clear > 0.0 && clear >= all * (1.0 - NOTHING));
         self.clear += clear;
         self.clear2 += clear * clear / all.max(f64::MIN_POSITIVE);
     }

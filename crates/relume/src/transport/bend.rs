@@ -298,7 +298,8 @@ mod tests {
             let corners = &source.corners[..source.len];
             let seen = |p| form_factor_from_point(p, receiver.plane.normal, corners);
             let [line, best, bent] = left(&receiver, bend, seen);
-            let bound = (best * best + 0.09 * line * line).sqrt() + 1e-4;
+            // What the best parabola leaves over, nine points may take for one.
+            let bound = 1.5 * best + 0.2 * line + 1e-4;
             prop_assert!(bent < bound, "{line} {best} {bent} {bend:?}");
         }
 

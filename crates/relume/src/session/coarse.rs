@@ -7,7 +7,7 @@ use crate::pair::{self, Brightness, Changes, Light};
 use crate::scene::{PatchId, Scene};
 use crate::solver::{Dirty, Links, Radiosity, Stop, Surfaces};
 
-use super::surfaces::{LitForest, remove_pair, set_pair};
+use super::surfaces::{LitForest, set_pairs};
 
 /// Coarse elements are no larger than this share of the scene's area.
 const COARSE_SHARE: f64 = 1.0 / 64.0;
@@ -58,14 +58,9 @@ pub(super) struct Coarse {
 impl Coarse {
     /// Takes over what an update found on the coarse pairs. Whether any of them changed.
     pub(super) fn follow(&mut self, seed: &Forest, changes: &Changes) -> bool {
-        self.links.extend(seed.len());
-        for &(a, b) in &changes.dropped {
-            remove_pair(&mut self.links, a, b);
-        }
-        for held in &changes.held {
-            let link = pair::Link { a: held.a, b: held.b, carried: held.carried };
-            set_pair(&mut self.links, seed, &link);
-        }
+        let held = changes.held.iter();
+        let held = held.map(|h| pair::Link { a: h.a, b: h.b, carried: h.carried });
+        set_pairs(&mut self.links, seed, changes.dropped.iter().copied(), held);
         self.links.tidy();
         !changes.dropped.is_empty() || !changes.held.is_empty()
     }

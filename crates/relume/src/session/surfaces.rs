@@ -160,20 +160,32 @@ pub(crate) fn links_of(forest: &impl Receivers, tree: &PairTree) -> Links {
     })
 }
 
-/// Sets both directions of a pair to what it carries now; returns the receivers concerned.
-pub(super) fn set_pair(links: &mut Links, forest: &impl Receivers, pair: &pair::Link) {
+/// Removes both directions of some pairs and sets those of others to what they carry now; what is in both, is set.
+pub(super) fn set_pairs(
+    links: &mut Links,
+    forest: &impl Receivers,
+    removed: impl Iterator<Item = (ElementId, ElementId)>,
+    set: impl Iterator<Item = pair::Link>,
+) {
     links.extend(forest.room());
-    if pair.carried.exchange_area_past_occluders_m2() > 0.0 {
-        directions(forest, pair).for_each(|(receiver, link)| links.set(receiver, link));
-    } else {
-        remove_pair(links, pair.a, pair.b);
+    let without = |source: ElementId| Link { source: source.0, ..Link::default() };
+    let both = |(a, b): (ElementId, ElementId)| [(a.0, without(b)), (b.0, without(a))];
+    let mut wanted: Vec<(u32, Link)> = Vec::new();
+    for pair in set {
+        if pair.carried.exchange_area_past_occluders_m2() > 0.0 {
+            wanted.extend(directions(forest, &pair));
+        } else {
+            wanted.extend(both((pair.a, pair.b)));
+        }
     }
-}
-
-/// Removes both directions of a pair.
-pub(super) fn remove_pair(links: &mut Links, a: ElementId, b: ElementId) {
-    links.remove(a.0, b.0);
-    links.remove(b.0, a.0);
+    wanted.extend(removed.flat_map(both));
+    // In stable order: of equals, what is set comes first.
+    let ends = |(receiver, link): &(u32, Link)| u64::from(*receiver) << 32 | u64::from(link.source);
+    wanted.sort_by_key(ends);
+    wanted.dedup_by_key(|one| ends(one));
+    for of_one in wanted.chunk_by(|one, two| one.0 == two.0) {
+        links.set(of_one[0].0, of_one.iter().map(|(_, link)| *link));
+    }
 }
 
 /// Carries edits of a tree over to its links; returns the receivers concerned, ascending.
@@ -183,24 +195,20 @@ pub(crate) fn apply_edits(
     tree: &PairTree,
     edits: &[Edit],
 ) -> Vec<u32> {
-    links.extend(forest.room());
-    let mut receivers = Vec::with_capacity(2 * edits.len());
-    for edit in edits {
-        let (a, b) = match *edit {
-            Edit::Set(id) => {
-                // A pair that was due and, after that, one above it may have edited the same link:
-                // then its removal is among the edits too.
-                let Some(link) = tree.link(id) else { continue };
-                set_pair(links, forest, &link);
-                (link.a, link.b)
-            }
-            Edit::Removed(a, b) => {
-                remove_pair(links, a, b);
-                (a, b)
-            }
-        };
-        receivers.extend([a, b].iter().filter(|&&e| forest.receives(e)).map(|e| e.0));
-    }
+    let removed = edits.iter().filter_map(|edit| match *edit {
+        Edit::Removed(a, b) => Some((a, b)),
+        Edit::Set(_) => None,
+    });
+    let set = edits.iter().filter_map(|edit| match *edit {
+        // What was removed again, after it was set, is no link by now.
+        Edit::Set(id) => tree.link(id),
+        Edit::Removed(..) => None,
+    });
+    let ends = removed.clone().chain(set.clone().map(|link| (link.a, link.b)));
+    let receiving = |e: &ElementId| forest.receives(*e);
+    let mut receivers: Vec<u32> =
+        ends.flat_map(|(a, b)| [a, b]).filter(receiving).map(|e| e.0).collect();
+    set_pairs(links, forest, removed, set);
     links.tidy();
     receivers.sort_unstable();
     receivers.dedup();

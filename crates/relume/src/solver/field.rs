@@ -46,6 +46,16 @@ impl Linear {
         self
     }
 
+    /// How far the two are apart anywhere, with gradients per radius.
+    pub(super) fn largest_change(&self, other: &Linear) -> f32 {
+        let mut out = 0.0_f32;
+        for c in 0..3 {
+            let along = |k: usize| (self.gradient[k][c] - other.gradient[k][c]).powi(2);
+            out = out.max((self.mean[c] - other.mean[c]).abs() + (along(0) + along(1)).sqrt());
+        }
+        out
+    }
+
     pub(super) fn difference(&self, other: &Linear) -> f32 {
         let mut out = 0.0_f32;
         for c in 0..3 {

@@ -54,6 +54,8 @@ pub struct Links {
     pool: Vec<Link>,
     /// Room in the pool that no span has.
     lost: usize,
+    /// Links on their way in.
+    fresh: Vec<Link>,
 }
 
 /// Counts first, then fills: two passes over the links, no sorting.
@@ -90,7 +92,7 @@ impl LinksBuilder {
             pool[(span.start + span.len) as usize] = link;
             span.len += 1;
         });
-        Links { spans: self.spans, pool, lost: 0 }
+        Links { spans: self.spans, pool, ..Links::default() }
     }
 }
 
@@ -117,29 +119,38 @@ impl Links {
         }
     }
 
-    /// Adds a link, or gives that from the same source new values.
-    pub fn set(&mut self, receiver: u32, link: Link) {
-        if let Some(at) = self.find(receiver, link.source) {
-            self.pool[at] = link;
-            return;
+    /// Adds links, each from another source, or gives those from the same sources new values; a coupling of
+    /// 0 takes them out. What stays may change its order.
+    pub fn set(&mut self, receiver: u32, links: impl Iterator<Item = Link>) {
+        let Span { start, len: before } = self.spans[receiver as usize];
+        let mut fresh = std::mem::take(&mut self.fresh);
+        let mut len = before as usize;
+        for link in links {
+            let held = &mut self.pool[start as usize..start as usize + len];
+            match held.iter().position(|l| l.source == link.source) {
+                Some(at) if link.coupling == 0.0 => {
+                    len -= 1;
+                    held[at] = held[len];
+                }
+                Some(at) => held[at] = link,
+                None if link.coupling == 0.0 => {}
+                None => fresh.push(link),
+            }
         }
-        let span = self.spans[receiver as usize];
-        if span.len == room(span.len) {
-            self.relocate(receiver);
+        let wanted = (len + fresh.len()) as u32;
+        self.spans[receiver as usize].len = len as u32;
+        if wanted > room(before) {
+            self.lost += room(before) as usize;
+            self.relocate(receiver, wanted);
+        } else {
+            self.lost += (room(before) - room(wanted)) as usize;
         }
         let span = &mut self.spans[receiver as usize];
-        self.pool[(span.start + span.len) as usize] = link;
-        span.len += 1;
-    }
-
-    /// Removes the link from a source, if there is one; the others may change their order.
-    pub fn remove(&mut self, receiver: u32, source: u32) {
-        let Some(at) = self.find(receiver, source) else { return };
-        let span = &mut self.spans[receiver as usize];
-        let before = room(span.len);
-        span.len -= 1;
-        self.lost += (before - room(span.len)) as usize;
-        self.pool[at] = self.pool[(span.start + span.len) as usize];
+        let end = (span.start + span.len) as usize;
+        self.pool[end..end + fresh.len()].copy_from_slice(&fresh);
+        span.len = wanted;
+        fresh.clear();
+        self.fresh = fresh;
     }
 
     /// Puts the links of a receiver in the order of their sources.
@@ -149,22 +160,16 @@ impl Links {
             .sort_unstable_by_key(|l| l.source);
     }
 
-    fn find(&self, receiver: u32, source: u32) -> Option<usize> {
-        let at = self.of(receiver).iter().position(|l| l.source == source)?;
-        Some(self.spans[receiver as usize].start as usize + at)
-    }
-
-    /// Moves a full block to the end of the pool, where there is room for more.
-    fn relocate(&mut self, receiver: u32) {
-        let Span { start, len } = self.spans[receiver as usize];
-        let (from, to) = (start as usize, self.pool.len());
-        let wanted = to + (len + ROOM) as usize;
+    /// Moves a block to the end of the pool, where there is room for `len`.
+    fn relocate(&mut self, receiver: u32, len: u32) {
+        let span = self.spans[receiver as usize];
+        let (from, to) = (span.start as usize, self.pool.len());
+        let wanted = to + room(len) as usize;
         if wanted > self.pool.capacity() {
-            self.pool.reserve_exact(wanted / SLACK + (len + ROOM) as usize);
+            self.pool.reserve_exact(wanted / SLACK + room(len) as usize);
         }
-        self.pool.extend_from_within(from..from + len as usize);
+        self.pool.extend_from_within(from..from + span.len as usize);
         self.pool.resize(wanted, Link::default());
-        self.lost += len as usize;
         self.spans[receiver as usize].start = to as u32;
     }
 
@@ -181,7 +186,7 @@ impl Links {
             pool.extend_from_slice(&self.pool[from..from + span.len as usize]);
             pool.resize((span.start + room(span.len)) as usize, Link::default());
         }
-        *self = Links { spans: std::mem::take(&mut self.spans), pool, lost: 0 };
+        (self.pool, self.lost) = (pool, 0);
     }
 
     /// Follows elements to their new ids. The links of a receiver keep their order.
@@ -202,6 +207,7 @@ impl Links {
     pub fn trim(&mut self) {
         self.spans.shrink_to(self.spans.len() + self.spans.len() / SLACK);
         self.pool.shrink_to(self.pool.len() + self.pool.len() / SLACK);
+        self.fresh = Vec::new();
     }
 
     /// Bytes held by the links.
@@ -238,10 +244,7 @@ mod tests {
             for (k, (receiver, source, action)) in steps.into_iter().enumerate() {
                 let coupling = if action == 0 { 0.0 } else { k as f32 + 1.0 };
                 table[receiver as usize][source as usize] = coupling;
-                match action {
-                    0 => links.remove(receiver, source),
-                    _ => links.set(receiver, Link { source, coupling, ..Link::default() }),
-                }
+                links.set(receiver, [Link { source, coupling, ..Link::default() }].into_iter());
                 if action == 3 {
                     links.tidy();
                     links.sort(receiver);

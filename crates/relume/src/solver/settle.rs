@@ -1,4 +1,7 @@
 //! One facet: irradiance pushed down, reflected at the leaves, radiosity pulled up.
+//!
+//! What changes a little is not pushed down to every leaf each time: it is *owed* to what lies below, and delivered once what is
+//! owed may add up to more than the limit, or something else leads there.
 
 use super::field::{Field, Linear};
 use super::surfaces::{Lit, Place, Surfaces};
@@ -11,12 +14,17 @@ pub(super) struct Settled {
     pub(super) changed: Vec<(u32, Linear, f32)>,
     /// Largest difference within the limit.
     pub(super) small: f32,
+    /// What is now owed to elements; nothing where everything was settled.
+    pub(super) owed: Vec<(u32, f32)>,
 }
 
 /// One facet being settled.
 pub(super) struct Below<'a, S> {
     pub(super) radiosity: &'a Field,
     pub(super) gathered: &'a Field,
+    /// By how much the radiosities at and below an element may be off, at most, for what was not pushed
+    /// down to them, W/m2.
+    pub(super) owed: &'a [f32],
     pub(super) surfaces: &'a S,
     pub(super) lit: &'a Lit,
     pub(super) limit: f32,
@@ -25,29 +33,40 @@ pub(super) struct Below<'a, S> {
 }
 
 impl<S: Surfaces> Below<'_, S> {
-    /// Pushes irradiance down and pulls radiosity up; returns the new radiosity of `id`.
-    /// `concerned` says that something above has changed.
+    /// Pushes irradiance down and pulls radiosity up; returns the new radiosity of `id`, and what is owed at
+    /// and below it. `news` is by how much radiosities may change for what changed above.
     pub(super) fn settle(
         &self,
         id: u32,
         place: &Place,
         inherited: &Linear,
-        concerned: bool,
+        news: f32,
         out: &mut Settled,
-    ) -> Linear {
-        let concerned = concerned || self.way.is_some_and(|way| bit(&way.ends, id));
-        if !concerned && self.way.is_some_and(|way| !bit(&way.on, id)) {
-            return self.radiosity.get(id);
-        }
+    ) -> (Linear, f32) {
         let h = self.gathered.get(id).plus(inherited);
         let children = self.surfaces.children(id);
+        let mut owed = 0.0_f32;
         let b = if children.is_empty() {
             self.reflect(&h, place.radius)
         } else {
+            let news = match self.way {
+                Some(way) => news + self.owed_from(id) + way.news(id),
+                None => 0.0,
+            };
             let mut fit = Fit::default();
             for child in children {
                 let at = self.surfaces.place(child);
-                let b = self.settle(child, &at, &h.about(place, &at), concerned, out);
+                let (b, below) = match self.way {
+                    Some(way) if !bit(&way.on, child) && self.may_wait(child, news) => {
+                        let owed = self.owed[child as usize] + news;
+                        if news > 0.0 {
+                            out.owed.push((child, owed));
+                        }
+                        (self.radiosity.get(child), owed)
+                    }
+                    _ => self.settle(child, &at, &h.about(place, &at), news, out),
+                };
+                owed = owed.max(below);
                 fit.add(self.surfaces.area_m2(child), place, &at, &b);
             }
             fit.linear(place.radius)
@@ -59,7 +78,20 @@ impl<S: Surfaces> Below<'_, S> {
         if difference <= self.limit {
             out.small = out.small.max(difference);
         }
-        b
+        if self.way.is_some() {
+            out.owed.push((id, owed));
+        }
+        (b, owed)
+    }
+
+    fn may_wait(&self, id: u32, news: f32) -> bool {
+        self.owed[id as usize] + news <= self.limit
+    }
+
+    /// What of that which is owed at and below an element has not come further than to itself.
+    fn owed_from(&self, id: u32) -> f32 {
+        let below = self.surfaces.children(id).map(|child| self.owed[child as usize]);
+        (self.owed[id as usize] - below.fold(0.0, f32::max)).max(0.0)
     }
 
     fn reflect(&self, h: &Linear, radius: f32) -> Linear {

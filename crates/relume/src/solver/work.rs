@@ -45,8 +45,11 @@ pub(super) struct Scratch {
 #[derive(Default)]
 pub(super) struct Batch {
     pub(super) facets: Vec<u32>,
-    /// Receivers to be gathered, and settled with all that is below them.
+    /// Receivers to be gathered, and settled with what is below them.
     pub(super) receivers: Vec<u32>,
+    /// By how much what they gathered may change the radiosities below each; none before it was gathered, or
+    /// where everything is settled.
+    pub(super) news: Vec<f32>,
     /// Further elements to be settled with all that is below them.
     pub(super) parents: Vec<u32>,
 }
@@ -156,7 +159,7 @@ impl Work {
         let mut facets: Vec<u32> = concerned.map(|&id| surfaces.facet_of(id)).collect();
         facets.sort_unstable();
         facets.dedup();
-        Batch { receivers, facets, parents }
+        Batch { receivers, news: Vec::new(), facets, parents }
     }
 
     /// Whether another sweep is needed.
@@ -198,22 +201,34 @@ pub(super) fn bit(bits: &[u64], id: u32) -> bool {
     bits[id as usize / 64] >> (id % 64) & 1 == 1
 }
 
-/// The ways from facets to the elements that a batch concerns: nothing beside them is looked at.
+/// The ways from facets to the elements that a batch concerns.
 pub(super) struct Way {
     /// Elements on a way.
     pub(super) on: Vec<u64>,
-    /// Ends of the ways: everything below them is concerned.
-    pub(super) ends: Vec<u64>,
+    /// Ends of the ways.
+    ends: Vec<u64>,
+    /// By how much radiosities below the ends may change.
+    news: Vec<f32>,
 }
 
 impl Way {
     pub(super) fn new(len: usize) -> Way {
-        Way { on: vec![0; len / 64 + 1], ends: vec![0; len / 64 + 1] }
+        let bits = || vec![0; len / 64 + 1];
+        Way { on: bits(), ends: bits(), news: vec![0.0; len] }
+    }
+
+    /// By how much radiosities below an element may change for what it gathered itself.
+    pub(super) fn news(&self, id: u32) -> f32 {
+        if bit(&self.ends, id) { self.news[id as usize] } else { 0.0 }
     }
 
     pub(super) fn mark(&mut self, surfaces: &impl Surfaces, batch: &Batch) -> &Way {
-        for &id in batch.receivers.iter().chain(&batch.parents) {
+        let receivers = batch.receivers.iter().copied().zip(batch.news.iter().copied());
+        // Whose children came or went, concerns all that is below.
+        let parents = batch.parents.iter().map(|&id| (id, f32::INFINITY));
+        for (id, news) in receivers.chain(parents) {
             set_bit(&mut self.ends, id);
+            self.news[id as usize] = news;
             let mut at = Some(id);
             while let Some(id) = at.filter(|&id| !set_bit(&mut self.on, id)) {
                 at = surfaces.parent(id);

@@ -24,6 +24,14 @@ impl PointBundle {
     }
 }
 
+/// The sum over lanes, in an order that is the same for every instruction set.
+#[inline(always)]
+pub(super) fn sum_of_lanes(lanes: [f64; LANES]) -> f64 {
+    let halves: [f64; 8] = std::array::from_fn(|k| lanes[k] + lanes[k + 8]);
+    let quarters: [f64; 4] = std::array::from_fn(|k| halves[k] + halves[k + 4]);
+    (quarters[0] + quarters[2]) + (quarters[1] + quarters[3])
+}
+
 /// atan(t) / t for t in [0, tan(pi/8)] as a polynomial in t^2; error below 1e-15 (Chebyshev fit).
 const ATAN: [f64; 10] = [
     0.999_999_999_999_999,
@@ -44,10 +52,11 @@ const ATAN: [f64; 10] = [
 fn angle(y: f64, x: f64) -> f64 {
     let ax = x.abs();
     let (low, high) = (ax.min(y), ax.max(y));
-    let t = low / high.max(f64::MIN_POSITIVE);
-    // Above tan(pi/8): atan t = pi/4 + atan((t - 1) / (t + 1)).
-    let wide = t > 0.414_213_562_373_095_03;
-    let u = if wide { (t - 1.0) / (t + 1.0) } else { t };
+    // Above tan(pi/8): atan t = pi/4 + atan((t - 1) / (t + 1)), with t = low / high.
+    let wide = low > 0.414_213_562_373_095_03 * high;
+    let over = if wide { low - high } else { low };
+    let under = if wide { low + high } else { high };
+    let u = over / under.max(f64::MIN_POSITIVE);
     let u2 = u * u;
     let mut p = ATAN[9];
     for k in (0..9).rev() {
@@ -97,8 +106,9 @@ pub(super) fn form_factors_from_points(
     dispatch!(simd.level(), _simd => bundle_sums(points, normal, corners))
 }
 
+/// [`form_factors_from_points`] within vector code.
 #[inline(always)]
-fn bundle_sums(points: &PointBundle, normal: DVec3, corners: &[DVec3]) -> [f64; LANES] {
+pub(super) fn bundle_sums(points: &PointBundle, normal: DVec3, corners: &[DVec3]) -> [f64; LANES] {
     let mut sums = [0.0; LANES];
     let n = normal.to_array();
     let mut from = corners[corners.len() - 1];

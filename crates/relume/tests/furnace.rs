@@ -160,14 +160,17 @@ fn at_other_tolerances_and_with_the_other_oracle() {
         let mut session = Session::new(Arc::new(furnace(0.2)), at_tolerance(tolerance)).unwrap();
         errors.push(run(&format!("tolerance {tolerance}"), &mut session, 4).0);
     }
-    assert!(errors[0].patch < 1e-2 && errors[3].patch < 3e-3, "{errors:?}");
+    // A wall of which a part lies behind a box's top, with the other box close to that top, is looked at from the top: from
+    // the wall's own points, all of them behind, it was dark, and the top 7e-3 off.
+    let most = [6e-3, 3e-3, 2e-3, 6e-4];
+    assert!(errors.iter().zip(most).all(|(o, most)| o.patch < most), "{errors:?}");
     // Where walls meet, finer elements show more of what a coarse one averages.
     let finest = errors[3].rms;
     assert!(errors[..3].iter().all(|coarse| finest < 0.7 * coarse.rms), "{errors:?}");
     let options = form_factor_oracle(0.02, 1e-4);
     let mut session = Session::new(Arc::new(furnace(0.2)), options).unwrap();
     let (o, _) = run("form factor 0.02", &mut session, 4);
-    assert!(o.patch < 2e-2, "{o:?}");
+    assert!(o.patch < 4e-3, "{o:?}");
 }
 
 #[test]

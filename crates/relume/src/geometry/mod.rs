@@ -9,3 +9,12 @@ mod pose;
 pub use bounds::{Aabb, shaft_meets_box};
 pub use convex::{ConvexPolygon, Plane, split_convex};
 pub use pose::Pose;
+
+/// How far apart equal areas may be for rounding, relative.
+const AREA_ROUNDING: f64 = 1e-9;
+
+/// Whether an area is no smaller than another. Equal ones are that both ways, in whatever units and from whatever
+/// corners they were computed: what is decided by size must not depend on the last bit.
+pub fn no_smaller(area: f64, other: f64) -> bool {
+    area >= other * (1.0 - AREA_ROUNDING)
+}

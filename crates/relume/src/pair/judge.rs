@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use crate::element::{ElementId, ElementKey, Forest, Kind, WorldElement, WorldLight, WorldView};
 use crate::event::{Foresight, Lookahead, Tick};
-use crate::geometry::{Aabb, Plane, shaft_meets_box};
+use crate::geometry::{Aabb, Plane, no_smaller, shaft_meets_box};
 use crate::scene::{BodyId, LightKind, PatchId};
 use crate::transport::{
     CLIPPED_MAX, Clipping, Exchange, Meeting, SegmentBundle, Shaft, Simd, Visibility, clipping,
@@ -242,7 +242,7 @@ impl Placed<'_> {
             Kind::Element => -1.0,
             _ => self.forest.area_m2(id),
         };
-        let side = if size(a) >= size(b) { Side::A } else { Side::B };
+        let side = if no_smaller(size(a), size(b)) { Side::A } else { Side::B };
         passing(Verdict::Refine(side), 0)
     }
 
@@ -412,7 +412,7 @@ impl Placed<'_> {
         match (self.forest.coarse(a), self.forest.coarse(b)) {
             (None, Some(_)) => Side::A,
             (Some(_), None) => Side::B,
-            _ if self.forest.area_m2(a) >= self.forest.area_m2(b) => Side::A,
+            _ if no_smaller(self.forest.area_m2(a), self.forest.area_m2(b)) => Side::A,
             _ => Side::B,
         }
     }
@@ -424,7 +424,8 @@ impl Placed<'_> {
         (area_a, area_b): (f64, f64),
         min_area: f64,
     ) -> Option<Side> {
-        let order = if area_a >= area_b { [Side::A, Side::B] } else { [Side::B, Side::A] };
+        let order =
+            if no_smaller(area_a, area_b) { [Side::A, Side::B] } else { [Side::B, Side::A] };
         order.into_iter().find(|&side| {
             let (id, area) = if side == Side::A { (a, area_a) } else { (b, area_b) };
             area > min_area && self.forest.can_split(id)

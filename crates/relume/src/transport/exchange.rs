@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3};
 use super::kernel::{GaussPoints, Simd, kernel_grid};
 use super::point::{LANES, PointBundle, bundle_sums, sum_of_lanes};
 use crate::element::{WorldElement, WorldLight, bilinear, bilinear_area};
-use crate::geometry::ConvexPolygon;
+use crate::geometry::{ConvexPolygon, no_smaller};
 use crate::scene::LightKind;
 
 /// How two elements face each other.
@@ -277,7 +277,7 @@ fn close_exchange(simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
     }
     let (from_a, over_a) = integrate_polygon(simd, a, &of_a, of_b.corners());
     let (from_b, over_b) = integrate_polygon(simd, b, &of_b, of_a.corners());
-    Exchange { area_m2: if a.area <= b.area { from_a } else { from_b }, over_a, over_b }
+    Exchange { area_m2: if no_smaller(b.area, a.area) { from_a } else { from_b }, over_a, over_b }
 }
 
 /// Integral over `part` of `e` of the form factor to `seen`, m2, and its variation over `e`.

@@ -1,5 +1,6 @@
 //! Oracles: whether a pair of elements is good enough as a link, and if not which side to refine.
 
+use crate::geometry::no_smaller;
 use crate::transport::{Exchange, SEGMENTS, Variation, Visibility};
 
 use super::brightness::Light;
@@ -58,7 +59,7 @@ impl Estimate {
     /// smallest motion would make the other side the better one, and everything below anew.
     pub(super) fn side(&self, a: &End, b: &End) -> (Side, u16) {
         let (one, two) = self.mends;
-        let (large, small, by_large, by_small) = match a.area >= b.area {
+        let (large, small, by_large, by_small) = match no_smaller(a.area, b.area) {
             true => (Side::A, Side::B, one, two),
             false => (Side::B, Side::A, two, one),
         };
@@ -69,7 +70,7 @@ impl Estimate {
 }
 
 /// How many times as much the smaller side must mend to be refined in place of the larger.
-const PREFERENCE: f64 = 1.5;
+const PREFERENCE: f64 = 3.0;
 
 /// Weight of the variation of visibility over a receiver, for emitted light: few of a receiver's
 /// links have the edge of a lamp's shadow within it, while all have a bend.

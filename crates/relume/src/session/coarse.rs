@@ -10,7 +10,7 @@ use crate::solver::{Dirty, Links, Radiosity, Stop, Surfaces};
 use super::surfaces::{LitForest, set_pairs};
 
 /// Coarse elements are no larger than this share of the scene's area.
-const COARSE_SHARE: f64 = 1.0 / 64.0;
+const COARSE_SHARE: f64 = 1.0 / 32.0;
 
 /// An element of this share of the scene's area weighs 1 in the error norm.
 const REFERENCE_SHARE: f64 = 1.0 / 512.0;

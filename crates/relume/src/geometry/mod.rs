@@ -10,11 +10,11 @@ pub use bounds::{Aabb, shaft_meets_box};
 pub use convex::{ConvexPolygon, Plane, split_convex};
 pub use pose::Pose;
 
-/// How far apart equal areas may be for rounding, relative.
-const AREA_ROUNDING: f64 = 1e-9;
+/// How far apart equal areas may be for rounding, relative: files hold corners in single precision.
+const AREA_ROUNDING: f64 = 1e-6;
 
-/// Whether an area is no smaller than another. Equal ones are that both ways, in whatever units and from whatever
-/// corners they were computed: what is decided by size must not depend on the last bit.
+/// Whether an area is no smaller than another. Equal ones are that both ways, in whatever units they were
+/// computed: what is decided by size must not depend on the last bit.
 pub fn no_smaller(area: f64, other: f64) -> bool {
     area >= other * (1.0 - AREA_ROUNDING)
 }

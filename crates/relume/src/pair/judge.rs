@@ -9,8 +9,8 @@ use crate::event::{Foresight, Lookahead, Tick};
 use crate::geometry::{Aabb, Plane, no_smaller, shaft_meets_box};
 use crate::scene::{BodyId, LightKind, PatchId};
 use crate::transport::{
-    CLIPPED_MAX, Clipping, Exchange, Meeting, SegmentBundle, Shaft, Simd, Visibility, clipping,
-    exchange, light_at, light_exchange, light_visibility, meeting, visibility,
+    CELLS_MAX, CLIPPED_MAX, Clipping, Exchange, Meeting, SegmentBundle, Shaft, Simd, Visibility,
+    clipping, exchange, light_at, light_exchange, light_visibility, meeting, visibility,
 };
 
 use super::brightness::Brightness;
@@ -239,7 +239,7 @@ impl Placed<'_> {
         // By area, which no motion changes: the extent of a group follows each of its bodies, and all
         // pairs below would be made anew.
         let size = |id: ElementId| match self.forest.kind(id) {
-            Kind::Element => -1.0,
+            Kind::Element => 0.0,
             _ => self.forest.area_m2(id),
         };
         let side = if no_smaller(size(a), size(b)) { Side::A } else { Side::B };
@@ -546,7 +546,7 @@ fn look_closer(v: Visibility, clipped: &mut Clipping<'_>, error: f64) -> Visibil
         return v;
     }
     // The error of n x n points on a function with kinks falls as 1 / n^2.
-    let cells = (error / CLOSER).sqrt().ceil().min(CELLS_MAX);
+    let cells = (error / CLOSER).sqrt().ceil().min(f64::from(CELLS_MAX));
     let again = clipped.visibility(cells as u32);
     Visibility { segments: v.segments + again.segments, ..again }
 }
@@ -562,9 +562,6 @@ const CLIPPED_MAX_REST: usize = 4;
 
 /// Thresholds below this ask for no more points a link: elements shrink instead.
 const FINEST: f64 = 0.002;
-
-/// Parts of a looker along each side from which it looks at most.
-const CELLS_MAX: f64 = 8.0;
 
 /// Stake times doubt of visibility above which a link is clipped from more points.
 const CLOSER: f64 = 0.03;

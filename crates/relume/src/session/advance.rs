@@ -282,7 +282,7 @@ impl Session {
 const PAIR_LINKS_BYTES: u64 = 20;
 
 /// An element with its radiosity, bytes.
-const ELEMENT_BYTES: u64 = 118;
+const ELEMENT_BYTES: u64 = 122;
 
 #[derive(Clone, Copy)]
 enum Level {

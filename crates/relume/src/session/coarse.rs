@@ -9,8 +9,9 @@ use crate::solver::{Dirty, Links, Radiosity, Stop, Surfaces};
 
 use super::surfaces::{LitForest, set_pairs};
 
-/// Coarse elements are no larger than this share of the scene's area.
-const COARSE_SHARE: f64 = 1.0 / 32.0;
+/// Coarse elements are no larger than this share of the scene's area: some 1/31, which equal quadtrees do not meet
+/// exactly.
+const COARSE_SHARE: f64 = 0.0323;
 
 /// An element of this share of the scene's area weighs 1 in the error norm.
 const REFERENCE_SHARE: f64 = 1.0 / 512.0;

@@ -139,6 +139,8 @@ pub(super) fn directions(
         let receives = forest.receives(receiver) && exchange > 0.0;
         receives.then(|| {
             let coupling = exchange / forest.receiving_area_m2(receiver) as f32;
+            // Nothing at all would take the link out.
+            let coupling = coupling.max(f32::MIN_POSITIVE);
             (receiver.0, Link { source: source.0, coupling, over_receiver, over_source })
         })
     };

@@ -236,19 +236,30 @@ mod tests {
         /// Whatever is set, removed and tidied, a table remembers what the pool should hold.
         #[test]
         fn the_pool_holds_what_was_put_in(
-            steps in prop::collection::vec((0..7_u32, 0..9_u32, 0..4_u32), 0..400)
+            steps in prop::collection::vec(
+                (0..7_u32, prop::collection::btree_map(0..40_u32, 0..3_u32, 0..30), 0..4_u32),
+                0..60,
+            )
         ) {
             let mut links = Links::default();
             links.extend(7);
-            let mut table = [[0.0_f32; 9]; 7];
-            for (k, (receiver, source, action)) in steps.into_iter().enumerate() {
-                let coupling = if action == 0 { 0.0 } else { k as f32 + 1.0 };
-                table[receiver as usize][source as usize] = coupling;
-                links.set(receiver, [Link { source, coupling, ..Link::default() }].into_iter());
+            let mut table = [[0.0_f32; 40]; 7];
+            for (k, (receiver, some, action)) in steps.into_iter().enumerate() {
+                let coupling = |kind: u32| if kind == 0 { 0.0 } else { k as f32 + 1.0 };
+                let link = |(source, kind)| {
+                    Link { source, coupling: coupling(kind), ..Link::default() }
+                };
+                let some: Vec<Link> = some.into_iter().map(link).collect();
+                for link in &some {
+                    table[receiver as usize][link.source as usize] = link.coupling;
+                }
+                links.set(receiver, some.into_iter());
                 if action == 3 {
                     links.tidy();
                     links.sort(receiver);
                 }
+                let rooms: u32 = links.spans.iter().map(|s| room(s.len)).sum();
+                prop_assert_eq!(links.pool.len(), rooms as usize + links.lost);
                 for (r, row) in table.iter().enumerate() {
                     let held = links.of(r as u32);
                     prop_assert_eq!(held.len(), row.iter().filter(|c| **c > 0.0).count());

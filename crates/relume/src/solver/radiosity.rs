@@ -48,7 +48,9 @@ pub struct Radiosity {
     pub sweeps: u32,
     /// Receivers gathered by the last solve, each time counted.
     pub gathers: u64,
-    /// Largest change that was not followed to who depends on it, relative to the mean radiosity.
+    /// By how much a radiosity may be off what its links and the other radiosities say, relative to the mean one: it
+    /// stays, something is owed to it, and what it gathers may have changed a little. An estimate: all three at once, but not at
+    /// every level.
     pub residual: f64,
     /// The same of the last sweep over everything alone, W/m2.
     passed_over: f32,

@@ -45,10 +45,10 @@ pub(super) struct Scratch {
 #[derive(Default)]
 pub(super) struct Batch {
     pub(super) facets: Vec<u32>,
-    /// Receivers to be gathered, and settled with what is below them.
+    /// Receivers to be gathered, and settled with what is below them; once gathered, those that cannot wait.
     pub(super) receivers: Vec<u32>,
-    /// By how much what they gathered may change the radiosities below each; none before it was gathered, or
-    /// where everything is settled.
+    /// One by one, by how much what they gathered may change radiosities; none before it was gathered, or where
+    /// everything is settled.
     pub(super) news: Vec<f32>,
     /// Further elements to be settled with all that is below them.
     pub(super) parents: Vec<u32>,

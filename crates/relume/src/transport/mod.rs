@@ -18,7 +18,7 @@ pub use exchange::{
     Exchange, Meeting, Variation, exchange, exchange_of_points, light_at, light_exchange, meeting,
 };
 pub use kernel::Simd;
-pub use lookout::{Clipping, FactorPast, Looker, Lookout, form_factor_past};
+pub use lookout::{CELLS_MAX, Clipping, FactorPast, Looker, Lookout, form_factor_past};
 pub use point::form_factor_from_point;
 pub use segments::{SEGMENTS, SegmentBundle};
 pub use visibility::{

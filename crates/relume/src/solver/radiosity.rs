@@ -391,47 +391,64 @@ mod tests {
 
     use super::*;
 
-    /// Two plates, the second split in two, and a lamp without area; with given couplings.
-    struct Plates(Lit, [ElementId; 2]);
+    /// Two facets, the second of which is split in two, and perhaps the first half of it again.
+    struct Toy {
+        lit: [Lit; 2],
+        facets: [ElementId; 2],
+        /// Where elements lie along the first axis, and their areas; a lamp without area is no surface.
+        at: Vec<(f32, f64)>,
+        quarters: bool,
+    }
 
-    impl Surfaces for Plates {
+    impl Surfaces for Toy {
+        /// Room for many more, so that two receivers are few.
         fn len(&self) -> usize {
-            5
+            64
         }
         fn facets(&self) -> &[ElementId] {
-            &self.1
+            &self.facets
         }
         fn facet_of(&self, id: u32) -> u32 {
             id.min(1)
         }
         fn parent(&self, id: u32) -> Option<u32> {
-            (id >= 2).then_some(1)
+            (id >= 2).then_some(if id < 4 { 1 } else { 2 })
         }
         fn children(&self, id: u32) -> Range<u32> {
-            if id == 1 { 2..4 } else { 0..0 }
+            match id {
+                1 => 2..4,
+                2 if self.quarters => 4..6,
+                _ => 0..0,
+            }
         }
         fn area_m2(&self, id: u32) -> f64 {
-            [1.0, 1.0, 0.5, 0.5, 0.0][id as usize]
+            self.at[id as usize].1
         }
         fn place(&self, id: u32) -> Place {
-            let x = [0.0, 0.0, -0.25, 0.25][id as usize];
+            let x = self.at[id as usize].0;
             Place { centroid: [x, 0.0], radius: 0.5, moment: [0.05, 0.0, 0.05] }
         }
-        fn lit(&self, _: u32) -> &Lit {
-            &self.0
+        fn lit(&self, facet: u32) -> &Lit {
+            &self.lit[facet as usize]
         }
+    }
+
+    fn set(links: &mut Links, receiver: u32, source: u32, coupling: f32) {
+        links.set(receiver, [Link { source, coupling, ..Link::default() }].into_iter());
     }
 
     const STOP: Stop = Stop::Residual(1e-7);
 
-    fn plates() -> (Plates, Links) {
-        let lit = Lit { reflectance: [0.5, 0.8, 0.0], exitance: [1.0, 2.0, 3.0] };
+    /// Two plates, the second split in two, and a lamp; with given couplings.
+    fn plates() -> (Toy, Links) {
+        let lit = [Lit { reflectance: [0.5, 0.8, 0.0], exitance: [1.0, 2.0, 3.0] }; 2];
         let mut links = Links::default();
-        links.extend(4);
+        links.extend(64);
         for (receiver, source, coupling) in [(0, 2, 0.5), (0, 3, 0.5), (2, 0, 1.0), (3, 0, 1.0)] {
-            links.set(receiver, [Link { source, coupling, ..Link::default() }].into_iter());
+            set(&mut links, receiver, source, coupling);
         }
-        (Plates(lit, [ElementId(0), ElementId(1)]), links)
+        let at = vec![(0.0, 1.0), (0.0, 1.0), (-0.25, 0.5), (0.25, 0.5), (0.0, 0.0)];
+        (Toy { lit, facets: [ElementId(0), ElementId(1)], at, quarters: false }, links)
     }
 
     #[test]
@@ -450,57 +467,21 @@ mod tests {
     fn a_lamp_that_goes_out_leaves_no_glow_where_it_was_little() {
         let (plates, _) = plates();
         let mut links = Links::default();
-        links.extend(5);
+        links.extend(64);
         for (receiver, source, coupling) in [(0, 4, 1.0), (2, 0, 1e-5), (3, 0, 1e-5)] {
-            links.set(receiver, [Link { source, coupling, ..Link::default() }].into_iter());
+            set(&mut links, receiver, source, coupling);
         }
         let mut b = Radiosity::new(&plates);
         b.set(4, [1e6; 3]);
         b.solve(&plates, &links, Dirty::All, Stop::Residual(1e-3));
         assert!(b.radiosity(2)[0] > 3.0);
-        links.set(0, [Link { source: 4, ..Link::default() }].into_iter());
+        set(&mut links, 0, 4, 0.0);
         let dirty = Dirty::Some { receivers: vec![0], parents: vec![] };
         b.solve(&plates, &links, dirty, Stop::Residual(1e-3));
         for id in 0..4 {
             assert!((b.radiosity(id)[0] - 1.0).abs() < 0.01, "{id}: {:?}", b.radiosity(id));
         }
         assert!(b.residual <= 3e-3, "{}", b.residual);
-    }
-
-    /// A lamp, and a plate whose halves and one quarter gather too.
-    struct Tree([Lit; 2], [ElementId; 2]);
-
-    impl Surfaces for Tree {
-        /// Room for many more, so that two receivers are few.
-        fn len(&self) -> usize {
-            64
-        }
-        fn facets(&self) -> &[ElementId] {
-            &self.1
-        }
-        fn facet_of(&self, id: u32) -> u32 {
-            id.min(1)
-        }
-        fn parent(&self, id: u32) -> Option<u32> {
-            [None, None, Some(1), Some(1), Some(2), Some(2)][id as usize]
-        }
-        fn children(&self, id: u32) -> Range<u32> {
-            match id {
-                1 => 2..4,
-                2 => 4..6,
-                _ => 0..0,
-            }
-        }
-        fn area_m2(&self, id: u32) -> f64 {
-            [1.0, 1.0, 0.5, 0.5, 0.25, 0.25][id as usize]
-        }
-        fn place(&self, id: u32) -> Place {
-            let x = [0.0, 0.0, -0.25, 0.25, -0.375, -0.125][id as usize];
-            Place { centroid: [x, 0.0], radius: 0.5, moment: [0.05, 0.0, 0.05] }
-        }
-        fn lit(&self, facet: u32) -> &Lit {
-            &self.0[facet as usize]
-        }
     }
 
     proptest! {
@@ -511,24 +492,24 @@ mod tests {
         ) {
             let lamp = Lit { reflectance: [0.3; 3], exitance: [1.0, 1.0, 1.0] };
             let plate = Lit { reflectance: [0.5, 0.9, 0.1], exitance: [0.0; 3] };
-            let tree = Tree([lamp, plate], [ElementId(0), ElementId(1)]);
+            let at = [(0.0, 1.0), (0.0, 1.0), (-0.25, 0.5), (0.25, 0.5), (-0.375, 0.25), (-0.125, 0.25)];
+            let (lit, facets) = ([lamp, plate], [ElementId(0), ElementId(1)]);
+            let tree = Toy { lit, facets, at: at.to_vec(), quarters: true };
             let mut links = Links::default();
             links.extend(64);
             let receivers = [1, 2, 3, 4];
             let mut couplings = [0.1_f32; 4];
-            let set = |links: &mut Links, k: usize, coupling: f32| {
-                let back = coupling * tree.area_m2(receivers[k]) as f32;
-                let link = |source, coupling| [Link { source, coupling, ..Link::default() }];
-                links.set(receivers[k], link(0, coupling).into_iter());
-                links.set(0, link(receivers[k], back).into_iter());
+            let both = |links: &mut Links, k: usize, coupling: f32| {
+                set(links, receivers[k], 0, coupling);
+                set(links, 0, receivers[k], coupling * tree.area_m2(receivers[k]) as f32);
             };
-            (0..4).for_each(|k| set(&mut links, k, couplings[k]));
+            (0..4).for_each(|k| both(&mut links, k, couplings[k]));
             let stop = Stop::Residual(2e-3);
             let mut warm = Radiosity::new(&tree);
             warm.solve(&tree, &links, Dirty::All, stop);
             for (k, step) in steps {
                 couplings[k] = (couplings[k] + step).max(1e-3);
-                set(&mut links, k, couplings[k]);
+                both(&mut links, k, couplings[k]);
                 let dirty = Dirty::Some { receivers: vec![0, receivers[k]], parents: vec![] };
                 warm.solve(&tree, &links, dirty, stop);
                 let mut cold = Radiosity::new(&tree);
@@ -549,7 +530,7 @@ mod tests {
         let (plates, mut links) = plates();
         let mut warm = Radiosity::new(&plates);
         warm.solve(&plates, &links, Dirty::All, STOP);
-        links.set(2, [Link { source: 0, coupling: 0.25, ..Link::default() }].into_iter());
+        set(&mut links, 2, 0, 0.25);
         let dirty = Dirty::Some { receivers: vec![2], parents: vec![] };
         warm.solve(&plates, &links, dirty, STOP);
         let mut cold = Radiosity::new(&plates);

@@ -498,8 +498,9 @@ pub(crate) struct UpdateChoice {
     /// given); quicker and less exact.
     #[arg(long = "update", value_name = "STRATEGY", default_value = "certificate")]
     pub(crate) strategy: UpdateFlag,
-    /// With `--update extrapolate`: evaluate a link again as soon as its exchange may be off by this
-    /// share; N then is the limit (4 if not given).
+    /// With `--update extrapolate`: evaluate a link again as soon as its exchange is estimated to be off by
+    /// this share; N then is the limit (4 if not given). An estimate, no bound: what no line foretells, such as
+    /// a shadow that reaches a clear link, is not seen.
     #[arg(long, value_name = "E", value_parser = parse_share, allow_negative_numbers = true)]
     pub(crate) error: Option<f64>,
 }

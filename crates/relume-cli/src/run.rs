@@ -15,7 +15,7 @@ use relume_picture::export::{probe, write_atomically, write_glb};
 use relume_picture::picture::{self, Exposure, Viewpoint};
 
 use crate::args::{
-    DemoArgs, ExposureFlag, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags,
+    DemoArgs, ExposureFlag, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags, UpdateFlag,
 };
 use crate::clip::{self, Clip, TOLERANCE, fixed, now};
 use crate::demo;
@@ -115,6 +115,7 @@ impl Job {
             wanted.iter().copied().filter(|frame| !report.frames.contains_key(frame)).collect();
         if !self.quiet() {
             self.warn_of_old_pictures(wanted, &report);
+            self.warn_of_strategy();
         }
         let events = self.solve.events.as_ref().map(|_| EventTable::new());
         let options = clip.options(self.solve.update, true)?;
@@ -201,6 +202,20 @@ impl Job {
             bytes.starts_with(b"\x89PNG\r\n\x1a\n") && bytes.ends_with(b"IEND\xaeB`\x82")
         };
         self.picture_path(frame).is_none_or(|path| fs::read(path).is_ok_and(whole))
+    }
+
+    /// What the strategy asked for does not do.
+    fn warn_of_strategy(&self) {
+        match self.solve.update.strategy {
+            UpdateFlag::Extrapolate { .. } => output::complain(
+                "warning: extrapolated links may be far off, above all where bodies touch; `relume bench --compare` says \
+                 by how much",
+            ),
+            UpdateFlag::Scratch if self.solve.events.is_some() => output::complain(
+                "warning: with `--update scratch` every frame is built anew: there are no events",
+            ),
+            _ => {}
+        }
     }
 
     /// Pictures in the directory that no run described by the report has made.

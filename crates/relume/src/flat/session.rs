@@ -7,8 +7,8 @@ use crate::element::{ElementId, ElementKey};
 use crate::event::Ticks;
 use crate::pair::{Carried, LinkEvent, PairHash, PairTree, Record, update};
 use crate::session::{
-    Ahead, Clock, ElementName, Event, FrameReport, Memory, PairCounts, Receivers, Solution, Update,
-    apply_edits, balance_of, links_of, with_names,
+    Ahead, Clock, ElementName, Event, FrameReport, Memory, PairCounts, Receivers, SUDDEN, Solution,
+    Update, apply_edits, balance_of, links_of, with_names,
 };
 use crate::solver::{Dirty, Links, Lit, Place, Radiosity, Stop, Surfaces};
 
@@ -134,6 +134,8 @@ struct Solved {
     hash: PairHash,
     links: Links,
     radiosity: Radiosity,
+    /// Mean radiosity when no link was extrapolated last, W/m2.
+    sound_mean_w_m2: f64,
     events: Vec<LinkEvent>,
     report: FrameReport,
 }
@@ -181,7 +183,7 @@ impl FlatSession {
             last => rayon::scope(|_| {
                 let extrapolates = last.is_some();
                 let solved = self.advance(last, from, view.clone(), label.clone());
-                // Extrapolated links that no scene can have: this frame is built anew.
+                // Extrapolated links by which light grows as it should not: this frame is built anew.
                 match extrapolates && solved.report.residual.is_infinite() {
                     true => self.advance(None, from, view, label),
                     false => solved,
@@ -244,12 +246,18 @@ impl FlatSession {
             let residual = self.options.residual;
             let stop = match extrapolates {
                 // Extrapolated links may feed each other.
-                true => Stop::Bounded { residual, mean_w_m2: 1.1 * self.most_mean_w_m2() },
+                true => {
+                    let sound = SUDDEN * solved.sound_mean_w_m2;
+                    Stop::Bounded { residual, mean_w_m2: sound.min(1.1 * self.most_mean_w_m2()) }
+                }
                 false => Stop::Residual(residual),
             };
             solved.radiosity.solve(&lit, &solved.links, dirty, stop);
         }
         report.seconds.solve = clock.lap();
+        if solved.tree.live_count() == 0 {
+            solved.sound_mean_w_m2 = solved.radiosity.mean_w_m2;
+        }
         if solved.tree.vacant_len() * VACANT_PAIRS > solved.tree.len() {
             solved.tree.compact();
         }
@@ -286,6 +294,7 @@ impl FlatSession {
             hash: PairHash::default(),
             links: Links::default(),
             radiosity: Radiosity::default(),
+            sound_mean_w_m2: 0.0,
             events: Vec::new(),
             report: FrameReport::default(),
         }

@@ -10,7 +10,7 @@ use crate::pair::{
 use crate::scene::{BodyId, LightKind};
 use crate::solver::{Dirty, Links, Radiosity, Stop};
 
-use super::ahead::Ahead;
+use super::ahead::{Ahead, SUDDEN};
 use super::coarse::{self, Coarse};
 use super::report::FrameReport;
 use super::surfaces::{LitForest, apply_edits, links_of};
@@ -86,7 +86,10 @@ impl Session {
         let residual = self.options.tolerance * share;
         let stop = match ahead.lookahead {
             // Extrapolated links may feed each other.
-            Some(_) => Stop::Bounded { residual, mean_w_m2: 1.1 * self.most_mean_w_m2() },
+            Some(_) => {
+                let sound = SUDDEN * solved.sound_mean_w_m2;
+                Stop::Bounded { residual, mean_w_m2: sound.min(1.1 * self.most_mean_w_m2()) }
+            }
             None => Stop::Residual(residual),
         };
         let lamps = (0..self.scene.lights.len()).any(|k| solved.view.light(k).is_some());
@@ -97,6 +100,9 @@ impl Session {
             solved.radiosity.solve(&lit, &solved.links, dirty, stop);
         }
         report.seconds.solve = clock.lap();
+        if solved.is_settled() {
+            solved.sound_mean_w_m2 = solved.radiosity.mean_w_m2;
+        }
         solved.compact();
 
         solved.time_s = time_s;
@@ -147,6 +153,7 @@ impl Session {
             links: Links::default(),
             coarse: Coarse::default(),
             radiosity: Radiosity::default(),
+            sound_mean_w_m2: 0.0,
             events: Vec::new(),
             report: FrameReport::default(),
         }

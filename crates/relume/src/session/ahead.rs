@@ -5,6 +5,10 @@ use crate::pair::PairTree;
 
 use super::Update;
 
+/// How many times as bright as when no link was extrapolated last a scene may get before its frame is built anew:
+/// links that are a little too large feed each other.
+pub(crate) const SUDDEN: f64 = 1.25;
+
 /// What a strategy predicts with; nothing for those that do not.
 #[derive(Default)]
 pub(crate) struct Ahead {

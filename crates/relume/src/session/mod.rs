@@ -42,7 +42,7 @@ pub use snapshot::{Leaf, Snapshot};
 pub use solution::Solution;
 
 // Flatland's session shares these.
-pub(crate) use ahead::Ahead;
+pub(crate) use ahead::{Ahead, SUDDEN};
 pub(crate) use events::with_names;
 pub(crate) use surfaces::{Receivers, apply_edits, links_of};
 pub(crate) use tally::balance_of;
@@ -97,6 +97,8 @@ struct Solved {
     links: Links,
     coarse: Coarse,
     radiosity: Radiosity,
+    /// Mean radiosity when no link was extrapolated last, W/m2.
+    sound_mean_w_m2: f64,
     events: Vec<LinkEvent>,
     report: FrameReport,
 }
@@ -177,7 +179,7 @@ impl Session {
             // On a thread of the pool: entering it anew for every small task would cost more.
             last => rayon::scope(|_| {
                 let solved = self.advance(last, from, label.clone())?;
-                // Extrapolated links that no scene can have: this frame is built anew.
+                // Extrapolated links by which light grows as it should not: this frame is built anew.
                 match solved.report.residual.is_infinite() {
                     true => self.advance(None, from, label),
                     false => Ok(solved),

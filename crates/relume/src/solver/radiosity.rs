@@ -44,6 +44,8 @@ pub struct Radiosity {
     /// By how much the radiosities at and below an element may be off, at most, for what was not pushed down
     /// to them, W/m2: what is owed to itself, and the most that is owed below any of its children.
     owed: Vec<f32>,
+    /// Area-weighted mean radiosity that the last solve found, all channels, W/m2.
+    pub mean_w_m2: f64,
     /// Sweeps made by the last solve.
     pub sweeps: u32,
     /// Receivers gathered by the last solve, each time counted.
@@ -167,6 +169,7 @@ impl Radiosity {
             // A radiosity stays, what its ancestors gathered is owed to it, and they may gather other values.
             let left = self.passed_over + self.held * (1.0 + 1.0 + PENDING_SHARE);
             let (mean, before) = (self.mean(surfaces), limit);
+            self.mean_w_m2 = mean;
             limit = limit_of(mean);
             self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
             let done = match stop {

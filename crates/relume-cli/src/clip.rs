@@ -11,12 +11,12 @@ use relume::session::{Options, Oracle, Session, SessionError, Snapshot};
 use relume_picture::picture::{self, Exposure, Settings};
 
 use crate::args::{
-    ClipFlags, DemoScene, OracleFlag, PictureFlags, Shading, SourceFlags, UpdateChoice,
+    ClipFlags, DemoScene, OracleFlag, PictureFlags, Shading, SourceFlags, UpdateChoice, UpdateFlag,
 };
 use crate::demo;
 use crate::failure::Failure;
 use crate::frames;
-use crate::output::{count, counted};
+use crate::output::{self, count, counted};
 use crate::scene_file;
 
 /// Default tolerance, relative error of irradiance.
@@ -117,6 +117,16 @@ impl Clip {
     pub(crate) fn warn(&self) {
         if !self.flags.quiet {
             scene_file::warn(&self.scene);
+        }
+    }
+
+    /// Says on stderr what a strategy may cost, unless the user wants quiet.
+    pub(crate) fn warn_of(&self, update: UpdateChoice) {
+        if !self.flags.quiet && matches!(update.strategy, UpdateFlag::Extrapolate { .. }) {
+            output::complain(
+                "warning: extrapolated links may be far off, above all where bodies touch; `relume bench --compare` \
+                 says by how much",
+            );
         }
     }
 

@@ -29,6 +29,7 @@ pub(crate) fn factors(args: &FactorsArgs) -> Result<(), Failure> {
     let format = format_of(args)?;
     let clip = Clip::of_file(&args.scene, &args.clip, TOLERANCE)?;
     judge(args, format, &clip)?;
+    clip.warn_of(args.update);
     let clip = clip.without_light();
     let grouping = grouping(&clip.scene, args.by);
     let things = Things { environment: environment(&grouping), grouping };

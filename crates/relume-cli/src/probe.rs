@@ -22,6 +22,7 @@ pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
     let riders = riders(&clip.scene, &args.sensors, &sensors)?;
     let hidden = inside(&clip, &riders, &args.sensors)?;
     clip.warn();
+    clip.warn_of(args.update);
     if !args.clip.quiet {
         say_renamed(&sensors);
         hidden.iter().for_each(|line| output::complain(line));

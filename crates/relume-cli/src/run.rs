@@ -106,6 +106,7 @@ impl Job {
         });
         let camera = camera.transpose()?;
         clip.warn();
+        clip.warn_of(self.solve.update);
         if let Some(dir) = &self.dir {
             make_directory(dir)?;
         }
@@ -115,7 +116,7 @@ impl Job {
             wanted.iter().copied().filter(|frame| !report.frames.contains_key(frame)).collect();
         if !self.quiet() {
             self.warn_of_old_pictures(wanted, &report);
-            self.warn_of_strategy();
+            self.warn_of_no_events();
         }
         let events = self.solve.events.as_ref().map(|_| EventTable::new());
         let options = clip.options(self.solve.update, true)?;
@@ -204,17 +205,12 @@ impl Job {
         self.picture_path(frame).is_none_or(|path| fs::read(path).is_ok_and(whole))
     }
 
-    /// What the strategy asked for does not do.
-    fn warn_of_strategy(&self) {
-        match self.solve.update.strategy {
-            UpdateFlag::Extrapolate { .. } => output::complain(
-                "warning: extrapolated links may be far off, above all where bodies touch; `relume bench --compare` says \
-                 by how much",
-            ),
-            UpdateFlag::Scratch if self.solve.events.is_some() => output::complain(
+    /// Events that will not come.
+    fn warn_of_no_events(&self) {
+        if self.solve.events.is_some() && self.solve.update.strategy == UpdateFlag::Scratch {
+            output::complain(
                 "warning: with `--update scratch` every frame is built anew: there are no events",
-            ),
-            _ => {}
+            );
         }
     }
 

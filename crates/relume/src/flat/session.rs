@@ -7,8 +7,8 @@ use crate::element::{ElementId, ElementKey};
 use crate::event::Ticks;
 use crate::pair::{Carried, LinkEvent, PairHash, PairTree, Record, update};
 use crate::session::{
-    Ahead, Clock, ElementName, Event, FrameReport, Memory, PairCounts, Receivers, SUDDEN, Solution,
-    Update, apply_edits, balance_of, links_of, with_names,
+    Ahead, Clock, ElementName, Event, FrameReport, Memory, PairCounts, Receivers, Solution, Update,
+    apply_edits, balance_of, links_of, while_extrapolated, with_names,
 };
 use crate::solver::{Dirty, Links, Lit, Place, Radiosity, Stop, Surfaces};
 
@@ -245,18 +245,14 @@ impl FlatSession {
         } else {
             let residual = self.options.residual;
             let stop = match extrapolates {
-                // Extrapolated links may feed each other.
-                true => {
-                    let sound = SUDDEN * solved.sound_mean_w_m2;
-                    Stop::Bounded { residual, mean_w_m2: sound.min(1.1 * self.most_mean_w_m2()) }
-                }
+                true => while_extrapolated(residual, solved.sound_mean_w_m2, self.most_mean_w_m2()),
                 false => Stop::Residual(residual),
             };
             solved.radiosity.solve(&lit, &solved.links, dirty, stop);
         }
         report.seconds.solve = clock.lap();
         if solved.tree.live_count() == 0 {
-            solved.sound_mean_w_m2 = solved.radiosity.mean_w_m2;
+            solved.sound_mean_w_m2 = solved.radiosity.mean_w_m2(&lit);
         }
         if solved.tree.vacant_len() * VACANT_PAIRS > solved.tree.len() {
             solved.tree.compact();

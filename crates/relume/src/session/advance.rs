@@ -10,7 +10,7 @@ use crate::pair::{
 use crate::scene::{BodyId, LightKind};
 use crate::solver::{Dirty, Links, Radiosity, Stop};
 
-use super::ahead::{Ahead, SUDDEN};
+use super::ahead::{Ahead, while_extrapolated};
 use super::coarse::{self, Coarse};
 use super::report::FrameReport;
 use super::surfaces::{LitForest, apply_edits, links_of};
@@ -85,11 +85,7 @@ impl Session {
         let share = if cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE };
         let residual = self.options.tolerance * share;
         let stop = match ahead.lookahead {
-            // Extrapolated links may feed each other.
-            Some(_) => {
-                let sound = SUDDEN * solved.sound_mean_w_m2;
-                Stop::Bounded { residual, mean_w_m2: sound.min(1.1 * self.most_mean_w_m2()) }
-            }
+            Some(_) => while_extrapolated(residual, solved.sound_mean_w_m2, self.most_mean_w_m2()),
             None => Stop::Residual(residual),
         };
         let lamps = (0..self.scene.lights.len()).any(|k| solved.view.light(k).is_some());
@@ -101,7 +97,7 @@ impl Session {
         }
         report.seconds.solve = clock.lap();
         if solved.is_settled() {
-            solved.sound_mean_w_m2 = solved.radiosity.mean_w_m2;
+            solved.sound_mean_w_m2 = solved.radiosity.mean_w_m2(&lit);
         }
         solved.compact();
 

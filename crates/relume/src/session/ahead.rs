@@ -2,12 +2,23 @@
 
 use crate::event::{Foresight, KnownMotion, Lookahead, Ticks};
 use crate::pair::PairTree;
+use crate::solver::Stop;
 
 use super::Update;
 
 /// How many times as bright as when no link was extrapolated last a scene may get before its frame is built anew:
 /// links that are a little too large feed each other.
-pub(crate) const SUDDEN: f64 = 1.25;
+const SUDDEN: f64 = 1.25;
+
+/// When to stop a solve over extrapolated links: given up where it gets brighter than it did without them, or than
+/// the scene can be. Mean radiosities, W/m2.
+pub(crate) fn while_extrapolated(residual: f64, sound_mean_w_m2: f64, most_mean_w_m2: f64) -> Stop {
+    let mean_w_m2 = (SUDDEN * sound_mean_w_m2).min(ROUNDING * most_mean_w_m2);
+    Stop::Bounded { residual, mean_w_m2 }
+}
+
+/// By how much the errors of links may make a scene brighter than it can be.
+const ROUNDING: f64 = 1.1;
 
 /// What a strategy predicts with; nothing for those that do not.
 #[derive(Default)]

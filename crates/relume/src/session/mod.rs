@@ -42,7 +42,7 @@ pub use snapshot::{Leaf, Snapshot};
 pub use solution::Solution;
 
 // Flatland's session shares these.
-pub(crate) use ahead::{Ahead, SUDDEN};
+pub(crate) use ahead::{Ahead, while_extrapolated};
 pub(crate) use events::with_names;
 pub(crate) use surfaces::{Receivers, apply_edits, links_of};
 pub(crate) use tally::balance_of;

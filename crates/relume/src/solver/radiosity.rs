@@ -44,8 +44,6 @@ pub struct Radiosity {
     /// By how much the radiosities at and below an element may be off, at most, for what was not pushed down
     /// to them, W/m2: what is owed to itself, and the most that is owed below any of its children.
     owed: Vec<f32>,
-    /// Area-weighted mean radiosity that the last solve found, all channels, W/m2.
-    pub mean_w_m2: f64,
     /// Sweeps made by the last solve.
     pub sweeps: u32,
     /// Receivers gathered by the last solve, each time counted.
@@ -148,7 +146,7 @@ impl Radiosity {
             Stop::Residual(limit) | Stop::Bounded { residual: limit, .. } => (limit * mean) as f32,
         };
         let to_residual = !matches!(stop, Stop::Sweeps(_));
-        let mut last_mean = self.mean(surfaces);
+        let mut last_mean = self.mean_w_m2(surfaces);
         let mut limit = limit_of(last_mean);
         loop {
             if self.held > HELD_MAX * limit && !work.all && to_residual {
@@ -168,8 +166,7 @@ impl Radiosity {
             }
             // A radiosity stays, what its ancestors gathered is owed to it, and they may gather other values.
             let left = self.passed_over + self.held * (1.0 + 1.0 + PENDING_SHARE);
-            let (mean, before) = (self.mean(surfaces), limit);
-            self.mean_w_m2 = mean;
+            let (mean, before) = (self.mean_w_m2(surfaces), limit);
             limit = limit_of(mean);
             self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
             let done = match stop {
@@ -245,8 +242,8 @@ impl Radiosity {
         small
     }
 
-    /// Area-weighted mean radiosity of all surfaces and channels.
-    fn mean(&self, surfaces: &impl Surfaces) -> f64 {
+    /// Area-weighted mean radiosity of all surfaces and channels, W/m2.
+    pub fn mean_w_m2(&self, surfaces: &impl Surfaces) -> f64 {
         let (mut flux, mut area) = (0.0, 0.0);
         for facet in surfaces.facets() {
             let a = surfaces.area_m2(facet.0);
@@ -517,7 +514,7 @@ mod tests {
                 warm.solve(&tree, &links, dirty, stop);
                 let mut cold = Radiosity::new(&tree);
                 cold.solve(&tree, &links, Dirty::All, Stop::Residual(1e-7));
-                let mean = cold.mean(&tree);
+                let mean = cold.mean_w_m2(&tree);
                 for id in 0..6 {
                     for (one, two) in warm.radiosity(id).iter().zip(cold.radiosity(id)) {
                         let off = f64::from((one - two).abs()) / mean;

@@ -288,7 +288,8 @@ impl<'a> Clipping<'a> {
     ///
     /// V is smooth over an end while part of the other is seen, and has kinks where that begins and ends. So
     /// four points that all see a part are nearly exact; four that see all of it, or nothing, may have
-    /// overlooked something. Where all four are behind the other's plane there are more. Measured on 47,000 links of three scenes (docs/exchange.md).
+    /// overlooked something. Where all four are behind the other's plane there are more. Measured on 47,000
+    /// links of three scenes (docs/exchange.md).
     pub fn first_look(&mut self) -> (Visibility, f64) {
         let mut v = self.visibility(1);
         let mut cells = 1;

@@ -30,12 +30,6 @@ impl Linear {
         Linear { mean: self.at(dx, dy), ..*self }
     }
 
-    /// With gradients per radius instead of per metre.
-    pub(super) fn per_radius(mut self, radius: f32) -> Linear {
-        self.gradient.iter_mut().flatten().for_each(|g| *g *= radius);
-        self
-    }
-
     /// The sum, in the same units.
     pub fn plus(mut self, other: &Linear) -> Linear {
         for c in 0..3 {
@@ -46,14 +40,14 @@ impl Linear {
         self
     }
 
-    /// How far the two are apart anywhere, with gradients per radius.
-    pub(super) fn largest_change(&self, other: &Linear) -> f32 {
-        let mut out = 0.0_f32;
+    /// The difference, in the same units.
+    pub(super) fn minus(mut self, other: &Linear) -> Linear {
         for c in 0..3 {
-            let along = |k: usize| (self.gradient[k][c] - other.gradient[k][c]).powi(2);
-            out = out.max((self.mean[c] - other.mean[c]).abs() + (along(0) + along(1)).sqrt());
+            self.mean[c] -= other.mean[c];
+            self.gradient[0][c] -= other.gradient[0][c];
+            self.gradient[1][c] -= other.gradient[1][c];
         }
-        out
+        self
     }
 
     pub(super) fn difference(&self, other: &Linear) -> f32 {

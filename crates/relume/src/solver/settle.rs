@@ -1,7 +1,8 @@
 //! One facet: irradiance pushed down, reflected at the leaves, radiosity pulled up.
 //!
 //! What changes a little is not pushed down to every leaf each time: it is *owed* to what lies below, and delivered once what is
-//! owed may add up to more than the limit, or something else leads there.
+//! owed may add up to more than the limit, or something else leads there. What changes now is known as a function of place: what one
+//! level gains and another loses cancels, and where a change is small it waits though it may be large elsewhere.
 
 use super::field::{Field, Linear};
 use super::surfaces::{Lit, Place, Surfaces};
@@ -16,6 +17,21 @@ pub(super) struct Settled {
     pub(super) small: f32,
     /// What is now owed to elements; nothing where everything was settled.
     pub(super) owed: Vec<(u32, f32)>,
+}
+
+/// What changed above an element.
+#[derive(Clone, Copy, Default)]
+pub(super) struct News {
+    /// By how much the irradiance that is pushed down changed, W/m2 and per metre.
+    change: Linear,
+    /// By how much radiosities may change for earlier changes, of which no more is known, W/m2.
+    owed: f32,
+}
+
+impl News {
+    fn about(&self, own: &Place, other: &Place) -> News {
+        News { change: self.change.about(own, other), ..*self }
+    }
 }
 
 /// One facet being settled.
@@ -34,13 +50,13 @@ pub(super) struct Below<'a, S> {
 
 impl<S: Surfaces> Below<'_, S> {
     /// Pushes irradiance down and pulls radiosity up; returns the new radiosity of `id`, and what is owed at
-    /// and below it. `news` is by how much radiosities may change for what changed above.
+    /// and below it. `news` is what changed above.
     pub(super) fn settle(
         &self,
         id: u32,
         place: &Place,
         inherited: &Linear,
-        news: f32,
+        news: &News,
         out: &mut Settled,
     ) -> (Linear, f32) {
         let h = self.gathered.get(id).plus(inherited);
@@ -50,22 +66,23 @@ impl<S: Surfaces> Below<'_, S> {
             self.reflect(&h, place.radius)
         } else {
             let news = match self.way {
-                Some(way) => news + self.owed_from(id) + way.news(id),
-                None => 0.0,
+                Some(way) => self.add_own(news, way, id),
+                None => News::default(),
             };
             let mut fit = Fit::default();
             for child in children {
                 let at = self.surfaces.place(child);
-                let (b, below) = match self.way {
-                    Some(way) if !bit(&way.on, child) && self.may_wait(child, news) => {
-                        let owed = self.owed[child as usize] + news;
-                        if news > 0.0 {
-                            out.owed.push((child, owed));
+                let news = news.about(place, &at);
+                let (b, below) =
+                    match self.way.and_then(|way| self.may_wait(way, child, &at, &news)) {
+                        Some(owed) => {
+                            if owed > self.owed[child as usize] {
+                                out.owed.push((child, owed));
+                            }
+                            (self.radiosity.get(child), owed)
                         }
-                        (self.radiosity.get(child), owed)
-                    }
-                    _ => self.settle(child, &at, &h.about(place, &at), news, out),
-                };
+                        None => self.settle(child, &at, &h.about(place, &at), &news, out),
+                    };
                 owed = owed.max(below);
                 fit.add(self.surfaces.area_m2(child), place, &at, &b);
             }
@@ -84,8 +101,21 @@ impl<S: Surfaces> Below<'_, S> {
         (b, owed)
     }
 
-    fn may_wait(&self, id: u32, news: f32) -> bool {
-        self.owed[id as usize] + news <= self.limit
+    /// What is owed to an element with what changed above, if it can wait.
+    fn may_wait(&self, way: &Way, id: u32, place: &Place, news: &News) -> Option<f32> {
+        let owed = self.owed[id as usize] + news.owed + self.lit.most(&news.change, place.radius);
+        (!bit(&way.on, id) && owed <= self.limit).then_some(owed)
+    }
+
+    /// News from above with those of an element itself.
+    fn add_own(&self, above: &News, way: &Way, id: u32) -> News {
+        let owed = above.owed + self.owed_from(id);
+        match way.news(id) {
+            Some(Some(own)) => News { change: above.change.plus(own), owed },
+            // Whose children came or went, concerns all that is below.
+            Some(None) => News { owed: f32::INFINITY, ..*above },
+            None => News { owed, ..*above },
+        }
     }
 
     /// What of that which is owed at and below an element has not come further than to itself.

@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use crate::element::ElementId;
 
+use super::field::Linear;
+
 /// Reflectance and exitance of one material, linear RGB.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lit {
@@ -11,6 +13,20 @@ pub struct Lit {
     pub reflectance: [f32; 3],
     /// Exitance M, W/m2.
     pub exitance: [f32; 3],
+}
+
+impl Lit {
+    /// By how much a change of irradiance (gradients per metre) changes radiosities at most, up to a distance from
+    /// where it has its mean, in each of their numbers; W/m2.
+    pub(super) fn most(&self, change: &Linear, radius_m: f32) -> f32 {
+        let mut out = 0.0_f32;
+        for c in 0..3 {
+            let [x, y] = [0, 1].map(|axis| change.gradient[axis][c]);
+            let most = change.mean[c].abs() + radius_m * (x * x + y * y).sqrt();
+            out = out.max(self.reflectance[c] * most);
+        }
+        out
+    }
 }
 
 /// Where an element lies in its patch's frame.

@@ -47,9 +47,9 @@ pub(super) struct Batch {
     pub(super) facets: Vec<u32>,
     /// Receivers to be gathered, and settled with what is below them; once gathered, those that cannot wait.
     pub(super) receivers: Vec<u32>,
-    /// One by one, by how much what they gathered may change radiosities; none before it was gathered, or where
+    /// One by one, by how much what they gathered changed, W/m2 and per metre; none before it was gathered, or where
     /// everything is settled.
-    pub(super) news: Vec<f32>,
+    pub(super) news: Vec<Linear>,
     /// Further elements to be settled with all that is below them.
     pub(super) parents: Vec<u32>,
 }
@@ -207,28 +207,33 @@ pub(super) struct Way {
     pub(super) on: Vec<u64>,
     /// Ends of the ways.
     ends: Vec<u64>,
-    /// By how much radiosities below the ends may change.
-    news: Vec<f32>,
+    /// Which news those of the ends are; [`ALL`] where children came or went.
+    numbers: Vec<u32>,
+    news: Vec<Linear>,
 }
+
+/// In place of a number of news: everything below may differ.
+const ALL: u32 = u32::MAX;
 
 impl Way {
     pub(super) fn new(len: usize) -> Way {
         let bits = || vec![0; len / 64 + 1];
-        Way { on: bits(), ends: bits(), news: vec![0.0; len] }
+        Way { on: bits(), ends: bits(), numbers: vec![0; len], news: Vec::new() }
     }
 
-    /// By how much radiosities below an element may change for what it gathered itself.
-    pub(super) fn news(&self, id: u32) -> f32 {
-        if bit(&self.ends, id) { self.news[id as usize] } else { 0.0 }
+    /// Whether anything changed at an element itself, and by how much what it gathered did, if that is all.
+    pub(super) fn news(&self, id: u32) -> Option<Option<&Linear>> {
+        let number = || self.numbers[id as usize];
+        bit(&self.ends, id).then(|| (number() != ALL).then(|| &self.news[number() as usize]))
     }
 
-    pub(super) fn mark(&mut self, surfaces: &impl Surfaces, batch: &Batch) -> &Way {
-        let receivers = batch.receivers.iter().copied().zip(batch.news.iter().copied());
-        // Whose children came or went, concerns all that is below.
-        let parents = batch.parents.iter().map(|&id| (id, f32::INFINITY));
-        for (id, news) in receivers.chain(parents) {
+    pub(super) fn mark(&mut self, surfaces: &impl Surfaces, batch: &mut Batch) -> &Way {
+        self.news = std::mem::take(&mut batch.news);
+        let receivers = batch.receivers.iter().copied().zip(0..);
+        let parents = batch.parents.iter().map(|&id| (id, ALL));
+        for (id, number) in receivers.chain(parents) {
             set_bit(&mut self.ends, id);
-            self.news[id as usize] = news;
+            self.numbers[id as usize] = number;
             let mut at = Some(id);
             while let Some(id) = at.filter(|&id| !set_bit(&mut self.on, id)) {
                 at = surfaces.parent(id);

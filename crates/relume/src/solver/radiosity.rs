@@ -423,8 +423,10 @@ mod tests {
             self.at[id as usize].1
         }
         fn place(&self, id: u32) -> Place {
-            let x = self.at[id as usize].0;
-            Place { centroid: [x, 0.0], radius: 0.5, moment: [0.05, 0.0, 0.05] }
+            // Strips: as long as their area says.
+            let (x, area) = self.at[id as usize];
+            let radius = 0.5 * area as f32;
+            Place { centroid: [x, 0.0], radius, moment: [radius * radius / 3.0, 0.0, 0.05] }
         }
         fn lit(&self, facet: u32) -> &Lit {
             &self.lit[facet as usize]

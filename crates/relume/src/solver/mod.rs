@@ -10,6 +10,7 @@ mod push;
 mod radiosity;
 mod settle;
 mod surfaces;
+mod trend;
 mod work;
 
 pub use field::Linear;

@@ -13,6 +13,7 @@ use super::links::Links;
 use super::push::push;
 use super::settle::{Below, News, Settled};
 use super::surfaces::{Surfaces, for_each_below};
+use super::trend::Trend;
 use super::work::{Batch, Dirty, PENDING_SHARE, Way, Work};
 
 /// When to stop.
@@ -32,7 +33,7 @@ pub enum Stop {
     Residual(f64),
 }
 
-/// The solution: 80 bytes an element.
+/// The solution: 84 bytes an element.
 #[derive(Clone, Debug, Default)]
 pub struct Radiosity {
     /// Gradients are per radius of the element.
@@ -44,6 +45,7 @@ pub struct Radiosity {
     /// By how much the radiosities at and below an element may be off, at most, for what was not pushed down
     /// to them, W/m2: what is owed to itself, and the most that is owed below any of its children.
     owed: Vec<f32>,
+    trend: Trend,
     /// Sweeps made by the last solve.
     pub sweeps: u32,
     /// Receivers gathered by the last solve, each time counted.
@@ -88,12 +90,14 @@ impl Radiosity {
             grow(&mut self.pending, len);
             grow(&mut self.owed, len);
         }
+        self.trend.extend(len);
     }
 
     /// Follows elements to their new ids.
     pub fn renumber(&mut self, to: &Renumbering) {
         self.radiosity.renumber(to);
         self.gathered.renumber(to);
+        self.trend.renumber(to);
         for values in [&mut self.pending, &mut self.owed] {
             *values = to.old_of().iter().map(|&old| values[old as usize]).collect();
         }
@@ -105,6 +109,7 @@ impl Radiosity {
         for values in [&mut radiosity.0, &mut gathered.0, pending, owed] {
             values.shrink_to(values.len() + values.len() / SLACK);
         }
+        self.trend.trim();
     }
 
     /// Gives an element a constant radiosity to begin with.
@@ -124,6 +129,7 @@ impl Radiosity {
             self.radiosity.set(child, &Linear { mean: from.at(x, y), gradient });
             self.gathered.set(child, &Linear::default());
             self.owed[child as usize] = 0.0;
+            self.trend.inherit(parent, child);
         }
     }
 
@@ -137,7 +143,11 @@ impl Radiosity {
     /// the residual since it last did; and what it gathers is pushed down once that, with what was not
     /// pushed down before, may change a radiosity by more than the residual. So nothing drifts, however
     /// often this is called.
+    ///
+    /// Where the last solve changed most of the scene, this one begins with all of it, as much further along as the last
+    /// change suggests.
     pub fn solve(&mut self, surfaces: &impl Surfaces, links: &Links, dirty: Dirty, stop: Stop) {
+        let is_first = self.sweeps == 0;
         let mut work = Work::new(surfaces, dirty);
         let mut jump = Jump::default();
         (self.sweeps, self.gathers) = (0, 0);
@@ -148,12 +158,18 @@ impl Radiosity {
         let to_residual = !matches!(stop, Stop::Sweeps(_));
         let mut last_mean = self.mean_w_m2(surfaces);
         let mut limit = limit_of(last_mean);
+        let start = (to_residual && self.trend.is_wide).then(|| {
+            work.start_all(surfaces);
+            self.trend.follow(&mut self.radiosity)
+        });
+        let mut is_wide = work.all && !is_first;
         loop {
             if self.held > HELD_MAX * limit && !work.all && to_residual {
                 // What was little beside a brighter scene is too much beside this one.
                 work.start_all(surfaces);
             }
             let all = work.all;
+            is_wide |= all && !is_first;
             if all {
                 jump.before(&self.radiosity);
             }
@@ -183,19 +199,23 @@ impl Radiosity {
                 _ => !work.is_left(surfaces, links, limit, &mut self.pending),
             };
             if done {
-                return;
+                break;
             }
             if self.sweeps >= SWEEPS_MAX {
                 // Given up: what the last sweep did to all is what is left at least.
                 let change = (mean - last_mean).abs() / mean;
                 self.residual =
                     if change.is_finite() { self.residual + change } else { f64::INFINITY };
-                return;
+                break;
             }
             last_mean = mean;
             if all && work.all && to_residual {
                 jump.after(&mut self.radiosity);
             }
+        }
+        match start {
+            Some(start) => self.trend.learn(&start, &self.radiosity, limit),
+            None => self.trend.is_wide = is_wide,
         }
     }
 
@@ -359,7 +379,8 @@ impl Radiosity {
     /// Bytes held.
     pub fn memory_bytes(&self) -> u64 {
         let single = self.pending.capacity() + self.owed.capacity();
-        self.radiosity.bytes() + self.gathered.bytes() + (single * size_of::<f32>()) as u64
+        let single = (single * size_of::<f32>()) as u64;
+        self.radiosity.bytes() + self.gathered.bytes() + single + self.trend.bytes()
     }
 }
 

@@ -142,10 +142,10 @@ impl Judge for FlatPlaced<'_> {
     ) -> Judgement {
         if !self.are_elements(a, b) {
             narrowed.extend_from_slice(candidates);
-            return passing(self.refine_groups(a, b), Margin::FIRM);
+            return passing(self.refine_groups(a, b), Margin::Firm);
         }
         if self.forest.facet(a) == self.forest.facet(b) {
-            return passing(Verdict::Cull(CullReason::FacingAway), Margin::FIRM);
+            return passing(Verdict::Cull(CullReason::FacingAway), Margin::Firm);
         }
         let ends = self.ends(a, b);
         match Shaft::new(&ends.a, &ends.b) {
@@ -154,11 +154,11 @@ impl Judge for FlatPlaced<'_> {
                 self.narrow_to(&shaft, &ends, candidates, narrowed);
                 self.decide((a, b), (&ends, &shaft), &narrowed[start..])
             }
-            None => passing(Verdict::Cull(CullReason::FacingAway), Margin::FIRM),
+            None => passing(Verdict::Cull(CullReason::FacingAway), Margin::Firm),
         }
     }
 
-    fn withstands(&self, _: ElementId, _: ElementId, _: bool, margin: Margin) -> Option<Margin> {
+    fn withstands(&self, _: ElementId, _: ElementId, margin: Margin) -> Option<Margin> {
         // No verdict depends on the light.
         Some(margin)
     }
@@ -309,13 +309,13 @@ impl FlatPlaced<'_> {
         let exchange = shaft.exchange();
         let (length_a, length_b) = (self.forest.length(a), self.forest.length(b));
         let factor = exchange / length_a.min(length_b);
-        let mut margin = Margin::FIRM;
+        let mut margin = Margin::Firm;
         if let Some(side) = self.larger((a, b), (length_a, length_b)) {
             let refined = factor > self.epsilon;
             if self.lookahead.is_some() {
                 let (large, small) =
                     if refined { (factor, self.epsilon) } else { (self.epsilon, factor) };
-                margin.error = Margin::between(large, small);
+                margin = Margin::of_error(!refined, Margin::between(large, small));
             }
             if refined {
                 return passing(Verdict::Refine(side), margin);

@@ -16,7 +16,7 @@ use crate::transport::{
 use super::brightness::Brightness;
 use super::certificate::SpaceOutlook;
 use super::hash::pair_key;
-use super::margin::Margin;
+use super::margin::{Margin, SideMargin};
 use super::oracle::{End, Oracle, Side, estimate};
 use super::outlook::{Finding, Outlook};
 use super::since::Since;
@@ -96,14 +96,8 @@ impl Judge for Placed<'_> {
         }
     }
 
-    fn withstands(
-        &self,
-        a: ElementId,
-        b: ElementId,
-        is_link: bool,
-        margin: Margin,
-    ) -> Option<Margin> {
-        margin.after(is_link, self.since?.growth(self.forest, a, b))
+    fn withstands(&self, a: ElementId, b: ElementId, margin: Margin) -> Option<Margin> {
+        margin.after(&self.since?.growth(self.forest, a, b))
     }
 
     fn stale(&self, a: ElementId, b: ElementId, certified: bool) -> Stale {
@@ -177,7 +171,7 @@ impl Judge for Placed<'_> {
 
 /// A verdict of which the numbers do not matter.
 fn passing(verdict: Verdict, segments: u32) -> Judgement {
-    Judgement { verdict, carried: Carried::default(), margin: Margin::FIRM, segments }
+    Judgement { verdict, carried: Carried::default(), margin: Margin::Firm, segments }
 }
 
 fn culled(reason: CullReason) -> Judgement {
@@ -197,7 +191,7 @@ fn carrying(
     );
     let visibility = in_steps(v.value);
     let carried = Carried { exchange_area_m2: x.area_m2 as f32, visibility, gradients };
-    Judgement { verdict, carried, margin: Margin::FIRM, segments: v.segments }
+    Judgement { verdict, carried, margin: Margin::Firm, segments: v.segments }
 }
 
 impl Placed<'_> {
@@ -313,7 +307,7 @@ impl Placed<'_> {
     ) -> Judgement {
         let key = pair_key(self.forest.key(a), self.forest.key(b));
         let x = exchange(self.simd, place_a, place_b, met);
-        let mut firm = Margin::FIRM;
+        let mut firm = Margin::Firm;
         if let (Oracle::FormFactor { epsilon, min_area_m2 }, Stage::Fine(_)) =
             (self.oracle, self.stage)
         {
@@ -324,7 +318,7 @@ impl Placed<'_> {
                 let (wanted, asked) = (factor > epsilon, self.lookahead.is_some());
                 if asked {
                     let (large, small) = if wanted { (factor, epsilon) } else { (epsilon, factor) };
-                    firm.error = Margin::between(large, small);
+                    firm = Margin::of_error(!wanted, Margin::between(large, small));
                 }
                 if wanted {
                     return Judgement { margin: firm, ..passing(Verdict::Refine(side), 0) };
@@ -364,16 +358,21 @@ impl Placed<'_> {
         let e = estimate(&x, &v, (&ends.0, &ends.1), brightness.reference_area_m2());
         let stake = x.area_m2 / place_a.area.min(place_b.area) / threshold.max(FINEST);
         let both_ways = way != Margin::ENDLESS;
-        let mut margin = Margin { error: way, both_ways, ..Margin::FIRM };
         let (better, ahead) = e.side(&ends.0, &ends.1);
-        if let Some((side, firm)) = self.splittable((a, b), better) {
-            if e.error > threshold {
-                margin.error = way.min(Margin::between(e.error, threshold));
-                margin.side = if firm { Margin::ENDLESS } else { ahead };
-                return Judgement { margin, ..passing(Verdict::Refine(side), v.segments) };
-            }
-            margin.error = way.min(Margin::between(threshold, e.error));
+        let wish = self.splittable((a, b), better);
+        if let Some((side, firm)) = wish
+            && e.error() > threshold
+        {
+            let (error, on) = (way.min(Margin::between(e.error(), threshold)), e.larger());
+            let side_margin = if firm { SideMargin::ENDLESS } else { SideMargin::new(ahead) };
+            let margin = Margin::Refined { error, on, both_ways, side: side_margin };
+            return Judgement { margin, ..passing(Verdict::Refine(side), v.segments) };
         }
+        let below = |error: f64| match wish {
+            Some(_) => way.min(Margin::between(threshold, error)),
+            None => way,
+        };
+        let margin = Margin::Link { on: e.on.map(below), both_ways };
         let v = match &mut clipped {
             Some(clipped) => look_closer(v, clipped, stake * doubt),
             None if v.segments == 0 => v,
@@ -476,7 +475,7 @@ impl Placed<'_> {
         let key = pair_key(self.forest.key(element), self.forest.key(light));
         let segments = place.segments(lamp, &e, key);
         let v = light_visibility(self.simd, &shaft, &blockers, &segments);
-        let mut margin = Margin::FIRM;
+        let mut margin = Margin::Firm;
         let verdict = match (self.stage, self.oracle) {
             (Stage::Coarse, _) => Verdict::Hold,
             (Stage::Fine(brightness), Oracle::Error { threshold }) => {
@@ -485,14 +484,19 @@ impl Placed<'_> {
                     End { area: 0.0, light: brightness.of(self.forest, light) },
                 );
                 let est = estimate(&x, &v, (&ends.0, &ends.1), brightness.reference_area_m2());
-                let wanted = est.error > threshold;
-                if self.forest.can_split(element) {
-                    margin.error = match wanted {
-                        true => Margin::between(est.error, threshold),
-                        false => Margin::between(threshold, est.error),
-                    };
+                let (error, may_split) = (est.on[0], self.forest.can_split(element));
+                let wanted = error > threshold;
+                if may_split && wanted {
+                    let error = Margin::between(error, threshold);
+                    let no_choice = SideMargin::ENDLESS;
+                    margin = Margin::Refined { error, on: side, both_ways: false, side: no_choice };
+                } else if may_split {
+                    let error = Margin::between(threshold, error);
+                    let endless = Margin::ENDLESS;
+                    let on = if side == Side::A { [error, endless] } else { [endless, error] };
+                    margin = Margin::Link { on, both_ways: false };
                 }
-                self.refine_if(wanted && self.forest.can_split(element), side)
+                self.refine_if(wanted && may_split, side)
             }
             (Stage::Fine(_), Oracle::FormFactor { epsilon, min_area_m2 }) => {
                 let uneven = x.over_a.slope.max(v.spread_a) > epsilon;

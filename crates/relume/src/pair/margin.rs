@@ -1,62 +1,194 @@
 //! How much brighter or darker the ends of a pair may get before its verdict can change.
 //!
 //! A cache, not part of the state: a pair that withstands a change of brightness is not judged
-//! again. All numbers are logarithms in steps of 1/256 of an octave, rounded to the safe side.
+//! again. All numbers are logarithms in steps of 1/240 of an octave, rounded to the safe side when a pair is
+//! judged; changes of brightness are added to them exactly, so that what brightens and darkens again leaves
+//! them as they were.
 
 use super::brightness::Light;
+use super::oracle::Side;
 
 /// Steps in an octave.
-const STEPS: f64 = 256.0;
+const STEPS: f64 = 240.0;
+
+/// Half an octave up from a power of two, brightness has a value 1.5 times that: log2(1.5) is 140.4 steps. All changes are
+/// multiples of [`COARSE`].
+const FIFTH: i32 = 140;
+
+/// Steps in one that is stored.
+const COARSE: i32 = 10;
+
+/// Given away to rounding: a step, and what [`FIFTH`] is off by for source and receiver.
+const SLACK: f64 = 2.0;
 
 /// What a verdict withstands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Margin {
+    /// Whatever the brightness, it is the same.
+    Firm,
+    /// That of a link.
+    Link {
+        /// By how much the errors on both receivers are below the threshold.
+        on: [u16; 2],
+        /// Whether they are also how far the pair is from being looked at in another way, which a change in
+        /// either sense may bring about.
+        both_ways: bool,
+    },
+    /// That of a refined pair.
+    Refined {
+        /// By how much the larger error is above the threshold.
+        error: u16,
+        /// The receiver that it is on.
+        on: Side,
+        /// As for links.
+        both_ways: bool,
+        /// How far the side that was refined is from being the worse one.
+        side: SideMargin,
+    },
+}
+
+/// By how much the side that was refined was ahead of the other, and how the two directions of the pair have
+/// drifted apart since, in either sense; in steps of [`COARSE`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Margin {
-    /// By how much the estimate of the error is away from the threshold; 15 bits.
-    pub error: u16,
-    /// By how much the better side to refine is ahead of the other; 15 bits.
-    pub side: u16,
-    /// Whether `error` counts both ways: it is also how far the pair is from being looked at in
-    /// another way, which a change in either sense may bring about.
-    pub both_ways: bool,
+pub struct SideMargin {
+    ahead: u8,
+    drift: i8,
+}
+
+impl SideMargin {
+    /// There is no choice.
+    pub const ENDLESS: SideMargin = SideMargin { ahead: u8::MAX, drift: 0 };
+
+    /// From a margin in steps.
+    pub(super) fn new(ahead: u16) -> SideMargin {
+        let ahead = (ahead / COARSE as u16).min(u16::from(u8::MAX) - 1);
+        SideMargin { ahead: ahead as u8, drift: 0 }
+    }
+
+    fn after(self, apart: i32) -> Option<SideMargin> {
+        if self == SideMargin::ENDLESS {
+            return Some(self);
+        }
+        let drift = i8::try_from(i32::from(self.drift) + apart / COARSE).ok()?;
+        (apart % COARSE == 0 && drift.unsigned_abs() < self.ahead)
+            .then_some(SideMargin { drift, ..self })
+    }
+
+    fn packed(self) -> u16 {
+        u16::from(self.ahead) << 8 | u16::from(self.drift as u8)
+    }
+
+    fn unpacked(packed: u16) -> SideMargin {
+        SideMargin { ahead: (packed >> 8) as u8, drift: packed as u8 as i8 }
+    }
 }
 
 impl Margin {
-    /// Whatever the brightness, the verdict is the same.
-    pub const ENDLESS: u16 = u16::MAX >> 1;
+    /// Nothing reaches as far.
+    pub const ENDLESS: u16 = u16::MAX >> 2;
 
-    /// A verdict that does not depend on brightness.
-    pub const FIRM: Margin =
-        Margin { error: Margin::ENDLESS, side: Margin::ENDLESS, both_ways: false };
-
-    /// `error` and `both_ways` in 16 bits.
-    pub(super) fn packed(self) -> u16 {
-        self.error | u16::from(self.both_ways) << 15
+    /// That of a verdict that does not depend on how bright the ends are: by how much the error, of whatever kind, is away from
+    /// the threshold.
+    pub fn of_error(is_link: bool, error: u16) -> Margin {
+        let side = SideMargin::ENDLESS;
+        match is_link {
+            true => Margin::Link { on: [error; 2], both_ways: false },
+            false => Margin::Refined { error, on: Side::A, both_ways: false, side },
+        }
     }
 
-    /// The inverse of [`Margin::packed`].
-    pub(super) fn unpacked(packed: u16, side: u16) -> Margin {
-        Margin { error: packed & Margin::ENDLESS, side, both_ways: packed >> 15 == 1 }
+    /// How far the error is away from the threshold.
+    pub fn error(&self) -> u16 {
+        match *self {
+            Margin::Firm => Margin::ENDLESS,
+            Margin::Link { on: [one, two], .. } => one.min(two),
+            Margin::Refined { error, .. } => error,
+        }
     }
 
-    /// What is left after the errors of the pair grew by at least and at most so many steps, if its
-    /// verdict withstands that.
-    pub(super) fn after(self, is_link: bool, (least, most): (i32, i32)) -> Option<Margin> {
-        // Of a link the error must not grow; of a refined pair it must not shrink, and its sides must
-        // keep their order.
-        let growth = match (self.both_ways, is_link) {
-            (true, _) => most.max(-least),
-            (false, true) => most,
-            (false, false) => -least,
-        };
-        let error = Margin::less(self.error, growth)?;
-        Some(Margin { error, side: Margin::less(self.side, most - least)?, ..self })
+    /// The same without a choice of the side to refine.
+    pub(super) fn on_this_side(self) -> Margin {
+        match self {
+            Margin::Refined { error, on, both_ways, .. } => {
+                Margin::Refined { error, on, both_ways, side: SideMargin::ENDLESS }
+            }
+            other => other,
+        }
     }
 
     /// The margin between two numbers of which the first is the larger.
     pub fn between(large: f64, small: f64) -> u16 {
         let octaves = libm::log2(large / small);
-        // One step is given away to rounding; NaN becomes 0.
-        (octaves * STEPS - 1.0).clamp(0.0, f64::from(Margin::ENDLESS - 1)) as u16
+        // NaN becomes 0.
+        (octaves * STEPS - SLACK).clamp(0.0, f64::from(Margin::ENDLESS - 1)) as u16
+    }
+
+    /// In 16 bits for a link, and in 32 for a refined pair.
+    pub(super) fn packed(self) -> u32 {
+        match self {
+            Margin::Firm => u32::MAX,
+            Margin::Link { on, both_ways } => {
+                let [one, two] = on.map(|on| match on {
+                    Margin::ENDLESS => LINK_ENDLESS,
+                    on => u32::from(on / COARSE as u16).min(LINK_ENDLESS - 1),
+                });
+                one | two << 7 | u32::from(both_ways) << 14
+            }
+            Margin::Refined { error, on, both_ways, side } => {
+                let flags = u32::from(on == Side::B) << 14 | u32::from(both_ways) << 15;
+                u32::from(side.packed()) << 16 | flags | u32::from(error)
+            }
+        }
+    }
+
+    /// What [`Margin::packed`] kept of a link's; never more than there was.
+    pub(super) fn of_link(packed: u16) -> Margin {
+        if packed == u16::MAX {
+            return Margin::Firm;
+        }
+        let on = [packed, packed >> 7].map(|on| match u32::from(on) & LINK_ENDLESS {
+            LINK_ENDLESS => Margin::ENDLESS,
+            on => on as u16 * COARSE as u16,
+        });
+        Margin::Link { on, both_ways: packed >> 14 & 1 == 1 }
+    }
+
+    /// The same of a refined pair's.
+    pub(super) fn of_refined(packed: u32) -> Margin {
+        if packed == u32::MAX {
+            return Margin::Firm;
+        }
+        Margin::Refined {
+            error: packed as u16 & Margin::ENDLESS,
+            on: if packed >> 14 & 1 == 1 { Side::B } else { Side::A },
+            both_ways: packed >> 15 & 1 == 1,
+            side: SideMargin::unpacked((packed >> 16) as u16),
+        }
+    }
+
+    /// What is left after the errors of the pair grew, if its verdict withstands that.
+    pub(super) fn after(self, growth: &Growth) -> Option<Margin> {
+        match self {
+            Margin::Firm => Some(self),
+            Margin::Link { on, both_ways } => {
+                let left = |k: usize| {
+                    let steps = if both_ways { growth.either() } else { growth.on[k].1 };
+                    Margin::less(on[k], steps)
+                };
+                Some(Margin::Link { on: [left(0)?, left(1)?], both_ways })
+            }
+            Margin::Refined { error, on, both_ways, side } => {
+                let shrinks = -growth.on[usize::from(on == Side::B)].0;
+                let steps = if both_ways { growth.either() } else { shrinks };
+                let error = Margin::less(error, steps)?;
+                let side = match growth.apart() {
+                    Some(apart) => side.after(apart)?,
+                    None if side == SideMargin::ENDLESS => side,
+                    None => return None,
+                };
+                Some(Margin::Refined { error, on, both_ways, side })
+            }
+        }
     }
 
     /// What is left after the logarithm changed to the worse by `steps`; `None` if that is nothing.
@@ -69,15 +201,22 @@ impl Margin {
     }
 }
 
+/// [`Margin::ENDLESS`] in seven bits.
+const LINK_ENDLESS: u32 = 127;
+
 /// How the light of a coarse element changed, in steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Shift {
-    /// The least that its radiosity, or the reflected part of it, grew by.
-    pub(super) least: i32,
-    /// The most.
-    pub(super) most: i32,
+    /// How its radiosity and the reflected part of it grew: at least and at most.
+    radiosity: (i32, i32),
     /// How its irradiance grew: at least and at most.
-    pub(super) irradiance: (i32, i32),
+    irradiance: (i32, i32),
+}
+
+/// How the errors of a pair grew on either receiver: at least and at most, in steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Growth {
+    on: [(i32, i32); 2],
 }
 
 /// A change without bounds: from nothing to something, or back.
@@ -95,24 +234,44 @@ impl Shift {
             } else if before <= 0.0 || after <= 0.0 {
                 (-ENDLESS, ENDLESS)
             } else {
-                let steps = libm::log2(after / before) * STEPS;
-                (steps.floor() as i32, steps.ceil() as i32)
+                let steps = steps(after) - steps(before);
+                (steps, steps)
             }
         };
         let all = grown(before.radiosity, after.radiosity);
         let part = grown(before.reflected, after.reflected);
         let irradiance = grown(before.irradiance, after.irradiance);
-        Some(Shift { least: all.0.min(part.0), most: all.1.max(part.1), irradiance })
+        Some(Shift { radiosity: (all.0.min(part.0), all.1.max(part.1)), irradiance })
+    }
+}
+
+/// The logarithm of a brightness, which is a power of two, or 1.5 times one.
+fn steps(value: f64) -> i32 {
+    let bits = value.to_bits();
+    let exponent = (bits >> 52) as i32;
+    exponent * STEPS as i32 + (bits >> 51 & 1) as i32 * FIFTH
+}
+
+impl Growth {
+    /// What both ends' shifts do to the errors of a pair.
+    pub(super) fn of_pair(a: &Shift, b: &Shift) -> Growth {
+        let one_way = |receiver: &Shift, source: &Shift| {
+            let (least, most) = (source.radiosity.0, source.radiosity.1);
+            (least - receiver.irradiance.1, most - receiver.irradiance.0)
+        };
+        Growth { on: [one_way(a, b), one_way(b, a)] }
     }
 
-    /// What both ends' shifts do to the errors of a pair: the least and the most that the error of
-    /// either direction grows by.
-    pub(super) fn of_pair(a: &Shift, b: &Shift) -> (i32, i32) {
-        let one_way = |receiver: &Shift, source: &Shift| {
-            (source.least - receiver.irradiance.1, source.most - receiver.irradiance.0)
-        };
-        let (one, two) = (one_way(a, b), one_way(b, a));
-        (one.0.min(two.0), one.1.max(two.1))
+    /// The largest change in either sense.
+    fn either(&self) -> i32 {
+        let [one, two] = self.on.map(|(least, most)| most.max(-least));
+        one.max(two)
+    }
+
+    /// By how much more the first error grew than the second, if that is known.
+    fn apart(&self) -> Option<i32> {
+        let [one, two] = self.on;
+        (one.0 == one.1 && two.0 == two.1).then_some(one.0 - two.0)
     }
 }
 
@@ -124,9 +283,13 @@ mod tests {
         Light { radiosity, reflected: radiosity, irradiance }
     }
 
+    fn growth(on: [(i32, i32); 2]) -> Growth {
+        Growth { on }
+    }
+
     #[test]
     fn margins_are_rounded_to_the_safe_side() {
-        assert_eq!(Margin::between(2.0, 1.0), 255);
+        assert_eq!(Margin::between(2.0, 1.0), 238);
         assert_eq!(Margin::between(1.001, 1.0), 0);
         assert_eq!(Margin::between(1.0, 0.0), Margin::ENDLESS - 1);
         assert_eq!(Margin::between(0.0, 0.0), 0);
@@ -139,24 +302,84 @@ mod tests {
 
     #[test]
     fn links_mind_growth_and_refined_pairs_shrinking() {
-        let margin = |both_ways| Margin { error: 100, side: Margin::ENDLESS, both_ways };
-        let left = |m: Margin, link, growth| m.after(link, growth).map(|m| m.error);
-        assert_eq!(left(margin(false), true, (-500, 30)), Some(70));
-        assert_eq!(left(margin(false), false, (-30, 500)), Some(70));
-        assert_eq!(left(margin(true), true, (-500, 30)), None);
-        assert_eq!(left(margin(true), false, (-30, 40)), Some(60));
-        for margin in [margin(true), margin(false), Margin::FIRM] {
-            assert_eq!(Margin::unpacked(margin.packed(), margin.side), margin);
+        let link = |both_ways| Margin::Link { on: [100, 40], both_ways };
+        let left = |margin: Margin, on| margin.after(&growth(on)).map(|m| m.error());
+        assert_eq!(left(link(false), [(-500, 30), (-9, -9)]), Some(49));
+        assert_eq!(left(link(false), [(0, 0), (40, 40)]), None);
+        assert_eq!(left(link(true), [(-30, 20), (0, 0)]), Some(10));
+        assert_eq!(left(link(true), [(-40, 20), (0, 0)]), None);
+        let refined = |on, both_ways| {
+            let side = SideMargin::ENDLESS;
+            Margin::Refined { error: 100, on, both_ways, side }
+        };
+        assert_eq!(left(refined(Side::A, false), [(-30, 500), (-200, 0)]), Some(70));
+        assert_eq!(left(refined(Side::B, false), [(-30, 500), (-200, 0)]), None);
+        assert_eq!(left(refined(Side::A, true), [(-30, 40), (0, 0)]), Some(60));
+    }
+
+    #[test]
+    fn what_brightens_and_darkens_again_leaves_margins_as_they_were() {
+        let side = SideMargin::new(300);
+        let refined = Margin::Refined { error: 300, on: Side::B, both_ways: false, side };
+        let link = Margin::Link { on: [320, 710], both_ways: false };
+        let lights = [3.0, 4.0, 2.0, 1.5, 3.0].map(|b| light(b, 1.0));
+        for margin in [refined, link] {
+            let mut now = margin;
+            for k in 1..lights.len() {
+                let shift = Shift::between(&lights[k - 1], &lights[k]).unwrap();
+                now = now.after(&Growth::of_pair(&shift, &Shift::default())).unwrap();
+                let packed = now.packed();
+                now = if margin == link {
+                    Margin::of_link(packed as u16)
+                } else {
+                    Margin::of_refined(packed)
+                };
+                assert_eq!(now == margin, k == 4, "{now:?}");
+            }
         }
+        // Two octaves are more than the side is ahead.
+        let far = Shift::between(&light(1.0, 1.0), &light(4.0, 1.0)).unwrap();
+        assert_eq!(refined.after(&Growth::of_pair(&Shift::default(), &far)), None);
+    }
+
+    #[test]
+    fn packing_never_adds_to_a_margin() {
+        let ahead = [0, 9, 10, 3000].map(SideMargin::new);
+        for error in [0, 7, 10, 1234, 1265, Margin::ENDLESS - 1, Margin::ENDLESS] {
+            for both_ways in [false, true] {
+                let link = Margin::Link { on: [error, 20], both_ways };
+                let Margin::Link { on, both_ways: kept } = Margin::of_link(link.packed() as u16)
+                else {
+                    panic!("{link:?}")
+                };
+                let endless = error == Margin::ENDLESS;
+                assert!(
+                    on[0] <= error && (on[0] + 10 > error.min(1260) || error > 1260),
+                    "{error} {on:?}"
+                );
+                assert_eq!(
+                    (on[0] == error && on[1] == 20, kept),
+                    (endless || error == 0 || error == 10, both_ways)
+                );
+                for side in ahead {
+                    let refined = Margin::Refined { error, on: Side::B, both_ways, side };
+                    assert_eq!(Margin::of_refined(refined.packed()), refined);
+                }
+            }
+        }
+        assert_eq!(Margin::of_link(Margin::Firm.packed() as u16), Margin::Firm);
+        assert_eq!(Margin::of_refined(Margin::Firm.packed()), Margin::Firm);
     }
 
     #[test]
     fn a_brighter_source_and_a_darker_receiver_make_errors_larger() {
         let up = Shift::between(&light(1.0, 1.0), &light(2.0, 1.0)).unwrap();
         let down = Shift::between(&light(1.0, 2.0), &light(1.0, 1.0)).unwrap();
-        assert_eq!(Shift::of_pair(&down, &up), (0, 512));
+        let grown = Growth::of_pair(&down, &up);
+        assert_eq!((grown.on, grown.apart()), ([(480, 480), (0, 0)], Some(480)));
         let woken = Shift::between(&light(0.0, 1.0), &light(1.0, 1.0)).unwrap();
-        assert_eq!(Shift::of_pair(&woken, &Shift::default()), (-ENDLESS, ENDLESS));
+        let grown = Growth::of_pair(&woken, &Shift::default());
+        assert_eq!((grown.on, grown.apart()), ([(0, 0), (-ENDLESS, ENDLESS)], None));
         assert_eq!(Shift::between(&light(1.0, 1.0), &light(1.0, 1.0)), None);
     }
 }

@@ -46,13 +46,23 @@ const SOURCE_VARIATION: f64 = 0.2;
 /// Errors of a link, each relative to its threshold's unit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Estimate {
-    /// Largest of the errors on the two receivers.
-    pub(super) error: f64,
+    /// The errors on the two receivers.
+    pub(super) on: [f64; 2],
     /// What splitting each end would mend.
     mends: (f64, f64),
 }
 
 impl Estimate {
+    /// The larger error.
+    pub(super) fn error(&self) -> f64 {
+        self.on[0].max(self.on[1])
+    }
+
+    /// The receiver that it is on.
+    pub(super) fn larger(&self) -> Side {
+        if self.on[1] > self.on[0] { Side::B } else { Side::A }
+    }
+
     /// The side to refine, and how far it is from being the other one.
     ///
     /// The larger, unless splitting the smaller mends far more: where both mend about as much the
@@ -117,7 +127,7 @@ pub(super) fn estimate(
     let link = LinkSize { exchange: x.area_m2, noise, reference_area };
     let (on_a, by_a, by_b) = one_way(&link, (a, &over_a), (b, &over_b));
     let (on_b, cy_b, cy_a) = one_way(&link, (b, &over_b), (a, &over_a));
-    Estimate { error: on_a.max(on_b), mends: (by_a + cy_a, by_b + cy_b) }
+    Estimate { on: [on_a, on_b], mends: (by_a + cy_a, by_b + cy_b) }
 }
 
 /// The hypotenuse; `f64::hypot` is the platform's, and differs from one to another.

@@ -5,7 +5,7 @@ use crate::scene::{BodyId, LightKind, PatchId, Scene};
 use crate::transport::Shaft;
 
 use super::judge::{BoxShaft, LightPlace, body_of};
-use super::margin::Shift;
+use super::margin::{Growth, Shift};
 use super::update::Stale;
 
 /// How much of a node of the forest's fixed part has moved, appeared or vanished.
@@ -105,12 +105,11 @@ impl<'a> Since<'a> {
         }
     }
 
-    /// By how much the errors of a pair at or below the coarse level grew, at least and at most, in
-    /// the steps of [`Margin`](super::margin::Margin).
-    pub(super) fn growth(&self, forest: &Forest, a: ElementId, b: ElementId) -> (i32, i32) {
+    /// By how much the errors of a pair at or below the coarse level grew.
+    pub(super) fn growth(&self, forest: &Forest, a: ElementId, b: ElementId) -> Growth {
         let shift =
             |id| forest.coarse(id).and_then(|number| self.dimmed[number]).unwrap_or_default();
-        Shift::of_pair(&shift(a), &shift(b))
+        Growth::of_pair(&shift(a), &shift(b))
     }
 
     /// Whether the ends of a pair moved against each other.

@@ -430,21 +430,19 @@ impl PairTree {
     pub(super) fn margin(&self, id: PairId) -> Margin {
         let node = &self.nodes[id.0 as usize];
         match node.state() {
-            State::Active => Margin::unpacked((node.payload[1] >> 16) as u16, Margin::ENDLESS),
-            State::Refined(_) => {
-                let both = node.payload[2];
-                Margin::unpacked(both as u16, (both >> 16) as u16)
-            }
-            _ => Margin::FIRM,
+            State::Active => Margin::of_link((node.payload[1] >> 16) as u16),
+            State::Refined(_) => Margin::of_refined(node.payload[2]),
+            _ => Margin::Firm,
         }
     }
 
     pub(super) fn set_margin(&mut self, id: PairId, margin: Margin) {
         let node = &mut self.nodes[id.0 as usize];
-        let (error, side) = (u32::from(margin.packed()), u32::from(margin.side));
         match node.state() {
-            State::Active => node.payload[1] = error << 16 | node.payload[1] & 0xffff,
-            State::Refined(_) => node.payload[2] = side << 16 | error,
+            State::Active => {
+                node.payload[1] = margin.packed() << 16 | node.payload[1] & 0xffff;
+            }
+            State::Refined(_) => node.payload[2] = margin.packed(),
             _ => {}
         }
     }
@@ -571,7 +569,7 @@ mod tests {
         let carried = Carried { exchange_area_m2: 0.123, visibility: 65_535, gradients };
         let mut tree = PairTree::new(ElementId(0));
         tree.set_state(PairTree::ROOT, State::Active);
-        let margin = Margin { error: 1234, side: Margin::ENDLESS, both_ways: true };
+        let margin = Margin::Link { on: [1230, Margin::ENDLESS], both_ways: true };
         tree.set_margin(PairTree::ROOT, margin);
         tree.set_carried(PairTree::ROOT, &carried);
         assert_eq!(tree.link(PairTree::ROOT).unwrap().carried, carried);

@@ -95,15 +95,9 @@ pub trait Judge: Hierarchy + Sync {
         narrowed: &mut Vec<u32>,
     ) -> Judgement;
 
-    /// What is left of the margin of a link (or of a refined pair) after the changes of brightness
-    /// since the last update, if its verdict withstands them.
-    fn withstands(
-        &self,
-        a: ElementId,
-        b: ElementId,
-        is_link: bool,
-        margin: Margin,
-    ) -> Option<Margin>;
+    /// What is left of the margin of a pair after the changes of brightness since the last update, if
+    /// its verdict withstands them.
+    fn withstands(&self, a: ElementId, b: ElementId, margin: Margin) -> Option<Margin>;
 
     /// What may have changed of a pair since the last update. Of a pair that is `certified` (and not
     /// culled) nothing stands between its ends, or what does is as it was.
@@ -463,11 +457,10 @@ fn look_at<J: Judge>(
         false if due => Stale::Due,
         false => judge.stale(a, b, certified || item.list == List::CLEAR),
     };
-    if stale == Stale::Brightness {
-        let is_link = state == State::Active;
-        if let Some(left) = judge.withstands(a, b, is_link, tree.margin(item.pair)) {
-            return Look::Withstands(left);
-        }
+    if stale == Stale::Brightness
+        && let Some(left) = judge.withstands(a, b, tree.margin(item.pair))
+    {
+        return Look::Withstands(left);
     }
     let start = narrowed.len();
     match stale {
@@ -488,7 +481,7 @@ fn look_at<J: Judge>(
     {
         // Which side is better matters little; making everything below anew costs much.
         found.verdict = Verdict::Refine(side);
-        found.margin.side = Margin::ENDLESS;
+        found.margin = found.margin.on_this_side();
     }
     let refined = matches!(found.verdict, Verdict::Refine(_) | Verdict::RefineSelf);
     let may_be_clear = match refined {
@@ -522,9 +515,8 @@ fn extrapolate<J: Judge>(
     ahead: &Lookahead,
 ) -> Option<Look> {
     let (a, b) = tree.ends(pair);
-    let is_link = tree.state(pair) == State::Active;
     let margin = match judge.dimmed(a, b) {
-        true => Some(judge.withstands(a, b, is_link, tree.margin(pair))?),
+        true => Some(judge.withstands(a, b, tree.margin(pair))?),
         false => None,
     };
     match tree.link(pair) {
@@ -623,7 +615,7 @@ impl<J: Judge> Editor<'_, J> {
         let sample = Sample {
             exchange_area_m2: found.carried.exchange_area_m2,
             visibility: found.carried.visibility,
-            margin: match found.margin.error {
+            margin: match found.margin.error() {
                 Margin::ENDLESS => Sample::FIRM,
                 margin => margin,
             },

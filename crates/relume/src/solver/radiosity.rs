@@ -33,7 +33,7 @@ pub enum Stop {
     Residual(f64),
 }
 
-/// The solution: 84 bytes an element.
+/// The solution: 80 bytes an element.
 #[derive(Clone, Debug, Default)]
 pub struct Radiosity {
     /// Gradients are per radius of the element.
@@ -43,8 +43,10 @@ pub struct Radiosity {
     /// By how much the irradiance of an element may have changed since it was gathered, W/m2.
     pending: Vec<f32>,
     /// By how much the radiosities at and below an element may be off, at most, for what was not pushed down
-    /// to them, W/m2: what is owed to itself, and the most that is owed below any of its children.
+    /// to them, W/m2: what is owed to itself, and the most that is owed below any of its children. Not kept where
+    /// the next solve will begin with everything.
     owed: Vec<f32>,
+    /// Kept instead.
     trend: Trend,
     /// Sweeps made by the last solve.
     pub sweeps: u32,
@@ -88,7 +90,9 @@ impl Radiosity {
         self.gathered.extend(len);
         if len > self.pending.len() {
             grow(&mut self.pending, len);
-            grow(&mut self.owed, len);
+            if !self.trend.is_wide {
+                grow(&mut self.owed, len);
+            }
         }
         self.trend.extend(len);
     }
@@ -98,7 +102,8 @@ impl Radiosity {
         self.radiosity.renumber(to);
         self.gathered.renumber(to);
         self.trend.renumber(to);
-        for values in [&mut self.pending, &mut self.owed] {
+        let kept = [&mut self.pending, &mut self.owed].into_iter().filter(|v| !v.is_empty());
+        for values in kept {
             *values = to.old_of().iter().map(|&old| values[old as usize]).collect();
         }
     }
@@ -128,7 +133,9 @@ impl Radiosity {
             let gradient = from.gradient.map(|g| g.map(|v| v * scale));
             self.radiosity.set(child, &Linear { mean: from.at(x, y), gradient });
             self.gathered.set(child, &Linear::default());
-            self.owed[child as usize] = 0.0;
+            if let Some(owed) = self.owed.get_mut(child as usize) {
+                *owed = 0.0;
+            }
             self.trend.inherit(parent, child);
         }
     }
@@ -160,6 +167,7 @@ impl Radiosity {
         let mut limit = limit_of(last_mean);
         let start = (to_residual && self.trend.is_wide).then(|| {
             work.start_all(surfaces);
+            grow(&mut self.owed, self.pending.len());
             self.trend.follow(&mut self.radiosity)
         });
         let mut is_wide = work.all && !is_first;
@@ -216,6 +224,9 @@ impl Radiosity {
         match start {
             Some(start) => self.trend.learn(&start, &self.radiosity, limit),
             None => self.trend.is_wide = is_wide,
+        }
+        if self.trend.is_wide {
+            self.owed = Vec::new();
         }
     }
 

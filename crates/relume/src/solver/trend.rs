@@ -55,7 +55,7 @@ impl Trend {
             *step = Step::of(change);
         }
         self.share = if last > 0.0 { (along / last).clamp(0.0, 1.0) as f32 } else { 1.0 };
-        if wide < start.0.len() / WIDE {
+        if wide * WIDE < start.0.len() {
             *self = Trend::default();
         }
     }

@@ -135,8 +135,8 @@ impl Hierarchy for FlatPlaced<'_> {
 impl Judge for FlatPlaced<'_> {
     fn judge(
         &self,
-        a: ElementId,
-        b: ElementId,
+        (a, b): (ElementId, ElementId),
+        _: Option<&Carried>,
         candidates: &[u32],
         narrowed: &mut Vec<u32>,
     ) -> Judgement {

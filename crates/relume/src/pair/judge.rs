@@ -82,13 +82,15 @@ impl Hierarchy for Placed<'_> {
 impl Judge for Placed<'_> {
     fn judge(
         &self,
-        a: ElementId,
-        b: ElementId,
+        (a, b): (ElementId, ElementId),
+        known: Option<&Carried>,
         candidates: &[u32],
         narrowed: &mut Vec<u32>,
     ) -> Judgement {
         match (self.forest.kind(a), self.forest.kind(b)) {
-            (Kind::Element, Kind::Element) => self.judge_elements(a, b, candidates, narrowed),
+            (Kind::Element, Kind::Element) => {
+                self.judge_elements((a, b), known, candidates, narrowed)
+            }
             (Kind::Element, Kind::Light) => self.judge_light(b, a, Side::A, candidates, narrowed),
             (Kind::Light, Kind::Element) => self.judge_light(a, b, Side::B, candidates, narrowed),
             (Kind::Light, Kind::Light) => culled(CullReason::NoReceiver),
@@ -254,8 +256,8 @@ impl Placed<'_> {
 
     fn judge_elements(
         &self,
-        a: ElementId,
-        b: ElementId,
+        (a, b): (ElementId, ElementId),
+        known: Option<&Carried>,
         candidates: &[u32],
         narrowed: &mut Vec<u32>,
     ) -> Judgement {
@@ -276,7 +278,7 @@ impl Placed<'_> {
         if self.is_above_coarse(a, b) {
             return passing(Verdict::Refine(self.larger_above_coarse(a, b)), 0);
         }
-        self.decide((a, b), (&places.own.0, &places.own.1), met, &shaft, candidates)
+        self.decide((a, b), known, (&places.own.0, &places.own.1), met, &shaft, candidates)
     }
 
     fn shaft<'a>(
@@ -300,6 +302,7 @@ impl Placed<'_> {
     fn decide(
         &self,
         (a, b): (ElementId, ElementId),
+        known: Option<&Carried>,
         (place_a, place_b): (&WorldElement, &WorldElement),
         met: Meeting,
         shaft: &Shaft<'_>,
@@ -373,6 +376,9 @@ impl Placed<'_> {
             None => way,
         };
         let margin = Margin::Link { on: e.on.map(below), both_ways };
+        if let Some(&carried) = known {
+            return Judgement { verdict: Verdict::Link, carried, margin, segments: v.segments };
+        }
         let v = match &mut clipped {
             Some(clipped) => look_closer(v, clipped, stake * doubt),
             None if v.segments == 0 => v,

@@ -86,11 +86,12 @@ pub trait Hierarchy {
 pub trait Judge: Hierarchy + Sync {
     /// Judges a pair. `candidates` are the possible occluders of the pair above; those of this
     /// pair are appended to `narrowed`, whose present content belongs to other pairs. A pure
-    /// function of the space: `candidates` only say where to look.
+    /// function of the space: `candidates` only say where to look, and `known` is what the pair carries if
+    /// it is a link, of one on which nothing but the light changed.
     fn judge(
         &self,
-        a: ElementId,
-        b: ElementId,
+        ends: (ElementId, ElementId),
+        known: Option<&Carried>,
         candidates: &[u32],
         narrowed: &mut Vec<u32>,
     ) -> Judgement;
@@ -475,7 +476,11 @@ fn look_at<J: Judge>(
         _ => {}
     }
     let candidates = if stale == Stale::Followed { &[] } else { item.list.of(candidates) };
-    let mut found = judge.judge(a, b, candidates, narrowed);
+    // What is extrapolated is not what an evaluation would find.
+    let lit_anew = stale == Stale::Brightness && judge.lookahead().is_none();
+    let link = if lit_anew { tree.link(item.pair) } else { None };
+    let known = link.as_ref().map(|link| &link.carried);
+    let mut found = judge.judge((a, b), known, candidates, narrowed);
     if let (Some(_), State::Refined(side), Verdict::Refine(_)) =
         (judge.lookahead(), state, found.verdict)
     {

@@ -31,7 +31,7 @@ pub(super) struct Start(Vec<[f32; 3]>);
 impl Trend {
     /// Goes on as before, from `field`; returns where that was.
     pub(super) fn follow(&self, field: &mut Field) -> Start {
-        let start = Start(means(field).map(|mean| *mean).collect());
+        let start = Start(means(field).copied().collect());
         if self.share > 0.0 {
             for (mean, step) in means_mut(field).zip(&self.steps) {
                 let change = step.value();

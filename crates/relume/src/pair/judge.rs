@@ -376,7 +376,8 @@ impl Placed<'_> {
             None => way,
         };
         let margin = Margin::Link { on: e.on.map(below), both_ways };
-        if let Some(&carried) = known {
+        // How V is found may depend on the light.
+        if let Some(&carried) = known.filter(|_| !both_ways) {
             return Judgement { verdict: Verdict::Link, carried, margin, segments: v.segments };
         }
         let v = match &mut clipped {

@@ -86,8 +86,8 @@ pub trait Hierarchy {
 pub trait Judge: Hierarchy + Sync {
     /// Judges a pair. `candidates` are the possible occluders of the pair above; those of this
     /// pair are appended to `narrowed`, whose present content belongs to other pairs. A pure
-    /// function of the space: `candidates` only say where to look, and `known` is what the pair carries if
-    /// it is a link, of one on which nothing but the light changed.
+    /// function of the space: `candidates` only say where to look, and `known` is what a link carries on
+    /// which nothing but the light changed.
     fn judge(
         &self,
         ends: (ElementId, ElementId),

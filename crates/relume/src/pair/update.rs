@@ -400,15 +400,15 @@ enum Look {
     Certified,
     /// Nothing has changed here or below, nor can it until then.
     Unaffected(Tick),
-    /// Look at the children.
-    Descend,
+    /// Look at the children; with a certificate, unless the pair keeps the one it has, as below.
+    Descend(Option<Tick>),
     /// Look at the children, with these candidates.
     Narrowed(List),
     /// The light changed, the verdict did not; look at the children.
-    Withstands(Margin),
+    Withstands(Margin, Option<Tick>),
     /// A link, extrapolated.
     Extrapolated(Carried, Option<Margin>),
-    /// Judged, with the candidates of its children and a certificate, unless the one it has stays.
+    /// Judged, with the candidates of its children and a certificate.
     Judged(Judgement, Stale, List, Option<Tick>),
 }
 
@@ -458,16 +458,17 @@ fn look_at<J: Judge>(
         false if due => Stale::Due,
         false => judge.stale(a, b, certified || item.list == List::CLEAR),
     };
+    // Of a pair whose ends are at rest with nothing new between them.
+    let unaffected = || (!certified).then(|| judge.foresee(a, b, Finding::Unaffected));
     if stale == Stale::Brightness
         && let Some(left) = judge.withstands(a, b, tree.margin(item.pair))
     {
-        return Look::Withstands(left);
+        return Look::Withstands(left, unaffected());
     }
     let start = narrowed.len();
     match stale {
-        Stale::Nothing if certified => return Look::Certified,
-        Stale::Nothing => return Look::Unaffected(judge.foresee(a, b, Finding::Unaffected)),
-        Stale::Below => return Look::Descend,
+        Stale::Nothing => return unaffected().map_or(Look::Certified, Look::Unaffected),
+        Stale::Below => return Look::Descend(unaffected()),
         Stale::Occlusion
             if state.is_refined() && judge.narrow(a, b, item.list.of(candidates), narrowed) =>
         {
@@ -501,6 +502,7 @@ fn look_at<J: Judge>(
         (_, Stale::Followed) => None,
         // It is met again, perhaps still in the state that it had.
         (Verdict::Hold, _) => Some(0),
+        (_, Stale::Brightness) => unaffected(),
         (_, Stale::Moved) if may_be_clear && !candidates.is_empty() => {
             Some(judge.foresee(a, b, Finding::Clear))
         }
@@ -530,7 +532,10 @@ fn extrapolate<J: Judge>(
             let carried = Carried { exchange_area_m2, visibility, ..link.carried };
             Some(Look::Extrapolated(carried, margin))
         }
-        None => Some(margin.map_or(Look::Descend, Look::Withstands)),
+        None => Some(match margin {
+            Some(margin) => Look::Withstands(margin, None),
+            None => Look::Descend(None),
+        }),
     }
 }
 
@@ -554,7 +559,8 @@ impl<J: Judge> Editor<'_, J> {
             match look {
                 Look::Certified => self.changes.work.certified += 1,
                 Look::Unaffected(due) => self.tree.set_due(item.pair, *due),
-                Look::Descend => {
+                Look::Descend(due) => {
+                    self.certify(item.pair, *due);
                     let children = self.tree.children(item.pair);
                     self.look_at(children, item.list, &wave.candidates);
                 }
@@ -562,7 +568,8 @@ impl<J: Judge> Editor<'_, J> {
                     let children = self.tree.children(item.pair);
                     self.look_at(children, *list, &chunk.candidates);
                 }
-                Look::Withstands(margin) => {
+                Look::Withstands(margin, due) => {
+                    self.certify(item.pair, *due);
                     self.tree.set_margin(item.pair, *margin);
                     let children = self.tree.children(item.pair);
                     self.look_at(children, item.list, &wave.candidates);
@@ -579,12 +586,16 @@ impl<J: Judge> Editor<'_, J> {
                     self.count(found, *stale);
                     self.remember(item.pair, found, *stale);
                     let children = self.apply(item.pair, found, *stale);
-                    if let Some(due) = due {
-                        self.tree.set_due(item.pair, *due);
-                    }
+                    self.certify(item.pair, *due);
                     self.look_at(children, *list, &chunk.candidates);
                 }
             }
+        }
+    }
+
+    fn certify(&mut self, pair: PairId, due: Option<Tick>) {
+        if let Some(due) = due {
+            self.tree.set_due(pair, due);
         }
     }
 

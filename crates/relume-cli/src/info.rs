@@ -91,10 +91,13 @@ fn bodies(out: &mut String, scene: &Scene) -> fmt::Result {
 fn materials(out: &mut String, scene: &Scene) -> fmt::Result {
     writeln!(out, "\nmaterials (reflectance; exitance in W/m2; linear RGB)")?;
     for material in &scene.materials {
-        let Material { name, reflectance, exitance, double_sided } = material;
+        let Material { name, reflectance, exitance, glow, double_sided } = material;
         write!(out, "  {name:<24} {}", triple(*reflectance))?;
-        if exitance.iter().any(|m| *m > 0.0) {
+        if material.emits() {
             write!(out, "  emits {}", triple(*exitance))?;
+        }
+        if glow.is_some() {
+            write!(out, " at first, up to {}", triple(material.most_exitance()))?;
         }
         writeln!(out, "{}", if *double_sided { "  both sides" } else { "" })?;
     }
@@ -106,8 +109,9 @@ fn emitters(out: &mut String, scene: &Scene) -> fmt::Result {
     writeln!(out, "\nemitters (flux in W; linear RGB, and the sum)")?;
     let mut none = scene.lights.is_empty();
     for (index, surface) in scene.surfaces.iter().enumerate() {
-        let exitance = scene.materials[surface.material.0 as usize].exitance;
-        if exitance.iter().all(|m| *m <= 0.0) {
+        let material = &scene.materials[surface.material.0 as usize];
+        let exitance = material.exitance;
+        if !material.emits() {
             continue;
         }
         none = false;

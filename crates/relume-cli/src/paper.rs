@@ -133,9 +133,7 @@ fn flags((width, height): (u32, u32)) -> PictureFlags {
 
 /// The bodies that emit.
 fn lamps(scene: &Scene) -> BTreeSet<BodyId> {
-    let emits = |patch: &&relume::scene::Patch| {
-        scene.materials[patch.material.0 as usize].exitance.iter().any(|&m| m > 0.0)
-    };
+    let emits = |patch: &&relume::scene::Patch| scene.materials[patch.material.0 as usize].emits();
     scene.patches.iter().filter(emits).map(|patch| patch.body).collect()
 }
 

@@ -4,12 +4,13 @@
 //! in one step each. Whatever ends a run, the directory holds finished frames and a report of
 //! exactly those.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use relume::scene::{BodyId, Scene};
+use relume::scene::{BodyId, MaterialId, Scene};
 use relume::session::{Options, Session, SessionError, Snapshot};
 use relume_picture::export::{probe, write_atomically, write_glb};
 use relume_picture::picture::{self, Exposure, Viewpoint};
@@ -439,17 +440,22 @@ impl Run<'_> {
 /// Cost: one pose for each emitting body and frame, until one is found.
 fn first_lit_frame(scene: &Scene, fps: f64) -> Option<u32> {
     let count = frames::frame_count(scene.motion.duration_s, fps).ok()?;
-    let emits = |body: &BodyId| {
-        scene.patches_of(*body).any(|(_, patch)| {
-            scene.materials[patch.material.0 as usize].exitance.iter().any(|m| *m > 0.0)
-        })
-    };
-    let bodies: Vec<BodyId> =
-        (0..scene.bodies.len() as u32).map(BodyId).filter(|body| emits(body)).collect();
+    let material = |id: MaterialId| &scene.materials[id.0 as usize];
+    let lamps: BTreeSet<(BodyId, MaterialId)> = scene
+        .patches
+        .iter()
+        .map(|p| (p.body, p.material))
+        .filter(|(_, m)| material(*m).emits())
+        .collect();
+    let some = |emission: [f64; 3]| emission.iter().any(|&m| m > 0.0);
     (0..count).find(|&frame| {
         let time_s = frames::time_of(frame, fps);
-        bodies.iter().any(|body| scene.pose(*body, time_s).is_some())
-            || scene.lights.iter().any(|l| scene.motion.pose(l.node, time_s).is_some())
+        lamps.iter().any(|&(body, of)| {
+            some(material(of).exitance_at(time_s)) && scene.pose(body, time_s).is_some()
+        }) || scene
+            .lights
+            .iter()
+            .any(|l| some(l.intensity_at(time_s)) && scene.motion.pose(l.node, time_s).is_some())
     })
 }
 

@@ -12,8 +12,8 @@ use std::path::Path;
 use glam::{DMat3, DQuat, DVec3};
 use relume::geometry::Pose;
 use relume::scene::{
-    BodyId, Interpolation, Light, LightKind, Material, Node, NodeId, Patch, Projection, Scene,
-    SurfaceId,
+    BodyId, Glow, Interpolation, Light, LightKind, Material, Node, NodeId, Patch, Projection,
+    Scene, SurfaceId, Track,
 };
 use serde_json::{Map, Value, json};
 
@@ -312,12 +312,25 @@ impl<'a> Writer<'a> {
     /// All tracks as one animation.
     fn animation(&mut self) {
         let (mut samplers, mut channels) = (Vec::new(), Vec::new());
-        let mut channel = |node: usize, path: &str, input, output, interpolation: &str| {
-            channels.push(json!({
-                "sampler": samplers.len(), "target": { "node": node, "path": path }
-            }));
+        let mut of = |target: Value, input, output, interpolation: &str| {
+            channels.push(json!({ "sampler": samplers.len(), "target": target }));
             samplers
                 .push(json!({ "input": input, "output": output, "interpolation": interpolation }));
+        };
+        for (pointer, track, is_colour) in self.glows() {
+            let input = self.times(&track.times_s);
+            let values: Vec<[f32; 3]> =
+                track.values.iter().map(|v| v.as_vec3().to_array()).collect();
+            let output = match is_colour {
+                true => self.vec3_accessor(&values, None, false),
+                false => self.scalars(values.into_iter().map(|[v, ..]| v)),
+            };
+            let extensions = json!({ "KHR_animation_pointer": { "pointer": pointer } });
+            let target = json!({ "path": "pointer", "extensions": extensions });
+            of(target, input, output, name(track.interpolation));
+        }
+        let mut channel = |node: usize, path: &str, input, output, interpolation: &str| {
+            of(json!({ "node": node, "path": path }), input, output, interpolation);
         };
         for (index, node) in self.scene.motion.nodes.iter().enumerate() {
             if let Some(track) = &node.translation_track {
@@ -352,6 +365,34 @@ impl<'a> Writer<'a> {
         }
     }
 
+    /// Tracks of emissions with their pointers, and whether they are colours.
+    fn glows(&self) -> Vec<(String, Track, bool)> {
+        let mut out = Vec::new();
+        let mut add = |lamp: Lamp, [colour, strength]: [String; 2]| {
+            out.extend(lamp.colour_track.map(|track| (colour, track, true)));
+            out.extend(lamp.strength_track.map(|track| (strength, track, false)));
+        };
+        for (k, material) in self.scene.materials.iter().enumerate() {
+            let at = format!("/materials/{k}");
+            let strength =
+                format!("{at}/extensions/KHR_materials_emissive_strength/emissiveStrength");
+            add(Lamp::of_material(material), [format!("{at}/emissiveFactor"), strength]);
+        }
+        for (k, light) in self.scene.lights.iter().enumerate() {
+            let at = format!("/extensions/KHR_lights_punctual/lights/{k}");
+            add(Lamp::of_light(light), [format!("{at}/color"), format!("{at}/intensity")]);
+        }
+        out
+    }
+
+    fn scalars(&mut self, values: impl ExactSizeIterator<Item = f32>) -> usize {
+        let count = values.len();
+        let view = self.view(values.flat_map(f32::to_le_bytes), None);
+        self.accessor(json!({
+            "bufferView": view, "componentType": FLOAT, "count": count, "type": "SCALAR"
+        }))
+    }
+
     fn times(&mut self, times_s: &[f64]) -> usize {
         let times: Vec<f32> = times_s.iter().map(|t| *t as f32).collect();
         let view = self.view(times.iter().flat_map(|t| t.to_le_bytes()), None);
@@ -371,6 +412,9 @@ impl<'a> Writer<'a> {
         let mut used = Vec::new();
         if materials.iter().any(|m| m.get("extensions").is_some()) {
             used.push("KHR_materials_emissive_strength");
+        }
+        if !self.glows().is_empty() {
+            used.push("KHR_animation_pointer");
         }
         let mut document = Map::new();
         document.insert(
@@ -431,11 +475,11 @@ fn material(material: &Material) -> Value {
             "baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.0, "roughnessFactor": 1.0
         }
     });
-    let (factor, strength) = colour_and_strength(material.exitance.map(|m| m / PI));
-    if strength > 0.0 {
-        value["emissiveFactor"] = json!(factor);
+    let Lamp { colour, strength, strength_track, .. } = Lamp::of_material(material);
+    if material.emits() {
+        value["emissiveFactor"] = json!(colour);
     }
-    if strength > 1.0 {
+    if strength > 1.0 || strength_track.is_some() {
         value["extensions"] =
             json!({ "KHR_materials_emissive_strength": { "emissiveStrength": strength } });
     }
@@ -443,6 +487,47 @@ fn material(material: &Material) -> Value {
         value["doubleSided"] = json!(true);
     }
     value
+}
+
+/// An emission as glTF states it: a colour in [0, 1] times a strength.
+struct Lamp {
+    colour: [f64; 3],
+    strength: f64,
+    colour_track: Option<Track>,
+    strength_track: Option<Track>,
+}
+
+impl Lamp {
+    fn of_material(material: &Material) -> Lamp {
+        Lamp::new(material.exitance, material.glow.as_ref(), 1.0 / PI)
+    }
+
+    fn of_light(light: &Light) -> Lamp {
+        Lamp::new(light.intensity, light.glow.as_ref(), LUMENS_PER_WATT)
+    }
+
+    /// Of an emission in a unit that is `per_unit` of the file's.
+    fn new(value: [f64; 3], glow: Option<&Glow>, per_unit: f64) -> Lamp {
+        let Some(Glow { scale, tracks }) = glow else {
+            let (colour, strength) = colour_and_strength(value.map(|v| v * per_unit));
+            return Lamp { colour, strength, colour_track: None, strength_track: None };
+        };
+        // Of several tracks the first is the colour, and the others are strengths of all channels.
+        let scale = DVec3::from_array(*scale) * per_unit;
+        let [colour, strengths @ ..] = tracks.as_slice() else { unreachable!("a glow has tracks") };
+        let times = |track: &Track, by: DVec3| {
+            let values = track.values.iter().map(|&v| v * by).collect();
+            Track { values, ..track.clone() }
+        };
+        let whole = times(colour, scale);
+        let largest = whole.values.iter().fold(0.0_f64, |most, v| most.max(v.max_element()));
+        let most = if strengths.is_empty() { largest.max(1.0) } else { largest };
+        let colour_track = times(&whole, DVec3::splat(1.0 / most.max(f64::MIN_POSITIVE)));
+        let strength_track = strengths.first().map(|track| times(track, DVec3::splat(most)));
+        let strength = strength_track.as_ref().map_or(most, |track| track.at(0.0).x);
+        let colour = colour_track.at(0.0).to_array();
+        Lamp { colour, strength, colour_track: Some(colour_track), strength_track }
+    }
 }
 
 /// `value = factor * strength` with each factor in [0, 1]; strength 1 where that is possible.
@@ -461,11 +546,8 @@ fn colour_and_strength(value: [f64; 3]) -> ([f64; 3], f64) {
 const LUMENS_PER_WATT: f64 = 683.0;
 
 fn punctual(light: &Light) -> Value {
-    let largest = light.intensity.into_iter().fold(0.0, f64::max);
-    let colour = if largest > 0.0 { light.intensity.map(|i| i / largest) } else { [1.0; 3] };
-    let mut value = json!({
-        "name": light.name, "color": colour, "intensity": largest * LUMENS_PER_WATT
-    });
+    let Lamp { colour, strength, .. } = Lamp::of_light(light);
+    let mut value = json!({ "name": light.name, "color": colour, "intensity": strength });
     match light.kind {
         LightKind::Point => value["type"] = json!("point"),
         LightKind::Directional => value["type"] = json!("directional"),

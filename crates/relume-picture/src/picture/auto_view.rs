@@ -251,7 +251,7 @@ impl<'a> Stage<'a> {
     }
 
     fn emits(&self, patch: &Patch) -> bool {
-        self.scene.materials[patch.material.0 as usize].exitance.iter().any(|&m| m > 0.0)
+        self.scene.materials[patch.material.0 as usize].emits()
     }
 
     fn score(&self, view: &View) -> f64 {

@@ -69,6 +69,7 @@ pub(crate) fn camera(
 pub(crate) fn material(scene: &mut Scene, reflectance: [f64; 3], exitance: f64) -> MaterialId {
     let id = MaterialId(scene.materials.len() as u32);
     scene.materials.push(Material {
+        glow: None,
         name: format!("material {}", id.0),
         reflectance,
         exitance: [exitance; 3],

@@ -39,7 +39,11 @@ impl Brightness {
             reflected: coarsen(l.reflected),
             irradiance: coarsen(l.irradiance),
         };
-        Brightness { coarse: coarse.into_iter().map(step).collect(), lights, reference_area_m2 }
+        Brightness {
+            coarse: coarse.into_iter().map(step).collect(),
+            lights: lights.into_iter().map(coarsen).collect(),
+            reference_area_m2,
+        }
     }
 
     /// The light of an element or punctual light.
@@ -52,10 +56,15 @@ impl Brightness {
         forest.coarse(id).map_or(Light::UNIFORM, |c| self.coarse[c])
     }
 
-    /// How the light of each coarse element, by number, changed since `before`, if it did.
-    pub fn shifts(&self, before: &Brightness) -> Vec<Option<Shift>> {
-        let pairs = before.coarse.iter().zip(&self.coarse);
-        pairs.map(|(before, after)| Shift::between(before, after)).collect()
+    /// How the light of each coarse element, by number, and each punctual light changed since `before`, if
+    /// it did.
+    pub fn shifts(&self, before: &Brightness) -> (Vec<Option<Shift>>, Vec<Option<Shift>>) {
+        let elements = before.coarse.iter().zip(&self.coarse);
+        let lights = before.lights.iter().zip(&self.lights);
+        (
+            elements.map(|(before, after)| Shift::between(before, after)).collect(),
+            lights.map(|(&before, &after)| Shift::of_light(before, after)).collect(),
+        )
     }
 
     /// Area at which an element weighs 1 in the error norm, m2.

@@ -228,20 +228,28 @@ impl Shift {
         if before == after {
             return None;
         }
-        let grown = |before: f64, after: f64| {
-            if before == after {
-                (0, 0)
-            } else if before <= 0.0 || after <= 0.0 {
-                (-ENDLESS, ENDLESS)
-            } else {
-                let steps = steps(after) - steps(before);
-                (steps, steps)
-            }
-        };
         let all = grown(before.radiosity, after.radiosity);
         let part = grown(before.reflected, after.reflected);
         let irradiance = grown(before.irradiance, after.irradiance);
         Some(Shift { radiosity: (all.0.min(part.0), all.1.max(part.1)), irradiance })
+    }
+
+    /// From one intensity of a punctual light to another; `None` if they are the same.
+    pub(super) fn of_light(before: f64, after: f64) -> Option<Shift> {
+        let radiosity = grown(before, after);
+        (before != after).then_some(Shift { radiosity, irradiance: (0, 0) })
+    }
+}
+
+/// At least and at most how many steps brighter something became.
+fn grown(before: f64, after: f64) -> (i32, i32) {
+    if before == after {
+        (0, 0)
+    } else if before <= 0.0 || after <= 0.0 {
+        (-ENDLESS, ENDLESS)
+    } else {
+        let steps = steps(after) - steps(before);
+        (steps, steps)
     }
 }
 

@@ -26,6 +26,8 @@ pub struct Since<'a> {
     movers: Vec<BodyId>,
     /// How the brightness of coarse elements changed, by number.
     dimmed: Vec<Option<Shift>>,
+    /// How punctual lights changed theirs.
+    lights: Vec<Option<Shift>>,
     /// Kept nodes above the coarse level with such an element below.
     dimmed_below: Vec<bool>,
 }
@@ -69,13 +71,29 @@ impl<'a> Since<'a> {
                 motion[id as usize] = if any { Motion::Some } else { Motion::Still };
             }
         }
-        Since { old, motion, movers, dimmed: Vec::new(), dimmed_below: Vec::new() }
+        Since {
+            old,
+            motion,
+            movers,
+            dimmed: Vec::new(),
+            lights: Vec::new(),
+            dimmed_below: Vec::new(),
+        }
     }
 
     /// Adds how coarse elements (by number) changed their brightness.
-    pub fn dim(&mut self, forest: &Forest, coarse: &[u32], dimmed: Vec<Option<Shift>>) {
+    pub fn dim(
+        &mut self,
+        forest: &Forest,
+        coarse: &[u32],
+        (dimmed, lights): (Vec<Option<Shift>>, Vec<Option<Shift>>),
+    ) {
         self.dimmed_below = vec![false; forest.kept_len() as usize];
-        for (&id, _) in coarse.iter().zip(&dimmed).filter(|(_, shift)| shift.is_some()) {
+        let elements = coarse.iter().zip(&dimmed).filter(|(_, shift)| shift.is_some());
+        let is_dimmed =
+            |id: &u32| forest.light(ElementId(*id)).is_some_and(|light| lights[light].is_some());
+        let below = elements.map(|(&id, _)| id).chain((0..forest.fixed_len()).filter(is_dimmed));
+        for id in below {
             let mut above = forest.parent(ElementId(id));
             while let Some(id) = above {
                 if std::mem::replace(&mut self.dimmed_below[id.0 as usize], true) {
@@ -84,7 +102,7 @@ impl<'a> Since<'a> {
                 above = forest.parent(id);
             }
         }
-        self.dimmed = dimmed;
+        (self.dimmed, self.lights) = (dimmed, lights);
     }
 
     /// What the changes of brightness mean to a pair.
@@ -92,9 +110,10 @@ impl<'a> Since<'a> {
         if self.dimmed.is_empty() {
             return Stale::Nothing;
         }
-        let dim = |id: ElementId| match forest.coarse(id) {
-            Some(number) => self.dimmed[number].is_some(),
-            None => self.dimmed_below[id.0 as usize],
+        let dim = |id: ElementId| match (forest.coarse(id), forest.light(id)) {
+            (Some(number), _) => self.dimmed[number].is_some(),
+            (None, Some(light)) => self.lights[light].is_some(),
+            (None, None) => self.dimmed_below[id.0 as usize],
         };
         // Above the coarse level no verdict depends on brightness.
         let low = |id| forest.coarse(id).is_some() || forest.kind(id) == Kind::Light;
@@ -107,8 +126,13 @@ impl<'a> Since<'a> {
 
     /// By how much the errors of a pair at or below the coarse level grew.
     pub(super) fn growth(&self, forest: &Forest, a: ElementId, b: ElementId) -> Growth {
-        let shift =
-            |id| forest.coarse(id).and_then(|number| self.dimmed[number]).unwrap_or_default();
+        let shift = |id| {
+            let of_light = || forest.light(id).and_then(|light| self.lights[light]);
+            forest
+                .coarse(id)
+                .map_or_else(of_light, |number| self.dimmed[number])
+                .unwrap_or_default()
+        };
         Growth::of_pair(&shift(a), &shift(b))
     }
 

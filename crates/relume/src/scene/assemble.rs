@@ -11,21 +11,23 @@ use glam::{DMat3, DVec2, DVec3};
 use super::draft::{Draft, DraftNode, DraftSurface};
 use super::flatten::{Flaw, flatten, seen_from_behind};
 use super::names::Names;
-use super::rigid::without_scales;
+use super::rigid::{check_track, without_scales};
 use super::{
-    Body, BodyId, Frame, Material, MaterialId, Motion, NodeId, Note, Patch, PatchId, Scene,
-    SceneError, Severity, Surface, SurfaceId,
+    Body, BodyId, Frame, Glow, Interpolation, Material, MaterialId, Motion, NodeId, Note, Patch,
+    PatchId, Scene, SceneError, Severity, Surface, SurfaceId,
 };
 use crate::geometry::Pose;
 
 /// Checks the draft and makes the scene of it.
 pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
     check_materials(&draft.materials)?;
+    check_glows(&draft)?;
+    start_glows(&mut draft);
     let mut notes = std::mem::take(&mut draft.notes);
     unique_names(&mut draft, &mut notes);
     let (nodes, residuals) = without_scales(&draft)?;
-    let motion =
-        Motion { duration_s: duration_s(&nodes), nodes, animation: draft.animation.clone() };
+    let duration_s = duration_s(&nodes, &draft);
+    let motion = Motion { duration_s, nodes, animation: draft.animation.clone() };
     notes.extend(misdirected(&draft, &residuals));
     let mut parts = Parts::default();
     for (node, members) in bodies_of(&draft, &motion) {
@@ -208,14 +210,53 @@ fn pose_in_body(motion: &Motion, node: usize) -> Pose {
 }
 
 /// The time of the last key.
-fn duration_s(nodes: &[super::Node]) -> f64 {
+fn duration_s(nodes: &[super::Node], draft: &Draft) -> f64 {
     let last = |n: &super::Node| {
         let translation = n.translation_track.as_ref().and_then(|t| t.times_s.last().copied());
         let rotation = n.rotation_track.as_ref().and_then(|t| t.times_s.last().copied());
         let presence = n.presence.last().map(|k| k.0);
         [translation, rotation, presence].into_iter().flatten().fold(0.0, f64::max)
     };
-    nodes.iter().map(last).fold(0.0, f64::max)
+    glows(draft).map(|(_, glow)| glow.end_s()).chain(nodes.iter().map(last)).fold(0.0, f64::max)
+}
+
+/// All emissions that change, with what they are of.
+fn glows(draft: &Draft) -> impl Iterator<Item = (String, &Glow)> {
+    let materials = draft.materials.iter().map(|m| (format!("material `{}`", m.name), &m.glow));
+    let lights = draft.lights.iter().map(|l| (format!("light `{}`", l.name), &l.glow));
+    materials.chain(lights).filter_map(|(of, glow)| Some((of, glow.as_ref()?)))
+}
+
+/// Keys in order, values finite and not negative.
+fn check_glows(draft: &Draft) -> Result<(), SceneError> {
+    for (of, glow) in glows(draft) {
+        let finite = glow.scale.iter().all(|s| s.is_finite() && *s >= 0.0);
+        for track in &glow.tracks {
+            check_track(&of, &track.times_s, track.values.len(), track.interpolation)?;
+            let cubic = track.interpolation == Interpolation::CubicSpline;
+            let is_good = |(k, v): (usize, &DVec3)| {
+                v.is_finite() && (v.min_element() >= 0.0 || (cubic && k % 3 != 1))
+            };
+            if let Some(bad) = (0..).zip(&track.values).find(|&key| !(finite && is_good(key))) {
+                return Err(SceneError::Animation {
+                    animation: of,
+                    what: format!("its emission has the value {}", bad.1),
+                    remedy: "choose finite values of 0 or more".into(),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What is stated without a time is stated of time 0.
+fn start_glows(draft: &mut Draft) {
+    for material in &mut draft.materials {
+        material.exitance = material.exitance_at(0.0);
+    }
+    for light in &mut draft.lights {
+        light.intensity = light.intensity_at(0.0);
+    }
 }
 
 /// Makes names unique within their kind.

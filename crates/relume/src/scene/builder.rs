@@ -9,7 +9,7 @@ use super::assemble::assemble;
 use super::draft::{Draft, DraftNode, DraftSurface};
 use super::flatten::{Flaw, flatten};
 use super::{
-    Camera, Light, LightKind, Material, MaterialId, NodeId, Projection, RotationTrack, Scene,
+    Camera, Glow, Light, LightKind, Material, MaterialId, NodeId, Projection, RotationTrack, Scene,
     SceneError, Track,
 };
 
@@ -52,6 +52,7 @@ impl SceneBuilder {
             name: name.to_owned(),
             reflectance,
             exitance,
+            glow: None,
             double_sided: false,
         })
     }
@@ -67,6 +68,7 @@ impl SceneBuilder {
             name: name.to_owned(),
             reflectance,
             exitance,
+            glow: None,
             double_sided: true,
         })
     }
@@ -114,6 +116,28 @@ impl SceneBuilder {
         self.change(node, |n| n.presence = keys);
     }
 
+    /// Animates the exitance of a material, W/m2, linear RGB.
+    pub fn animate_exitance(&mut self, material: MaterialId, track: Track) {
+        match self.draft.materials.get_mut(material.0 as usize) {
+            Some(m) => m.glow = Some(Glow { scale: [1.0; 3], tracks: vec![track] }),
+            None => self.fail(no_material(material, "an animation")),
+        }
+    }
+
+    /// Animates the intensity of the punctual lights of this name, in the unit that they have.
+    pub fn animate_intensity(&mut self, light: &str, track: Track) {
+        let glow = Glow { scale: [1.0; 3], tracks: vec![track] };
+        let mut named = self.draft.lights.iter_mut().filter(|l| l.name == light).peekable();
+        if named.peek().is_none() {
+            return self.fail(SceneError::Geometry {
+                subject: format!("light `{light}`"),
+                what: "it does not exist, but is to be animated".into(),
+                remedy: "add the light first".into(),
+            });
+        }
+        named.for_each(|l| l.glow = Some(glow.clone()));
+    }
+
     /// Adds a convex planar polygon, corners in the node's frame, counter-clockwise seen from its
     /// front. Polygons of one node, surface name and material form one surface.
     pub fn polygon(
@@ -131,11 +155,7 @@ impl SceneBuilder {
             });
         }
         if self.draft.materials.len() <= material.0 as usize {
-            self.fail(SceneError::Geometry {
-                subject: format!("surface `{surface_name}`"),
-                what: format!("material {} does not exist", material.0),
-                remedy: "use a material of the same builder".into(),
-            });
+            self.fail(no_material(material, &format!("surface `{surface_name}`")));
         }
         let polygon = corners.to_vec();
         self.change(node, |n| {
@@ -194,7 +214,8 @@ impl SceneBuilder {
             });
         }
         let conversion = "given in radiometric units, not converted".into();
-        self.draft.lights.push(Light { name: name.to_owned(), node, kind, intensity, conversion });
+        let name = name.to_owned();
+        self.draft.lights.push(Light { name, node, kind, intensity, glow: None, conversion });
     }
 
     /// Adds a camera that looks along the node's -Z, +Y up.
@@ -230,6 +251,14 @@ impl SceneBuilder {
 
     fn fail(&mut self, mistake: SceneError) {
         self.mistake.get_or_insert(mistake);
+    }
+}
+
+fn no_material(material: MaterialId, subject: &str) -> SceneError {
+    SceneError::Geometry {
+        subject: subject.to_owned(),
+        what: format!("material {} does not exist", material.0),
+        remedy: "use a material of the same builder".into(),
     }
 }
 

@@ -17,6 +17,7 @@ mod draft;
 mod drift;
 mod error;
 mod flatten;
+mod glow;
 mod import;
 mod inside;
 mod join;
@@ -32,6 +33,7 @@ pub use builder::SceneBuilder;
 pub use check::check;
 pub use drift::Drift;
 pub use error::SceneError;
+pub use glow::Glow;
 pub use import::{ImportOptions, import};
 pub use join::{Joined, Part};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
@@ -154,8 +156,10 @@ pub struct Material {
     pub name: String,
     /// Diffuse reflectance rho, each channel in [0, 1).
     pub reflectance: [f64; 3],
-    /// Exitance M = pi x emitted radiance, W/m2.
+    /// Exitance M = pi x emitted radiance, W/m2; at time 0 where it changes.
     pub exitance: [f64; 3],
+    /// How it changes, if it does.
+    pub glow: Option<Glow>,
     /// Whether both sides of its polygons reflect and emit.
     pub double_sided: bool,
 }
@@ -170,8 +174,10 @@ pub struct Light {
     /// What it is.
     pub kind: LightKind,
     /// Point and spot: radiant intensity, W/sr. Directional: irradiance at normal incidence, W/m2.
-    /// Linear RGB.
+    /// Linear RGB; at time 0 where it changes.
     pub intensity: [f64; 3],
+    /// How it changes, if it does.
+    pub glow: Option<Glow>,
     /// The statement of what the file said and how it was converted, for `info`.
     pub conversion: String,
 }
@@ -283,7 +289,9 @@ impl Scene {
     /// weighs the same.
     pub fn without_light(&self) -> Scene {
         let mut dark = Scene { lights: Vec::new(), ..self.clone() };
-        dark.materials.iter_mut().for_each(|material| material.exitance = [0.0; 3]);
+        for material in &mut dark.materials {
+            (material.exitance, material.glow) = ([0.0; 3], None);
+        }
         dark
     }
 

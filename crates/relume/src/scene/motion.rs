@@ -50,8 +50,8 @@ pub enum Interpolation {
     CubicSpline,
 }
 
-/// Keyframes of a translation.
-#[derive(Clone, Debug)]
+/// Keyframes of a translation, or of a colour (linear RGB).
+#[derive(Clone, Debug, PartialEq)]
 pub struct Track {
     /// Key times, seconds, strictly ascending.
     pub times_s: Vec<f64>,

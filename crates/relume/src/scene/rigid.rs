@@ -31,7 +31,7 @@ fn rigid_node(node: &DraftNode, above: DMat3) -> Result<Node, SceneError> {
     let mut translation = bend(finite(node, "translation", node.translation)?);
     let mut translation_track = None;
     if let Some(track) = &node.translation_track {
-        check_track(node, &track.times_s, track.values.len(), track.interpolation)?;
+        check_track(&node.name, &track.times_s, track.values.len(), track.interpolation)?;
         let values: Result<Vec<DVec3>, _> =
             track.values.iter().map(|&v| Ok(bend(finite(node, "translation", v)?))).collect();
         let track = Track {
@@ -125,7 +125,7 @@ fn constant<V: PartialEq + Copy>(
 
 /// A rotation track with unit values (tangents stay as they are).
 fn checked_rotation(node: &DraftNode, track: &RotationTrack) -> Result<RotationTrack, SceneError> {
-    check_track(node, &track.times_s, track.values.len(), track.interpolation)?;
+    check_track(&node.name, &track.times_s, track.values.len(), track.interpolation)?;
     let cubic = track.interpolation == Interpolation::CubicSpline;
     let value = |(i, &q): (usize, &DQuat)| match cubic && i % 3 != 1 {
         true if q.is_finite() => Ok(q),
@@ -145,13 +145,13 @@ fn checked_presence(node: &DraftNode) -> Result<Vec<(f64, bool)>, SceneError> {
     if node.presence.iter().all(|k| k.1) {
         return Ok(Vec::new());
     }
-    check_track(node, &times, times.len(), Interpolation::Step)?;
+    check_track(&node.name, &times, times.len(), Interpolation::Step)?;
     Ok(node.presence.clone())
 }
 
 /// Key times must be finite, not negative, strictly ascending, and match the values.
-fn check_track(
-    node: &DraftNode,
+pub(super) fn check_track(
+    of: &str,
     times_s: &[f64],
     values: usize,
     interpolation: Interpolation,
@@ -159,7 +159,7 @@ fn check_track(
     let a_key = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
     let fail = |what: String| {
         Err(SceneError::Animation {
-            animation: node.name.clone(),
+            animation: of.to_owned(),
             what,
             remedy: "export the animation again, one value for each of the ascending key times"
                 .into(),

@@ -7,7 +7,7 @@ use crate::event::Ticks;
 use crate::pair::{
     Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Record, Since, Stage, update,
 };
-use crate::scene::{BodyId, LightKind};
+use crate::scene::{self, BodyId, LightKind};
 use crate::solver::{Dirty, Links, Radiosity, Stop};
 
 use super::ahead::{Ahead, while_extrapolated};
@@ -22,6 +22,7 @@ impl Session {
         let bodies = (0..self.scene.bodies.len())
             .all(|b| last.view.poses()[b] == self.scene.pose(BodyId(b as u32), time_s));
         bodies
+            && !self.scene.is_relit([last.time_s, time_s])
             && self.scene.lights.iter().enumerate().all(|(k, light)| {
                 last.view.light(k) == WorldView::light_at(&self.scene, light, time_s).as_ref()
             })
@@ -41,6 +42,8 @@ impl Session {
         let mut solved = last.unwrap_or_else(|| self.blank(time_s));
         let view = WorldView::new(&self.scene, &solved.forest, time_s);
         let old = std::mem::replace(&mut solved.view, view);
+        let from_s = std::mem::replace(&mut solved.time_s, time_s);
+        let relit = cold || self.scene.is_relit([from_s, time_s]);
         let mut since =
             (!cold).then(|| Since::new(&self.scene, &solved.forest, &old, &solved.view));
         report.seconds.moving = clock.lap();
@@ -50,7 +53,7 @@ impl Session {
                 self.options.update,
                 &*self.scene,
                 (&mut solved.ticks, &mut solved.tree),
-                [solved.time_s, time_s],
+                [from_s, time_s],
                 old.far_m() != solved.view.far_m(),
             ),
         };
@@ -64,7 +67,7 @@ impl Session {
         };
         if !self.coarse_ids.is_empty() {
             changes = bring(&mut solved, since.as_ref(), Level::Coarse, &[])?;
-            self.follow_coarse(&mut solved, &changes, since.as_mut());
+            self.follow_coarse(&mut solved, &changes, (since.as_mut(), relit));
         }
         let fine = bring(&mut solved, since.as_ref(), Level::Fine, &changes.refined)?;
         changes.work.add_after_coarse(fine.work);
@@ -77,10 +80,19 @@ impl Session {
         let mut dirty = self.edit_links(&mut solved, &changes, cold, &mut report);
         if let Dirty::Some { parents, .. } = &mut dirty {
             parents.extend(self.came_or_went(&solved, &old));
+            if relit {
+                parents.extend(self.relit_facets(&solved, from_s));
+            }
+        }
+        if relit && self.lights_relit([from_s, time_s]) {
+            // Whoever gathers from a light gathers anew.
+            let lit = (&*self.scene, time_s);
+            coarse::set_lights(lit, &solved.forest, &mut solved.radiosity);
+            dirty = Dirty::All;
         }
         report.seconds.judge = clock.lap();
 
-        let lit = LitForest::new(&self.scene, &solved.forest).present_in(&solved.view);
+        let lit = LitForest::new(&self.scene, &solved.forest, time_s).present_in(&solved.view);
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
         let share = if cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE };
         let residual = self.options.tolerance * share;
@@ -88,10 +100,14 @@ impl Session {
             Some(_) => while_extrapolated(residual, solved.sound_mean_w_m2, self.most_mean_w_m2()),
             None => Stop::Residual(residual),
         };
-        let lamps = (0..self.scene.lights.len()).any(|k| solved.view.light(k).is_some());
+        let shines = |(k, light): (usize, &scene::Light)| {
+            solved.view.light(k).is_some() && light.intensity_at(time_s).iter().any(|&i| i > 0.0)
+        };
+        let lamps = self.scene.lights.iter().enumerate().any(shines);
         if lit.is_dark() && !lamps {
             // What is left of earlier light would fade for ever.
-            solved.radiosity = coarse::start(&self.scene, &solved.forest, &lit);
+            let none = (&*self.scene, time_s);
+            solved.radiosity = coarse::start(none, &solved.forest, &lit);
         } else {
             solved.radiosity.solve(&lit, &solved.links, dirty, stop);
         }
@@ -101,7 +117,6 @@ impl Session {
         }
         solved.compact();
 
-        solved.time_s = time_s;
         report.count(&work);
         tally::fill(&mut report, &solved);
         if self.options.balance {
@@ -124,7 +139,7 @@ impl Session {
         for patch in &scene.patches {
             let material = &scene.materials[patch.material.0 as usize];
             area_m2 += patch.area_m2();
-            emitted_w += patch.area_m2() * mean(material.exitance);
+            emitted_w += patch.area_m2() * mean(material.most_exitance());
             rho = material.reflectance.into_iter().fold(rho, f64::max);
         }
         for light in &scene.lights {
@@ -132,7 +147,7 @@ impl Session {
                 LightKind::Directional => area_m2,
                 LightKind::Point | LightKind::Spot { .. } => 4.0 * std::f64::consts::PI,
             };
-            emitted_w += mean(light.intensity) * spread;
+            emitted_w += mean(light.most_intensity()) * spread;
         }
         emitted_w / area_m2 / (1.0 - rho)
     }
@@ -186,17 +201,23 @@ impl Session {
         update(tree, &mut placed, &[Forest::ROOT.0], record_and_fresh, &may_go_on)
     }
 
-    /// Solves over the coarse pairs anew where any changed, and says which elements' brightness did.
-    fn follow_coarse(&self, solved: &mut Solved, changes: &Changes, since: Option<&mut Since<'_>>) {
+    /// Solves over the coarse pairs anew where any changed, or the emission did, and says which elements' brightness did.
+    fn follow_coarse(
+        &self,
+        solved: &mut Solved,
+        changes: &Changes,
+        (since, relit): (Option<&mut Since<'_>>, bool),
+    ) {
         let changed = solved.coarse.follow(&self.seed, changes);
-        if !changed && since.is_some() {
+        if !changed && !relit {
             return;
         }
         let before = std::mem::take(&mut solved.coarse.brightness);
-        solved.coarse.solve(&self.scene, &self.seed, &self.coarse_ids);
+        let lit = (&*self.scene, solved.time_s);
+        solved.coarse.solve(lit, &self.seed, &self.coarse_ids);
         if let Some(since) = since {
-            let shifts = solved.coarse.brightness.shifts(&before);
-            since.dim(&self.seed, &self.coarse_ids, shifts);
+            let (shifts, of_lights) = solved.coarse.brightness.shifts(&before);
+            since.dim(&self.seed, &self.coarse_ids, (shifts, of_lights));
         }
     }
 
@@ -220,7 +241,8 @@ impl Session {
             Some(receivers)
         };
         let split = solved.forest.take_changed();
-        let lit = LitForest::new(&self.scene, &solved.forest).present_in(&solved.view);
+        let lit = LitForest::new(&self.scene, &solved.forest, solved.time_s);
+        let lit = lit.present_in(&solved.view);
         if cold {
             solved.radiosity = self.first_guess(solved, &lit);
             return Dirty::All;
@@ -251,9 +273,26 @@ impl Session {
         forest.facets().iter().filter(toggled).map(|f| f.0).collect()
     }
 
+    /// Facets that emit otherwise than at `from_s`.
+    fn relit_facets(&self, solved: &Solved, from_s: f64) -> Vec<u32> {
+        let forest = &solved.forest;
+        let times = [from_s, solved.time_s];
+        let differs = |m: &scene::Material| m.exitance_at(times[0]) != m.exitance_at(times[1]);
+        let relit: Vec<bool> = self.scene.materials.iter().map(differs).collect();
+        let is_relit = |facet: &&ElementId| {
+            let patch = forest.patch(**facet).expect("a facet has a patch");
+            relit[self.scene.patches[patch.0 as usize].material.0 as usize]
+        };
+        forest.facets().iter().filter(is_relit).map(|f| f.0).collect()
+    }
+
+    fn lights_relit(&self, [from_s, to_s]: [f64; 2]) -> bool {
+        self.scene.lights.iter().any(|l| l.intensity_at(from_s) != l.intensity_at(to_s))
+    }
+
     /// The coarse solution, where there is one; else exitances.
     fn first_guess(&self, solved: &Solved, lit: &LitForest<'_>) -> Radiosity {
-        let mut out = coarse::start(&self.scene, &solved.forest, lit);
+        let mut out = coarse::start((&self.scene, solved.time_s), &solved.forest, lit);
         for id in 0..solved.forest.len() as u32 {
             if let Some(number) = solved.forest.coarse(ElementId(id)) {
                 out.set(id, solved.coarse.radiosity(self.coarse_ids[number]));

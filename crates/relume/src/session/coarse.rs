@@ -4,7 +4,7 @@
 
 use crate::element::{ElementId, Forest, Kind};
 use crate::pair::{self, Brightness, Changes, Light};
-use crate::scene::{PatchId, Scene};
+use crate::scene::{self, PatchId, Scene};
 use crate::solver::{Dirty, Links, Radiosity, Stop, Surfaces};
 
 use super::surfaces::{LitForest, set_pairs};
@@ -66,20 +66,20 @@ impl Coarse {
         !changes.dropped.is_empty() || !changes.held.is_empty()
     }
 
-    /// Solves over the coarse links; `coarse` are the coarse elements of `seed` by number.
-    pub(super) fn solve(&mut self, scene: &Scene, seed: &Forest, coarse: &[u32]) {
+    /// Solves over the coarse links as the scene emits at a time; `coarse` are the coarse elements of `seed` by number.
+    pub(super) fn solve(&mut self, (scene, time_s): (&Scene, f64), seed: &Forest, coarse: &[u32]) {
         for &id in coarse {
             self.links.sort(id);
         }
-        let surfaces = LitForest::new(scene, seed).with_places();
-        self.radiosity = start(scene, seed, &surfaces);
+        let surfaces = LitForest::new(scene, seed, time_s).with_places();
+        self.radiosity = start((scene, time_s), seed, &surfaces);
         self.radiosity.solve(&surfaces, &self.links, Dirty::All, Stop::Sweeps(SWEEPS));
-        self.brightness = self.measure(scene, seed, coarse, &surfaces);
+        self.brightness = self.measure((scene, time_s), seed, coarse, &surfaces);
     }
 
     fn measure(
         &self,
-        scene: &Scene,
+        (scene, time_s): (&Scene, f64),
         seed: &Forest,
         coarse: &[u32],
         surfaces: &LitForest<'_>,
@@ -95,7 +95,8 @@ impl Coarse {
         }
         let arriving: f64 =
             coarse.iter().zip(&irradiance).map(|(&id, h)| surfaces.area_m2(id) * h).sum();
-        let lights = scene.lights.iter().map(|l| l.intensity.iter().sum::<f64>() / 3.0).collect();
+        let intensity = |l: &scene::Light| l.intensity_at(time_s).iter().sum::<f64>() / 3.0;
+        let lights = scene.lights.iter().map(intensity).collect();
         let floor = arriving / total_area * DARK_FLOOR;
         let light_of = |(&id, irradiance): (&u32, &f64)| {
             let emitted = mean(surfaces.lit(surfaces.facet_of(id)).exitance);
@@ -124,12 +125,21 @@ impl Coarse {
 }
 
 /// A solution to begin with: exitances, and intensities of punctual lights.
-pub(super) fn start(scene: &Scene, forest: &Forest, surfaces: &LitForest<'_>) -> Radiosity {
+pub(super) fn start(lit: (&Scene, f64), forest: &Forest, surfaces: &LitForest<'_>) -> Radiosity {
     let mut out = Radiosity::new(surfaces);
+    set_lights(lit, forest, &mut out);
+    out
+}
+
+/// Gives the punctual lights the intensities that they have at a time.
+pub(super) fn set_lights(
+    (scene, time_s): (&Scene, f64),
+    forest: &Forest,
+    radiosity: &mut Radiosity,
+) {
     for id in 0..forest.fixed_len() {
         if let Some(light) = forest.light(ElementId(id)) {
-            out.set(id, scene.lights[light].intensity.map(|x| x as f32));
+            radiosity.set(id, scene.lights[light].intensity_at(time_s).map(|x| x as f32));
         }
     }
-    out
 }

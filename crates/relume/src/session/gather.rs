@@ -117,7 +117,8 @@ impl<'a> Look<'a> {
             _ => light.position,
         };
         let clear = e > 0.0 && segment_is_clear(view, self.forest, self.point, end, 1e-9 * away);
-        session.scene.lights[index].intensity.map(|i| if clear { i * e } else { 0.0 })
+        let intensity = session.scene.lights[index].intensity_at(self.solved.time_s);
+        intensity.map(|i| if clear { i * e } else { 0.0 })
     }
 
     fn add_patch(&self, patch: PatchId, sum: &mut [f64; 3]) {

@@ -9,7 +9,7 @@ use crate::pair::{self, Edit, PairTree};
 use crate::scene::{PatchId, Scene};
 use crate::solver::{Link, Links, LinksBuilder, Lit, Place, Surfaces};
 
-/// A forest with its materials.
+/// A forest with its materials at one instant.
 pub(super) struct LitForest<'a> {
     forest: &'a Forest,
     patch_lit: Vec<Lit>,
@@ -18,11 +18,12 @@ pub(super) struct LitForest<'a> {
 }
 
 impl<'a> LitForest<'a> {
-    pub(super) fn new(scene: &Scene, forest: &'a Forest) -> LitForest<'a> {
+    pub(super) fn new(scene: &Scene, forest: &'a Forest, time_s: f64) -> LitForest<'a> {
         let single = |v: [f64; 3]| v.map(|x| x as f32);
         let of_patch = |patch: &crate::scene::Patch| {
             let material = &scene.materials[patch.material.0 as usize];
-            Lit { reflectance: single(material.reflectance), exitance: single(material.exitance) }
+            let exitance = single(material.exitance_at(time_s));
+            Lit { reflectance: single(material.reflectance), exitance }
         };
         let patch_lit = scene.patches.iter().map(of_patch).collect();
         LitForest { forest, patch_lit, places: Vec::new() }

@@ -48,7 +48,7 @@ pub(super) fn dynamic_links(
 
 fn balance(scene: &Scene, solved: &Solved) -> (RowSumError, Energy) {
     let forest = &solved.forest;
-    let surfaces = LitForest::new(scene, forest);
+    let surfaces = LitForest::new(scene, forest, solved.time_s);
     let present = |facet: &ElementId| {
         let patch = forest.patch(*facet).expect("has a patch");
         solved.view.is_present(scene.patches[patch.0 as usize].body)
@@ -116,7 +116,7 @@ fn lights_w(scene: &Scene, solved: &Solved) -> (f64, f64) {
         if solved.view.light(k).is_none() {
             continue;
         }
-        let intensity: f64 = light.intensity.iter().sum();
+        let intensity: f64 = light.intensity_at(solved.time_s).iter().sum();
         let all = match light.kind {
             LightKind::Point => 4.0 * std::f64::consts::PI,
             LightKind::Spot { inner, outer } => spot_sr(inner, outer),
@@ -137,7 +137,7 @@ fn spot_sr(inner: f64, outer: f64) -> f64 {
 /// Row sums of all leaves.
 pub(super) fn row_sums_of(scene: &Scene, solved: &Solved) -> Vec<(ElementId, f64)> {
     let forest = &solved.forest;
-    let surfaces = LitForest::new(scene, forest);
+    let surfaces = LitForest::new(scene, forest, solved.time_s);
     let is_surface = |id: u32| forest.kind(ElementId(id)) == Kind::Element;
     let mut out = Vec::with_capacity(forest.counts().leaves as usize);
     for facet in forest.facets() {

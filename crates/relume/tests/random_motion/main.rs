@@ -76,9 +76,14 @@ fn bodies_that_ride_on_others() {
 }
 
 #[test]
+fn lamps_that_change() {
+    check(Flavour::Glows, 0..16);
+}
+
+#[test]
 fn steady_motion() {
-    use Flavour::{Contact, Families, Free, Jumps, Lights};
-    for flavour in [Free, Contact, Jumps, Lights, Families] {
+    use Flavour::{Contact, Families, Free, Glows, Jumps, Lights};
+    for flavour in [Free, Contact, Jumps, Lights, Families, Glows] {
         check_steady(flavour, 0..8);
     }
 }
@@ -147,8 +152,8 @@ fn ten_thousand_frames_leave_no_trace() {
 #[test]
 #[ignore = "minutes: the same, many more of them"]
 fn many_more_of_each() {
-    use Flavour::{Contact, Families, Free, Jumps, Lights};
-    for flavour in [Lights, Families, Jumps, Contact, Free] {
+    use Flavour::{Contact, Families, Free, Glows, Jumps, Lights};
+    for flavour in [Glows, Lights, Families, Jumps, Contact, Free] {
         check_steady(flavour, 8..160);
         check(flavour, 16..160);
     }

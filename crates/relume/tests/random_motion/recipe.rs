@@ -65,6 +65,8 @@ pub(crate) struct Recipe {
     pub(crate) things: Vec<Thing>,
     /// Nothing emits.
     pub(crate) dark: bool,
+    /// How bright lamps and lights are at 0 s, 1 s, ...; empty where that does not change.
+    pub(crate) glow: Vec<f64>,
     /// Tolerance of the error oracle, or the form-factor oracle with epsilon and least area.
     pub(crate) solve: Result<f64, (f64, f64)>,
     pub(crate) times_s: Vec<f64>,
@@ -83,6 +85,8 @@ pub(crate) enum Flavour {
     Lights,
     /// Bodies that ride on others.
     Families,
+    /// Lamps and punctual lights that brighten, darken, go out and rest.
+    Glows,
 }
 
 /// Keys of every track, at 0 s, 1 s, ...
@@ -103,7 +107,8 @@ impl Recipe {
             let thing = draw_thing(&mut r, flavour, what, &things);
             things.push(thing);
         }
-        let lights = if flavour == Flavour::Lights { 1 + whole(&mut r, 2) } else { 0 };
+        let lit = matches!(flavour, Flavour::Lights | Flavour::Glows);
+        let lights = if lit { 1 + whole(&mut r, 2) } else { 0 };
         for _ in 0..lights {
             let what = *pick(&mut r, &LIGHTS);
             let thing = draw_thing(&mut r, flavour, what, &things);
@@ -115,7 +120,17 @@ impl Recipe {
             Err((*pick(&mut r, &[0.1, 0.2, 0.3]), *pick(&mut r, &[0.01, 0.05])))
         };
         let times_s = draw_times(&mut r, steps);
-        Recipe { place, things, dark: r.unit() < 0.1, solve, times_s }
+        let dark = r.unit() < 0.1;
+        let glow = match flavour {
+            Flavour::Glows => {
+                (0..KEYS).map(|_| *pick(&mut r, &[0.0, 0.2, 0.9, 1.0, 1.0, 7.0])).collect()
+            }
+            _ => Vec::new(),
+        };
+        if flavour == Flavour::Glows && r.unit() < 0.3 {
+            things.iter_mut().for_each(|thing| (thing.slides, thing.turns) = (false, false));
+        }
+        Recipe { place, things, dark, glow, solve, times_s }
     }
 
     /// The same scene, at times that go steadily on, with a pause, an odd step or a step back now and
@@ -175,6 +190,20 @@ impl Recipe {
         let mut last = None;
         for (k, thing) in self.things.iter().enumerate() {
             last = Some(thing.build(&mut b, k, last, [grey, both, lamp], light));
+        }
+        if !self.glow.is_empty() {
+            let times_s: Vec<f64> = (0..self.glow.len()).map(|k| k as f64).collect();
+            let track = |full: [f64; 3]| Track {
+                times_s: times_s.clone(),
+                values: self.glow.iter().map(|&g| DVec3::from_array(full) * (g * light)).collect(),
+                interpolation: Interpolation::Linear,
+            };
+            b.animate_exitance(lamp, track([9.0, 6.0, 3.0]));
+            for (k, thing) in self.things.iter().enumerate() {
+                if LIGHTS.contains(&thing.what) {
+                    b.animate_intensity(&format!("{:?} {k}", thing.what), track([3.0; 3]));
+                }
+            }
         }
         Arc::new(b.build().unwrap())
     }

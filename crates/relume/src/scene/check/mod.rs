@@ -64,8 +64,8 @@ fn used(scene: &Scene) -> Vec<(&Material, usize)> {
 }
 
 fn emission(scene: &Scene, notes: &mut Vec<Note>) {
-    let glows = used(scene).iter().any(|(m, _)| m.exitance.iter().any(|&e| e > 0.0));
-    let shines = scene.lights.iter().any(|l| l.intensity.iter().any(|&i| i > 0.0));
+    let glows = used(scene).iter().any(|(m, _)| m.emits());
+    let shines = scene.lights.iter().any(|l| l.most_intensity().iter().any(|&i| i > 0.0));
     if !glows && !shines {
         let message = "nothing emits light, so every picture is black; give a material an emission \
                        (emissiveFactor) or add a point, spot or sun light (area lights are not exported to glTF: \
@@ -98,7 +98,7 @@ fn units(scene: &Scene, notes: &mut Vec<Note>) {
         }
     }
     for (material, count) in used(scene) {
-        let brightest = material.exitance.iter().copied().fold(0.0, f64::max);
+        let brightest = material.most_exitance().into_iter().fold(0.0, f64::max);
         if brightest > EXITANCE_HIGH {
             let message = format!(
                 "it emits {brightest:.3e} W/m2, more than a glowing filament; check the emission strength"
@@ -107,7 +107,7 @@ fn units(scene: &Scene, notes: &mut Vec<Note>) {
         }
     }
     for light in &scene.lights {
-        let brightest = light.intensity.iter().copied().fold(0.0, f64::max);
+        let brightest = light.most_intensity().into_iter().fold(0.0, f64::max);
         if light.kind == super::LightKind::Directional && brightest > SUN_HIGH {
             let message =
                 format!("it gives {brightest:.3e} W/m2, more than ten suns ({})", light.conversion);

@@ -234,7 +234,7 @@ fn emits_nothing(scene: &Scene, topology: &Topology, part: usize) -> bool {
         topology.polygons.iter().zip(&topology.component).filter(|(_, c)| **c as usize == part);
     members.all(|(p, _)| {
         let material = scene.patches[p.patch.0 as usize].material;
-        scene.materials[material.0 as usize].exitance == [0.0; 3]
+        !scene.materials[material.0 as usize].emits()
     })
 }
 

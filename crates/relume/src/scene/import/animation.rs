@@ -1,4 +1,5 @@
-//! Animations: keyframes of translation, rotation and presence for each node of the file.
+//! Animations: keyframes of translation, rotation and presence for each node of the file, and of what
+//! materials and lights emit.
 //!
 //! All animations play together unless one is chosen by name: exporters such as Blender's write
 //! one for each object. Where two move the same property of a node, the first one wins, with a
@@ -9,7 +10,7 @@ use glam::{DQuat, DVec3};
 
 use super::document::Document;
 use super::{json, node_name, note};
-use crate::scene::{Interpolation, Note, RotationTrack, SceneError, Severity, Track};
+use crate::scene::{Glow, Interpolation, Note, RotationTrack, SceneError, Severity, Track};
 
 /// How long a scale may take from nothing to full size and still count as a switch, seconds.
 /// Exporters that write a key for each frame turn a switch into a ramp of one frame.
@@ -31,12 +32,46 @@ pub(super) struct Moves {
     pub(super) visibility: Vec<(f64, bool)>,
 }
 
-/// What moves each node, and the names of the animations that play.
-pub(super) fn moves(
+/// Keyframes of what a material or a light of the file emits.
+#[derive(Clone, Default)]
+pub(super) struct GlowKeys {
+    pub(super) colour: Option<Track>,
+    pub(super) strength: Option<Track>,
+}
+
+impl GlowKeys {
+    /// With what does not change as a factor: of the colour, of the strength, and besides.
+    pub(super) fn glow(
+        &self,
+        (colour, strength): ([f64; 3], f64),
+        besides: [f64; 3],
+    ) -> Option<Glow> {
+        let tracks: Vec<Track> = self.colour.iter().chain(&self.strength).cloned().collect();
+        let strength = if self.strength.is_some() { 1.0 } else { strength };
+        let colour = if self.colour.is_some() { [1.0; 3] } else { colour };
+        let scale = [0, 1, 2].map(|c| colour[c] * strength * besides[c]);
+        (!tracks.is_empty()).then_some(Glow { scale, tracks })
+    }
+}
+
+/// All that is animated.
+pub(super) struct Played {
+    /// Of each node.
+    pub(super) moves: Vec<Moves>,
+    /// Of each material.
+    pub(super) materials: Vec<GlowKeys>,
+    /// Of each light.
+    pub(super) lights: Vec<GlowKeys>,
+    /// The names of the animations that play.
+    pub(super) names: Option<String>,
+}
+
+/// What the animations of a file do, or the chosen one.
+pub(super) fn played(
     document: &Document,
     chosen: Option<&str>,
     notes: &mut Vec<Note>,
-) -> Result<(Vec<Moves>, Option<String>), SceneError> {
+) -> Result<Played, SceneError> {
     let names: Vec<String> =
         document.root.animations.iter().enumerate().map(|(i, a)| name_of(i, a)).collect();
     if let Some(wanted) = chosen
@@ -53,20 +88,27 @@ pub(super) fn moves(
             remedy: format!("choose one that is there ({there}), or none to play all together"),
         });
     }
-    let mut moves: Vec<Moves> = document.root.nodes.iter().map(|_| Moves::default()).collect();
+    let lights = document.root.extensions.lights.as_ref().map_or(0, |l| l.lights.len());
+    let mut played = Played {
+        moves: document.root.nodes.iter().map(|_| Moves::default()).collect(),
+        materials: vec![GlowKeys::default(); document.root.materials.len()],
+        lights: vec![GlowKeys::default(); lights],
+        names: None,
+    };
     let mut playing = Vec::new();
     for (animation, name) in document.root.animations.iter().zip(&names) {
         if chosen.is_none_or(|wanted| wanted == name) {
             playing.push(name.clone());
             for channel in &animation.channels {
-                Reader { document, animation, name }.channel(channel, &mut moves, notes)?;
+                Reader { document, animation, name }.channel(channel, &mut played, notes)?;
             }
         }
         if chosen == Some(name) {
             break;
         }
     }
-    Ok((moves, (!playing.is_empty()).then(|| playing.join(", "))))
+    played.names = (!playing.is_empty()).then(|| playing.join(", "));
+    Ok(played)
 }
 
 fn name_of(index: usize, animation: &json::Animation) -> String {
@@ -84,12 +126,13 @@ impl Reader<'_> {
     fn channel(
         &self,
         channel: &json::Channel,
-        moves: &mut [Moves],
+        played: &mut Played,
         notes: &mut Vec<Note>,
     ) -> Result<(), SceneError> {
         if channel.target.path == "pointer" {
-            return self.pointer(channel, moves, notes);
+            return self.pointer(channel, played, notes);
         }
+        let moves = &mut played.moves;
         let Some(node) = channel.target.node else { return Ok(()) };
         let name = node_name(self.document, node);
         let of_node =
@@ -110,11 +153,7 @@ impl Reader<'_> {
             }
         };
         if taken {
-            let message = format!(
-                "animation `{}` moves its {path} too; the first animation wins: choose one by name",
-                self.name
-            );
-            notes.push(note(Severity::Warning, "animation-conflict", &name, 1, message));
+            notes.push(self.conflict(&name, path));
             return Ok(());
         }
         self.property(channel, &name, of_node, notes)
@@ -155,14 +194,26 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// KHR_animation_pointer: visibility of nodes is read, anything else is noted.
+    fn conflict(&self, name: &str, property: &str) -> Note {
+        let message = format!(
+            "animation `{}` moves its {property} too; the first animation wins: choose one by name",
+            self.name
+        );
+        note(Severity::Warning, "animation-conflict", name, 1, message)
+    }
+
+    /// KHR_animation_pointer: visibility of nodes and emission are read, anything else is noted.
     fn pointer(
         &self,
         channel: &json::Channel,
-        moves: &mut [Moves],
+        played: &mut Played,
         notes: &mut Vec<Note>,
     ) -> Result<(), SceneError> {
         let pointer = channel.target.extensions.pointer.as_ref().map_or("", |p| p.pointer.as_str());
+        if let Some((of, property)) = emission(pointer) {
+            return self.emission(channel, (pointer, of, property), played, notes);
+        }
+        let moves = &mut played.moves;
         let node = pointer
             .strip_prefix("/nodes/")
             .and_then(|rest| rest.strip_suffix("/extensions/KHR_node_visibility/visible"))
@@ -182,6 +233,41 @@ impl Reader<'_> {
                 self.document.numbers::<1>(self.sampler(channel)?.output, &self.owner(&name))?;
             of_node.visibility =
                 times_s.into_iter().zip(shown.into_iter().map(|[v]| v != 0.0)).collect();
+        }
+        Ok(())
+    }
+
+    /// Keys of what a material or a light emits.
+    fn emission(
+        &self,
+        channel: &json::Channel,
+        (pointer, of, property): (&str, Emitter, Property),
+        played: &mut Played,
+        notes: &mut Vec<Note>,
+    ) -> Result<(), SceneError> {
+        let missing = |kind, index| self.document.out_of_range(kind, index);
+        let keys = match of {
+            Emitter::Material(k) => {
+                played.materials.get_mut(k).ok_or_else(|| missing("material", k))
+            }
+            Emitter::Light(k) => played.lights.get_mut(k).ok_or_else(|| missing("light", k)),
+        }?;
+        let (times_s, interpolation) = self.keys(channel)?;
+        let output = self.sampler(channel)?.output;
+        let owner = format!("animation `{}` of {pointer}", self.name);
+        let (values, place) = match property {
+            Property::Colour => {
+                let read = self.document.numbers::<3>(output, &owner)?;
+                (read.into_iter().map(DVec3::from_array).collect(), &mut keys.colour)
+            }
+            Property::Strength => {
+                let read = self.document.numbers::<1>(output, &owner)?;
+                (read.into_iter().map(|[v]| DVec3::splat(v)).collect(), &mut keys.strength)
+            }
+        };
+        match place {
+            Some(_) => notes.push(self.conflict(pointer, "emission")),
+            None => *place = Some(Track { times_s, values, interpolation }),
         }
         Ok(())
     }
@@ -219,6 +305,43 @@ impl Reader<'_> {
     fn malformed(&self, what: &str) -> SceneError {
         self.document.malformed(format!("animation `{}`: {what}", self.name))
     }
+}
+
+/// What emits, by its index in the file.
+#[derive(Clone, Copy)]
+enum Emitter {
+    Material(usize),
+    Light(usize),
+}
+
+/// What of its emission changes.
+#[derive(Clone, Copy)]
+enum Property {
+    Colour,
+    Strength,
+}
+
+/// The emission that a pointer points to.
+fn emission(pointer: &str) -> Option<(Emitter, Property)> {
+    let index_and_rest = |prefix: &str| {
+        let (index, rest) = pointer.strip_prefix(prefix)?.split_once('/')?;
+        Some((index.parse::<usize>().ok()?, rest))
+    };
+    if let Some((index, rest)) = index_and_rest("/materials/") {
+        let property = match rest {
+            "emissiveFactor" => Property::Colour,
+            "extensions/KHR_materials_emissive_strength/emissiveStrength" => Property::Strength,
+            _ => return None,
+        };
+        return Some((Emitter::Material(index), property));
+    }
+    let (index, rest) = index_and_rest("/extensions/KHR_lights_punctual/lights/")?;
+    let property = match rest {
+        "color" => Property::Colour,
+        "intensity" => Property::Strength,
+        _ => return None,
+    };
+    Some((Emitter::Light(index), property))
 }
 
 /// The time of a frame as a 64-bit number, where the 32-bit `time_s` is a rounded one.

@@ -7,6 +7,7 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
+use super::animation::GlowKeys;
 use super::document::Document;
 use super::{json, note};
 use crate::scene::{Light, LightKind, NodeId, Note, Projection, SceneError, Severity};
@@ -17,9 +18,8 @@ const LUMENS_PER_WATT: f64 = 683.0;
 /// The light `index` of the file on a node.
 pub(super) fn light(
     document: &Document,
-    index: usize,
-    node: NodeId,
-    name: &str,
+    (index, keys): (usize, &GlowKeys),
+    (node, name): (NodeId, &str),
     notes: &mut Vec<Note>,
 ) -> Result<Light, SceneError> {
     let lights = document.root.extensions.lights.as_ref().map_or(&[][..], |l| &l.lights);
@@ -44,8 +44,12 @@ pub(super) fn light(
     if light.range.is_some() {
         conversion.push_str("; its range is ignored");
     }
+    let glow = keys.glow((colour, stated), [1.0 / LUMENS_PER_WATT; 3]);
+    if glow.is_some() {
+        conversion.push_str("; it changes over time");
+    }
     notes.push(note(Severity::Info, "light-units", name, 1, conversion.clone()));
-    Ok(Light { name: name.to_owned(), node, kind, intensity, conversion })
+    Ok(Light { name: name.to_owned(), node, kind, intensity, glow, conversion })
 }
 
 fn kind_of(document: &Document, light: &json::Light, name: &str) -> Result<LightKind, SceneError> {

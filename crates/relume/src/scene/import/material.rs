@@ -5,6 +5,7 @@
 
 use std::f64::consts::PI;
 
+use super::animation::GlowKeys;
 use super::document::Document;
 use super::json;
 use super::note;
@@ -17,13 +18,14 @@ pub(super) const REFLECTANCE_MAX: f64 = 0.98;
 /// All materials of the file, and one more behind them for primitives without one.
 pub(super) fn materials(
     document: &Document,
+    keys: &[GlowKeys],
     notes: &mut Vec<Note>,
 ) -> Result<Vec<Material>, SceneError> {
     let mut means = Means { document, of_image: vec![None; document.root.images.len()] };
     let read = |(i, m): (usize, &json::Material)| {
         let name =
             m.name.clone().filter(|n| !n.is_empty()).unwrap_or_else(|| format!("material {i}"));
-        one(m, name, &mut means, notes)
+        one(m, &keys[i], name, &mut means, notes)
     };
     let mut materials: Vec<Material> =
         document.root.materials.iter().enumerate().map(read).collect::<Result<_, _>>()?;
@@ -31,6 +33,7 @@ pub(super) fn materials(
         name: "no material".into(),
         reflectance: [REFLECTANCE_MAX; 3],
         exitance: [0.0; 3],
+        glow: None,
         double_sided: false,
     });
     Ok(materials)
@@ -38,6 +41,7 @@ pub(super) fn materials(
 
 fn one(
     material: &json::Material,
+    keys: &GlowKeys,
     name: String,
     means: &mut Means,
     notes: &mut Vec<Note>,
@@ -53,16 +57,20 @@ fn one(
         .as_ref()
         .and_then(|e| e.emissive_strength)
         .unwrap_or(1.0);
-    let mut radiance = material.emissive_factor.unwrap_or_default().map(|c| c * strength);
-    if let (Some(texture), true) = (material.emissive_texture, radiance != [0.0; 3]) {
-        radiance = product(radiance, means.of(texture, &name, "emission", notes)?);
+    let factor = material.emissive_factor.unwrap_or_default();
+    let mut besides = [PI; 3];
+    let glows = keys.colour.is_some() || factor != [0.0; 3];
+    if let (Some(texture), true) = (material.emissive_texture, glows) {
+        besides = product(besides, means.of(texture, &name, "emission", notes)?);
     }
+    let radiance = factor.map(|c| c * strength);
     note_what_is_ignored(material, &name, notes);
     let reflectance = clamped(reflectance, &name, notes);
     Ok(Material {
         name,
         reflectance,
-        exitance: radiance.map(|l| PI * l),
+        exitance: product(radiance, besides),
+        glow: keys.glow((factor, strength), besides),
         double_sided: material.double_sided,
     })
 }

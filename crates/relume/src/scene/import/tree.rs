@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::animation::{Moves, moves};
+use super::animation::{GlowKeys, Moves, played};
 use super::document::Document;
 use super::mesh::{Polygons, polygons};
 use super::{ImportOptions, json, light, material, node_name, note};
@@ -15,16 +15,17 @@ const SAME_SCALE: f64 = 1e-6;
 /// Everything of the file's active scene.
 pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draft, SceneError> {
     let mut notes = Vec::new();
-    let (moves, animation) = moves(document, options.animation.as_deref(), &mut notes)?;
-    let materials = material::materials(document, &mut notes)?;
+    let played = played(document, options.animation.as_deref(), &mut notes)?;
+    let materials = material::materials(document, &played.materials, &mut notes)?;
     let roots = roots(document, &mut notes)?;
     let mut tree = Tree {
         document,
-        moves,
+        moves: played.moves,
+        lights: played.lights,
         meshes: document.root.meshes.iter().map(|_| None).collect(),
         without_material: 0,
         growing: Vec::new(),
-        draft: Draft { materials, animation, ..Draft::default() },
+        draft: Draft { materials, animation: played.names, ..Draft::default() },
     };
     tree.draft.notes = notes;
     tree.walk(&roots)?;
@@ -70,6 +71,8 @@ fn not_a_tree(document: &Document, node: usize) -> SceneError {
 struct Tree<'a> {
     document: &'a Document,
     moves: Vec<Moves>,
+    /// How the lights of the file change.
+    lights: Vec<GlowKeys>,
     /// Polygons of the meshes read so far.
     meshes: Vec<Option<Vec<Polygons>>>,
     without_material: usize,
@@ -138,7 +141,9 @@ impl Tree<'_> {
         self.draft.nodes.push(placed);
         let id = NodeId(me as u32);
         if let Some(l) = &node.extensions.light {
-            let light = light::light(self.document, l.light, id, &name, &mut self.draft.notes)?;
+            let keys = self.lights.get(l.light).cloned().unwrap_or_default();
+            let on = (id, name.as_str());
+            let light = light::light(self.document, (l.light, &keys), on, &mut self.draft.notes)?;
             self.draft.lights.push(light);
         }
         if let Some(camera) = node.camera {

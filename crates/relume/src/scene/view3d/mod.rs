@@ -189,7 +189,8 @@ impl Materials {
         };
         let index = self.list.iter().position(|m| m.name == name).unwrap_or_else(|| {
             let reflectance = [1.0 - emittance; 3];
-            let material = Material { name, reflectance, exitance: [0.0; 3], double_sided: false };
+            let material =
+                Material { name, reflectance, exitance: [0.0; 3], glow: None, double_sided: false };
             self.list.push(material);
             self.list.len() - 1
         });

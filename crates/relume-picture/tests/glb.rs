@@ -57,7 +57,23 @@ fn everything() -> Scene {
     b.light("hand", hand, LightKind::Spot { inner: 0.25, outer: 0.5 }, [3.0; 3]);
     let sun = b.node("sun", None, DVec3::ZERO, turn);
     b.light("sun", sun, LightKind::Directional, [8.0, 8.0, 4.0]);
-    b.build().unwrap()
+    let keys = |values: [[f64; 3]; 3]| Track {
+        times_s: vec![0.0, 0.5, 1.5],
+        values: values.map(DVec3::from_array).to_vec(),
+        interpolation: Interpolation::Linear,
+    };
+    let flash = b.material("flash", [0.2; 3], [0.0; 3]);
+    b.cuboid(bird, "flash", flash, DVec3::splat(-0.1), DVec3::splat(0.1));
+    b.animate_exitance(flash, keys([[0.0; 3], [90.0, 40.0, 10.0], [1.0, 2.0, 3.0]]));
+    let ember = b.material("ember", [0.2; 3], [0.0; 3]);
+    b.cuboid(ghost, "ember", ember, DVec3::ZERO, DVec3::splat(0.1));
+    b.animate_exitance(ember, keys([[0.5, 0.25, 0.0], [0.0; 3], [0.125; 3]]));
+    b.animate_intensity("hand", keys([[3.0; 3], [0.001, 0.0, 0.0], [0.0, 5.0, 1.0]]));
+    let mut scene = b.build().unwrap();
+    // A colour and a strength apart, as files have them.
+    let flash = scene.materials[flash.0 as usize].glow.as_mut().unwrap();
+    flash.tracks.push(keys([[2.0; 3], [1.0; 3], [0.5; 3]]));
+    scene
 }
 
 /// The JSON chunk and the length of the binary one.
@@ -93,7 +109,11 @@ fn container_and_materials() {
     assert!((strength.as_f64().unwrap() - 40.0).abs() < 1e-12);
     assert_eq!(
         json["extensionsUsed"],
-        serde_json::json!(["KHR_materials_emissive_strength", "KHR_lights_punctual"])
+        serde_json::json!([
+            "KHR_materials_emissive_strength",
+            "KHR_animation_pointer",
+            "KHR_lights_punctual"
+        ])
     );
     // Of the double-sided pentagon one side is written: 5 corners beside the cuboid's 24.
     let corners = |primitive: &Value| {
@@ -146,6 +166,14 @@ fn same(a: &Scene, b: &Scene) {
         close(x.intensity, y.intensity, &x.name);
     }
     for t in [0.0, 0.1, 0.3, 0.5, 0.8, 1.5, 2.0] {
+        for x in &a.materials {
+            let y = b.materials.iter().find(|y| y.name == x.name).unwrap();
+            close(x.exitance_at(t), y.exitance_at(t), &format!("{} at {t} s", x.name));
+        }
+        for x in &a.lights {
+            let y = b.lights.iter().find(|y| y.name == x.name).unwrap();
+            close(x.intensity_at(t), y.intensity_at(t), &format!("{} at {t} s", x.name));
+        }
         for (index, body) in a.bodies.iter().enumerate() {
             let other = b.bodies.iter().position(|y| y.name == body.name).unwrap();
             let what = format!("{} at {t} s", body.name);

@@ -97,18 +97,73 @@ fn visibility_pointers_are_presence_and_others_are_noted() {
         json!({"bufferView": view, "componentType": 5121, "count": 2, "type": "SCALAR"}),
     );
     let channel = |pointer: &str| json!({"sampler": 0, "target": {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}}});
-    let glow = "/materials/0/emissiveFactor";
+    let colour = "/materials/0/pbrMetallicRoughness/baseColorFactor";
     g.push(
         "animations",
         json!({
-            "channels": [channel("/nodes/0/extensions/KHR_node_visibility/visible"), channel(glow)],
+            "channels": [channel("/nodes/0/extensions/KHR_node_visibility/visible"), channel(colour)],
             "samplers": [{"input": input, "output": output, "interpolation": "STEP"}],
         }),
     );
     g.json["extensionsRequired"] = json!(["KHR_animation_pointer", "KHR_node_visibility"]);
     let scene = scene_of(&g).unwrap();
     assert!(scene.pose(BodyId(0), 0.9).is_some() && scene.pose(BodyId(0), 1.0).is_none());
-    assert_eq!(with_code(&scene.notes, "animation-pointer")[0].subject, glow);
+    assert_eq!(with_code(&scene.notes, "animation-pointer")[0].subject, colour);
+}
+
+#[test]
+fn emission_pointers_are_colours_and_strengths_over_time() {
+    let mut g = Gltf::cube();
+    g.json["materials"] = json!([{
+        "name": "lamp",
+        "emissiveFactor": [1.0, 0.5, 0.0],
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8.0}}
+    }]);
+    g.json["meshes"][0]["primitives"][0]["material"] = json!(0);
+    g.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [
+        {"type": "point", "color": [1.0, 0.5, 0.25], "intensity": 683.0}
+    ]}});
+    g.node(json!({"name": "bulb", "extensions": {"KHR_lights_punctual": {"light": 0}}}));
+    let input = g.floats("SCALAR", &[0.0, 2.0]);
+    let colour = g.floats("VEC3", &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
+    let strength = g.floats("SCALAR", &[1.0, 3.0]);
+    let channel = |sampler: usize, pointer: &str| json!({"sampler": sampler, "target": {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}}});
+    let emissive_strength =
+        "/materials/0/extensions/KHR_materials_emissive_strength/emissiveStrength";
+    let intensity = "/extensions/KHR_lights_punctual/lights/0/intensity";
+    g.push(
+        "animations",
+        json!({
+            "name": "dusk",
+            "channels": [channel(0, "/materials/0/emissiveFactor"), channel(1, intensity)],
+            "samplers": [{"input": input, "output": colour}, {"input": input, "output": strength}],
+        }),
+    );
+    g.json["extensionsRequired"] = json!(["KHR_animation_pointer"]);
+    let pi = std::f64::consts::PI;
+    let scene = scene_of(&g).unwrap();
+    let lamp = &scene.materials[0];
+    // The strength at rest stays; the colour at rest does not count.
+    assert_eq!(lamp.exitance, [0.0; 3]);
+    assert_eq!(lamp.exitance_at(1.0), [4.0 * pi; 3]);
+    assert_eq!(lamp.most_exitance(), [8.0 * pi; 3]);
+    assert_eq!(scene.motion.duration_s, 2.0);
+    let bulb = scene.lights[0].intensity_at(1.0);
+    let expected = [2.0, 1.0, 0.5].map(|x| x / 683.0);
+    assert!((0..3).all(|c| (bulb[c] - expected[c]).abs() < 1e-12), "{bulb:?}");
+    assert!(scene.lights[0].conversion.ends_with("it changes over time"));
+    // Both at once.
+    let second = channel(1, emissive_strength);
+    g.json["animations"][0]["channels"].as_array_mut().unwrap().push(second.clone());
+    let scene = scene_of(&g).unwrap();
+    assert_eq!(scene.materials[0].exitance_at(1.0), [pi; 3]);
+    // And once too often, or of nothing.
+    g.json["animations"][0]["channels"].as_array_mut().unwrap().push(second);
+    let scene = scene_of(&g).unwrap();
+    assert_eq!(with_code(&scene.notes, "animation-conflict")[0].subject, emissive_strength);
+    let missing = channel(0, "/materials/7/emissiveFactor");
+    g.json["animations"][0]["channels"].as_array_mut().unwrap().push(missing);
+    assert!(scene_of(&g).unwrap_err().to_string().contains('7'));
 }
 
 #[test]

@@ -481,7 +481,7 @@ impl Placed<'_> {
         let blockers = shaft.blockers(&narrowed[start..]);
         let key = pair_key(self.forest.key(element), self.forest.key(light));
         let segments = place.segments(lamp, &e, key);
-        let v = light_visibility(self.simd, &shaft, &blockers, &segments);
+        let v = light_visibility(self.simd, &shaft, &blockers, (&segments, place.from(lamp, &e)));
         let mut margin = Margin::Firm;
         let verdict = match (self.stage, self.oracle) {
             (Stage::Coarse, _) => Verdict::Hold,
@@ -577,6 +577,9 @@ const FINEST: f64 = 0.002;
 /// Stake times doubt of visibility above which a link is clipped from more points.
 const CLOSER: f64 = 0.03;
 
+/// How many times as far as out of the scene a directional light is taken to be.
+const PARALLEL: f64 = (1 << 20) as f64;
+
 /// A punctual light as the far end of a shaft.
 pub(super) struct LightPlace {
     pub(super) stand_in: WorldElement,
@@ -604,6 +607,14 @@ impl LightPlace {
             rounding_m: 0.0,
         };
         LightPlace { stand_in, away_m }
+    }
+
+    /// Where its light comes from, or seems to: rays of a directional light are parallel to rounding.
+    fn from(&self, lamp: &WorldLight, e: &WorldElement) -> DVec3 {
+        match lamp.kind {
+            LightKind::Directional => e.centre - lamp.direction * (self.away_m * PARALLEL),
+            LightKind::Point | LightKind::Spot { .. } => lamp.position,
+        }
     }
 
     fn segments(&self, lamp: &WorldLight, e: &WorldElement, key: u64) -> SegmentBundle {

@@ -4,7 +4,7 @@
 
 use crate::element::{ElementId, Forest, Kind};
 use crate::pair::{self, Brightness, Changes, Light};
-use crate::scene::{self, PatchId, Scene};
+use crate::scene::{self, LightKind, PatchId, Scene};
 use crate::solver::{Dirty, Links, Radiosity, Stop, Surfaces};
 
 use super::surfaces::{LitForest, set_pairs};
@@ -21,6 +21,10 @@ const SWEEPS: u32 = 8;
 
 /// Errors on dark receivers are measured against at least this share of the mean irradiance.
 const DARK_FLOOR: f64 = 0.1;
+
+/// Share of what is emitted below which what arrives is what rounding lets through between shadows: errors
+/// relative to that have no end. (A lamp outside a closed room.)
+const LOST: f64 = 1e-5;
 
 /// Splits facets down to coarse elements, numbers them and keeps them for good; returns their ids
 /// by number.
@@ -96,7 +100,15 @@ impl Coarse {
         let arriving: f64 =
             coarse.iter().zip(&irradiance).map(|(&id, h)| surfaces.area_m2(id) * h).sum();
         let intensity = |l: &scene::Light| l.intensity_at(time_s).iter().sum::<f64>() / 3.0;
-        let lights = scene.lights.iter().map(intensity).collect();
+        let lights: Vec<f64> = scene.lights.iter().map(intensity).collect();
+        let emitted =
+            |&facet: &ElementId| surfaces.area_m2(facet.0) * mean(surfaces.lit(facet.0).exitance);
+        let spread = |light: &scene::Light| match light.kind {
+            LightKind::Directional => total_area,
+            LightKind::Point | LightKind::Spot { .. } => 4.0 * std::f64::consts::PI,
+        };
+        let shone = scene.lights.iter().zip(&lights).map(|(light, i)| i * spread(light));
+        let emitted_w = surfaces.facets().iter().map(emitted).chain(shone).sum::<f64>();
         let floor = arriving / total_area * DARK_FLOOR;
         let light_of = |(&id, irradiance): (&u32, &f64)| {
             let emitted = mean(surfaces.lit(surfaces.facet_of(id)).exitance);
@@ -104,10 +116,10 @@ impl Coarse {
             let reflected = (radiosity - emitted).max(0.0);
             Light { radiosity, reflected, irradiance: irradiance + floor }
         };
-        let known = if arriving > 0.0 {
+        let known = if arriving > LOST * emitted_w {
             coarse.iter().zip(&irradiance).map(light_of).collect()
         } else {
-            // Nothing emits: every surface weighs the same, and errors are relative to row sums.
+            // Nothing emits, or all of it is lost: every surface weighs the same, and errors are relative to row sums.
             vec![Light::UNIFORM; coarse.len()]
         };
         Brightness::new(known, lights, total_area * REFERENCE_SHARE)

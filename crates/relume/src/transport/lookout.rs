@@ -415,6 +415,36 @@ pub fn form_factor_past<'a>(
     FactorPast { factor, middle, is_exact: cutter.left.len() <= FRAGMENTS_MAX }
 }
 
+/// Whether convex occluders hide all of a convex polygon from a point. Occluders must have been clipped to between
+/// the two.
+pub(super) fn is_hidden<'a>(
+    point: DVec3,
+    target: &[DVec3],
+    occluders: impl Iterator<Item = &'a [DVec3]>,
+) -> bool {
+    let frame = TargetFrame::of_polygon(target);
+    let from = frame.place(point);
+    let mut between = Occluders::default();
+    for occluder in occluders {
+        between.push(occluder.iter().map(|&c| frame.place(c)), from);
+    }
+    between.largest_first();
+    let mut cutter = Cutter::default();
+    let flat = frame.flat(target);
+    cutter.cut(from, &flat, &between);
+    let left: f64 = cutter.left.iter().map(twice_area).sum();
+    let dark: f64 = cutter.dark.iter().map(twice_area).sum();
+    left - dark <= HIDDEN * twice_area(&flat)
+}
+
+/// Share of a polygon below which what is left of it is a gap between shadows that rounding made.
+const HIDDEN: f64 = 1e-8;
+
+fn twice_area(c: &[DVec2]) -> f64 {
+    let fan = |k: usize| (c[k] - c[0]).perp_dot(c[k + 1] - c[0]);
+    (1..c.len().saturating_sub(1)).map(fan).sum::<f64>().abs()
+}
+
 /// The frame of a target: the first two axes in its plane, the third towards its front.
 struct TargetFrame {
     origin: DVec3,

@@ -5,8 +5,9 @@ use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, Wor
 use crate::geometry::{Aabb, Plane, Pose, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
+use super::clip::keep_in_front;
 use super::kernel::Simd;
-use super::lookout::{Between, Clipping, Looker, Lookout, PlacedSolid};
+use super::lookout::{Between, Clipping, Looker, Lookout, PlacedSolid, is_hidden};
 use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use glam::{DVec2, DVec3};
 
@@ -322,6 +323,23 @@ impl<'a> Shaft<'a> {
         out
     }
 
+    /// Whether the blockers hide all of the first end from a point in front of it.
+    fn is_hidden_from(&self, from: DVec3, blockers: &[PatchId]) -> bool {
+        let (plane, slack) = (&self.a.plane, self.slack());
+        // Only what is between the end's plane and the point's hides anything.
+        let height = plane.distance(from);
+        let above = Plane { offset: plane.offset + slack, ..*plane };
+        let below = Plane { normal: -plane.normal, offset: -(plane.offset + height - slack) };
+        let between = |&patch: &PatchId| {
+            let mut corners: Vec<DVec3> = self.lifted(patch).1.corners().collect();
+            keep_in_front(&mut corners, &above);
+            keep_in_front(&mut corners, &below);
+            (corners.len() >= 3).then_some(corners)
+        };
+        let between: Vec<Vec<DVec3>> = blockers.iter().filter_map(between).collect();
+        is_hidden(from, &self.a.corners[..self.a.len], between.iter().map(Vec::as_slice))
+    }
+
     /// The segments of `bundle` (in the world; `own` in the body's frame) that are blocked.
     fn blocked(
         &self,
@@ -387,18 +405,23 @@ pub fn lookout(simd: Simd, shaft: &Shaft<'_>, blockers: &[PatchId], looker: Look
 }
 
 /// Visibility of a punctual light (the second end of the shaft) from an element; `segments` come
-/// from [`SegmentBundle::to_light`].
+/// from [`SegmentBundle::to_light`]. Where none of them gets through it is found out whether anything does: `from` is
+/// where the light is, or far enough towards it for its rays to be parallel.
 pub fn light_visibility(
     simd: Simd,
     shaft: &Shaft<'_>,
     blockers: &[PatchId],
-    segments: &SegmentBundle,
+    (segments, from): (&SegmentBundle, DVec3),
 ) -> Visibility {
     if blockers.is_empty() {
         return Visibility::CLEAR;
     }
     let mut tally = Tally::default();
-    tally.add(segments, shaft.blocked(simd, blockers, segments, None), shaft.a, shaft.a);
+    let blocked = shaft.blocked(simd, blockers, segments, None);
+    if blocked == u16::MAX && shaft.is_hidden_from(from, blockers) {
+        return Visibility { value: 0.0, segments: 1, ..Visibility::CLEAR };
+    }
+    tally.add(segments, blocked, shaft.a, shaft.a);
     let both = tally.finish(SEGMENTS as u32, shaft.a, shaft.a);
     Visibility { gradient_b: DVec2::ZERO, spread_b: 0.0, ..both }
 }

@@ -613,8 +613,8 @@ pub(crate) struct PictureFlags {
     #[arg(long, value_name = "NAME")]
     pub(crate) camera: Option<String>,
     /// Exposure in stops, fixed over the clip: at 0 a radiance of 1 W/m2/sr is full white, +1 is twice
-    /// as bright. `auto` chooses it once, at the first frame of the animation in which anything
-    /// emits, whichever frames are asked for; report.json says what it chose.
+    /// as bright. `auto` chooses it once, at the first of the frames of the animation in which most is
+    /// emitted, whichever frames are asked for; report.json says what it chose.
     #[arg(long, value_name = "EV", default_value = "auto", allow_negative_numbers = true)]
     pub(crate) exposure: ExposureFlag,
     /// Draw the outlines of the elements over the picture.

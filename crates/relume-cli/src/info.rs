@@ -110,7 +110,6 @@ fn emitters(out: &mut String, scene: &Scene) -> fmt::Result {
     let mut none = scene.lights.is_empty();
     for (index, surface) in scene.surfaces.iter().enumerate() {
         let material = &scene.materials[surface.material.0 as usize];
-        let exitance = material.exitance;
         if !material.emits() {
             continue;
         }
@@ -121,11 +120,12 @@ fn emitters(out: &mut String, scene: &Scene) -> fmt::Result {
             .filter(|patch| patch.surface.0 as usize == index)
             .map(|patch| patch.area_m2())
             .sum();
-        let flux = exitance.map(|m| m * area);
+        let flux = material.most_exitance().map(|m| m * area);
+        let most = if material.glow.is_some() { " at most" } else { "" };
         let sum = number(flux.iter().sum());
         writeln!(
             out,
-            "  {:<24} {}  sum {sum}, from {} m2",
+            "  {:<24} {}  sum {sum}{most}, from {} m2",
             surface.name,
             triple(flux),
             number(area)

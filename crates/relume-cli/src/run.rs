@@ -4,13 +4,13 @@
 //! in one step each. Whatever ends a run, the directory holds finished frames and a report of
 //! exactly those.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use relume::scene::{BodyId, MaterialId, Scene};
+use relume::scene::{BodyId, Light, MaterialId, Scene};
 use relume::session::{Options, Session, SessionError, Snapshot};
 use relume_picture::export::{probe, write_atomically, write_glb};
 use relume_picture::picture::{self, Exposure, Viewpoint};
@@ -372,7 +372,7 @@ impl Run<'_> {
 
     /// Chooses the automatic exposure once, before the first picture.
     ///
-    /// It is that of the first frame of the whole animation in which anything emits, whichever
+    /// It is that of the first of the frames of the whole animation in which most is emitted, whichever
     /// frames were asked for: so that the parts of a clip that were made by different runs match.
     /// Where that frame is not the one that comes next it costs one more solution, in a session of
     /// its own, so that the counters of this one stay what they would be.
@@ -382,7 +382,7 @@ impl Run<'_> {
         }
         let fps = self.job.solve.clip.fps;
         let scene = Arc::clone(self.session.scene());
-        let frame = first_lit_frame(&scene, fps).unwrap_or(next);
+        let frame = brightest_frame(&scene, fps).unwrap_or(next);
         if frame == next {
             // Left to `draw`, which has the solution.
             return Ok(());
@@ -435,28 +435,34 @@ impl Run<'_> {
     }
 }
 
-/// The first frame of the animation in which a surface or a light emits; `None` if none does.
+/// The first of the frames of the animation in which most is emitted; `None` if nothing ever is.
 ///
-/// Cost: one pose for each emitting body and frame, until one is found.
-fn first_lit_frame(scene: &Scene, fps: f64) -> Option<u32> {
+/// Cost: one pose for each emitting body, material and frame.
+fn brightest_frame(scene: &Scene, fps: f64) -> Option<u32> {
     let count = frames::frame_count(scene.motion.duration_s, fps).ok()?;
     let material = |id: MaterialId| &scene.materials[id.0 as usize];
-    let lamps: BTreeSet<(BodyId, MaterialId)> = scene
-        .patches
-        .iter()
-        .map(|p| (p.body, p.material))
-        .filter(|(_, m)| material(*m).emits())
-        .collect();
-    let some = |emission: [f64; 3]| emission.iter().any(|&m| m > 0.0);
-    (0..count).find(|&frame| {
+    let mut lamps: BTreeMap<(BodyId, MaterialId), f64> = BTreeMap::new();
+    for patch in scene.patches.iter().filter(|p| material(p.material).emits()) {
+        *lamps.entry((patch.body, patch.material)).or_default() += patch.area_m2();
+    }
+    let sum = |emission: [f64; 3]| emission.iter().sum::<f64>();
+    let emitted = |frame: u32| {
         let time_s = frames::time_of(frame, fps);
-        lamps.iter().any(|&(body, of)| {
-            some(material(of).exitance_at(time_s)) && scene.pose(body, time_s).is_some()
-        }) || scene
-            .lights
-            .iter()
-            .any(|l| some(l.intensity_at(time_s)) && scene.motion.pose(l.node, time_s).is_some())
-    })
+        let of_lamp = |(&(body, of), area): (&(BodyId, MaterialId), &f64)| {
+            let there = scene.pose(body, time_s).is_some();
+            if there { area * sum(material(of).exitance_at(time_s)) } else { 0.0 }
+        };
+        let of_light = |l: &Light| {
+            let there = scene.motion.pose(l.node, time_s).is_some();
+            if there { sum(l.intensity_at(time_s)) } else { 0.0 }
+        };
+        lamps.iter().map(of_lamp).chain(scene.lights.iter().map(of_light)).sum::<f64>()
+    };
+    let brighter = |best: (Option<u32>, f64), frame: u32| {
+        let now = emitted(frame);
+        if now > best.1 { (Some(frame), now) } else { best }
+    };
+    (0..count).fold((None, 0.0), brighter).0
 }
 
 /// The stops of a scale, rounded to a thousandth so that what the report says is what was used.
@@ -475,20 +481,28 @@ fn make_directory(dir: &Path) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+    use relume::scene::{Glow, Interpolation, Track};
+
     use super::*;
     use crate::args::DemoScene;
 
     #[test]
-    fn the_exposure_frame_is_the_first_with_light() {
+    fn the_exposure_frame_is_the_first_with_most_light() {
         let mut scene = (demo::demo(DemoScene::Room).build)().unwrap();
-        assert_eq!(first_lit_frame(&scene, 24.0), Some(0));
+        assert_eq!(brightest_frame(&scene, 24.0), Some(0));
         let lamp = scene.motion.nodes.iter_mut().find(|n| n.name == "lamp").unwrap();
         lamp.presence = vec![(0.0, false), (0.25, true)];
-        assert_eq!(first_lit_frame(&scene, 24.0), Some(6));
+        assert_eq!(brightest_frame(&scene, 24.0), Some(6));
+        let lamp = scene.materials.iter_mut().find(|m| m.emits()).unwrap();
+        let values = vec![DVec3::ONE, DVec3::splat(3.0)];
+        let track = Track { times_s: vec![0.0, 0.5], values, interpolation: Interpolation::Step };
+        lamp.glow = Some(Glow { scale: lamp.exitance, tracks: vec![track] });
+        assert_eq!(brightest_frame(&scene, 24.0), Some(12));
         for material in &mut scene.materials {
-            material.exitance = [0.0; 3];
+            (material.exitance, material.glow) = ([0.0; 3], None);
         }
-        assert_eq!(first_lit_frame(&scene, 24.0), None);
+        assert_eq!(brightest_frame(&scene, 24.0), None);
     }
 
     #[test]

@@ -96,7 +96,7 @@ fn materials(out: &mut String, scene: &Scene) -> fmt::Result {
         if material.emits() {
             write!(out, "  emits {}", triple(*exitance))?;
         }
-        if glow.is_some() {
+        if material.emits() && glow.is_some() {
             write!(out, " at first, up to {}", triple(material.most_exitance()))?;
         }
         writeln!(out, "{}", if *double_sided { "  both sides" } else { "" })?;

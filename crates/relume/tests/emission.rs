@@ -155,3 +155,64 @@ fn bad_keys_are_refused_by_name() {
     b.animate_intensity("nothing", track(&[1.0], [1.0; 3], Interpolation::Step));
     assert!(b.build().unwrap_err().to_string().contains("light `nothing`"));
 }
+
+#[test]
+fn what_is_solved_after_a_lamp_changed_can_be_reconstructed() {
+    let scene = build(room(&[1.0, 2.0, 3.0, 2.0]));
+    let mut session = Session::new(scene.clone(), options(Oracle::Error)).unwrap();
+    for frame in 0..4 {
+        session.step(frame, f64::from(frame)).unwrap();
+        let warm = session.reconstruction();
+        let mut cold = Session::new(scene.clone(), options(Oracle::Error)).unwrap();
+        cold.step(frame, f64::from(frame)).unwrap();
+        let cold = cold.reconstruction();
+        for (one, two) in warm.leaves.iter().zip(&cold.leaves) {
+            assert!(
+                (one.radiosity[0] - two.radiosity[0]).abs() <= 0.01 * two.radiosity[0].max(0.1)
+            );
+        }
+    }
+}
+
+#[test]
+fn a_lamp_that_brightens_is_no_reason_to_build_extrapolated_links_anew() {
+    let scene = build(room(&[0.0, 1.0, 3.0, 9.0]));
+    let update = Update::Extrapolate { frames: 7, error: None };
+    let mut session = Session::new(scene, Options { update, ..options(Oracle::Error) }).unwrap();
+    session.step(0, 0.5).unwrap();
+    for frame in 1..5 {
+        let report = session.step(frame, 0.5 + 0.5 * f64::from(frame)).unwrap();
+        let pairs = report.pairs.active + report.pairs.refined;
+        assert!(report.examined < pairs / 4, "frame {frame}: {} of {pairs}", report.examined);
+    }
+}
+
+/// A plate with a box on it below a bulb, and another bulb that is not there yet.
+fn plate(bulb: f64, away_m: f64, absent: f64) -> Arc<Scene> {
+    let mut b = SceneBuilder::new("plate");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let node = b.node("plate", None, DVec3::ZERO, DQuat::IDENTITY);
+    let corners = [(-1., -1.), (-1., 1.), (1., 1.), (1., -1.)].map(|(x, z)| DVec3::new(x, 0.0, z));
+    b.polygon(node, "plate", grey, &corners);
+    b.cuboid(node, "box", grey, DVec3::new(-0.2, 0.01, -0.3), DVec3::new(0.3, 0.5, 0.2));
+    let hook = b.node("hook", None, DVec3::new(0.3, away_m, 0.2), DQuat::IDENTITY);
+    b.light("bulb", hook, LightKind::Point, [bulb * away_m * away_m; 3]);
+    let hook = b.node("later", None, DVec3::new(0.3, 2.0, 0.2), DQuat::IDENTITY);
+    b.animate_presence(hook, vec![(0.0, false), (1.0, true)]);
+    b.light("later", hook, LightKind::Point, [absent; 3]);
+    build(b)
+}
+
+#[test]
+fn links_depend_neither_on_the_unit_of_light_nor_on_what_is_absent() {
+    let links = |scene: Arc<Scene>| {
+        let mut session = Session::new(scene, options(Oracle::Error)).unwrap();
+        session.step(0, 0.0).unwrap().hash
+    };
+    for away_m in [2.0, 400.0] {
+        let hash = links(plate(1.0, away_m, 0.0));
+        assert_eq!(hash, links(plate(1.0 / 1024.0, away_m, 0.0)), "{away_m} m");
+        assert_eq!(hash, links(plate(1024.0, away_m, 0.0)), "{away_m} m");
+        assert_eq!(hash, links(plate(1.0, away_m, 1e6)), "{away_m} m");
+    }
+}

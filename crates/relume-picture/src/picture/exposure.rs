@@ -76,7 +76,8 @@ fn visible_radiances(snapshot: &Snapshot, view: &View) -> Vec<(f64, bool)> {
     let emits = |patch: PatchId| {
         let scene = &snapshot.scene;
         let material = scene.patches[patch.0 as usize].material;
-        scene.materials[material.0 as usize].emits()
+        let now = scene.materials[material.0 as usize].exitance_at(snapshot.time_s);
+        now.iter().any(|&m| m > 0.0)
     };
     let pixels = rasterise(&grid, &drawing.primitives, |fragments| {
         fragments[0].primitive.map(|p| {

@@ -227,6 +227,9 @@ fn glows(draft: &Draft) -> impl Iterator<Item = (String, &Glow)> {
     materials.chain(lights).filter_map(|(of, glow)| Some((of, glow.as_ref()?)))
 }
 
+/// By how much baked keys may swing below nothing, where they count as that.
+const OVERSHOT: f64 = 1e-6;
+
 /// Keys in order, values finite and not negative.
 fn check_glows(draft: &Draft) -> Result<(), SceneError> {
     for (of, glow) in glows(draft) {
@@ -235,7 +238,7 @@ fn check_glows(draft: &Draft) -> Result<(), SceneError> {
             check_track(&of, &track.times_s, track.values.len(), track.interpolation)?;
             let cubic = track.interpolation == Interpolation::CubicSpline;
             let is_good = |(k, v): (usize, &DVec3)| {
-                v.is_finite() && (v.min_element() >= 0.0 || (cubic && k % 3 != 1))
+                v.is_finite() && (v.min_element() >= -OVERSHOT || (cubic && k % 3 != 1))
             };
             if let Some(bad) = (0..).zip(&track.values).find(|&key| !(finite && is_good(key))) {
                 return Err(SceneError::Animation {

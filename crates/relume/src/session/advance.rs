@@ -7,7 +7,7 @@ use crate::event::Ticks;
 use crate::pair::{
     Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Record, Since, Stage, update,
 };
-use crate::scene::{self, BodyId, LightKind};
+use crate::scene::{self, BodyId, LightKind, Material};
 use crate::solver::{Dirty, Links, Radiosity, Stop};
 
 use super::ahead::{Ahead, while_extrapolated};
@@ -96,9 +96,14 @@ impl Session {
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
         let share = if cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE };
         let residual = self.options.tolerance * share;
-        let stop = match ahead.lookahead {
-            Some(_) => while_extrapolated(residual, solved.sound_mean_w_m2, self.most_mean_w_m2()),
-            None => Stop::Residual(residual),
+        let stop = if solved.is_settled() {
+            Stop::Residual(residual)
+        } else {
+            let brightened = self.brightened(solved.sound_time_s, time_s);
+            // From nothing on, no growth is too much.
+            let mean = (solved.sound_mean_w_m2 * brightened).max(0.0);
+            let mean = if mean > 0.0 { mean } else { f64::INFINITY };
+            while_extrapolated(residual, mean, self.most_mean_w_m2())
         };
         let shines = |(k, light): (usize, &scene::Light)| {
             solved.view.light(k).is_some() && light.intensity_at(time_s).iter().any(|&i| i > 0.0)
@@ -114,6 +119,7 @@ impl Session {
         report.seconds.solve = clock.lap();
         if solved.is_settled() {
             solved.sound_mean_w_m2 = solved.radiosity.mean_w_m2(&lit);
+            solved.sound_time_s = time_s;
         }
         solved.compact();
 
@@ -133,23 +139,36 @@ impl Session {
     /// A bound on the mean radiosity of the scene at any time: all that can be emitted, over what is
     /// absorbed at least.
     fn most_mean_w_m2(&self) -> f64 {
+        let rho = self.scene.materials.iter().flat_map(|m| m.reflectance).fold(0.0, f64::max);
+        let emitted_w = self.emitted_w(Material::most_exitance, scene::Light::most_intensity);
+        emitted_w / self.scene.area_m2() / (1.0 - rho)
+    }
+
+    /// How many times as much the scene emits now as at another time, present or not.
+    fn brightened(&self, since_s: f64, now_s: f64) -> f64 {
+        let at = |t: f64| self.emitted_w(|m| m.exitance_at(t), |l| l.intensity_at(t));
+        if self.scene.is_relit([since_s, now_s]) { at(now_s) / at(since_s) } else { 1.0 }
+    }
+
+    /// What all surfaces and lights emit, W, with given exitances and intensities.
+    fn emitted_w(
+        &self,
+        exitance: impl Fn(&Material) -> [f64; 3],
+        intensity: impl Fn(&scene::Light) -> [f64; 3],
+    ) -> f64 {
         let scene = &self.scene;
         let mean = |c: [f64; 3]| c.iter().sum::<f64>() / 3.0;
-        let (mut emitted_w, mut area_m2, mut rho) = (0.0, 0.0, 0.0_f64);
-        for patch in &scene.patches {
-            let material = &scene.materials[patch.material.0 as usize];
-            area_m2 += patch.area_m2();
-            emitted_w += patch.area_m2() * mean(material.most_exitance());
-            rho = material.reflectance.into_iter().fold(rho, f64::max);
-        }
-        for light in &scene.lights {
+        let of_patch = |p: &scene::Patch| {
+            p.area_m2() * mean(exitance(&scene.materials[p.material.0 as usize]))
+        };
+        let of_light = |light: &scene::Light| {
             let spread = match light.kind {
-                LightKind::Directional => area_m2,
+                LightKind::Directional => scene.area_m2(),
                 LightKind::Point | LightKind::Spot { .. } => 4.0 * std::f64::consts::PI,
             };
-            emitted_w += mean(light.most_intensity()) * spread;
-        }
-        emitted_w / area_m2 / (1.0 - rho)
+            mean(intensity(light)) * spread
+        };
+        scene.patches.iter().map(of_patch).chain(scene.lights.iter().map(of_light)).sum()
     }
 
     /// Nothing but the seed and an unjudged root.
@@ -165,6 +184,7 @@ impl Session {
             coarse: Coarse::default(),
             radiosity: Radiosity::default(),
             sound_mean_w_m2: 0.0,
+            sound_time_s: time_s,
             events: Vec::new(),
             report: FrameReport::default(),
         }

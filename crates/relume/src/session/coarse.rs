@@ -3,8 +3,8 @@
 //! instant: links are summed in the order of the coarse elements, whatever their history.
 
 use crate::element::{ElementId, Forest, Kind};
-use crate::pair::{self, Brightness, Changes, Light};
-use crate::scene::{self, LightKind, PatchId, Scene};
+use crate::pair::{self, Brightness, Changes, Held, Light};
+use crate::scene::{self, PatchId, Scene};
 use crate::solver::{Dirty, Links, Radiosity, Stop, Surfaces};
 
 use super::surfaces::{LitForest, set_pairs};
@@ -22,9 +22,9 @@ const SWEEPS: u32 = 8;
 /// Errors on dark receivers are measured against at least this share of the mean irradiance.
 const DARK_FLOOR: f64 = 0.1;
 
-/// Share of what is emitted below which what arrives is what rounding lets through between shadows: errors
-/// relative to that have no end. (A lamp outside a closed room.)
-const LOST: f64 = 1e-5;
+/// Visibility, in 65,535ths, below which a coarse element sees no more of another than rounding lets through between two
+/// shadows: some 1e-4. Where that is all the light there is (a lamp outside a closed room), errors relative to it would have no end.
+const SEAM: u16 = 7;
 
 /// Splits facets down to coarse elements, numbers them and keeps them for good; returns their ids
 /// by number.
@@ -64,7 +64,12 @@ impl Coarse {
     /// Takes over what an update found on the coarse pairs. Whether any of them changed.
     pub(super) fn follow(&mut self, seed: &Forest, changes: &Changes) -> bool {
         let held = changes.held.iter();
-        let held = held.map(|h| pair::Link { a: h.a, b: h.b, carried: h.carried });
+        let held = held.map(|&Held { a, b, mut carried }| {
+            if carried.visibility < SEAM {
+                carried.visibility = 0;
+            }
+            pair::Link { a, b, carried }
+        });
         set_pairs(&mut self.links, seed, changes.dropped.iter().copied(), held);
         self.links.tidy();
         !changes.dropped.is_empty() || !changes.held.is_empty()
@@ -100,15 +105,7 @@ impl Coarse {
         let arriving: f64 =
             coarse.iter().zip(&irradiance).map(|(&id, h)| surfaces.area_m2(id) * h).sum();
         let intensity = |l: &scene::Light| l.intensity_at(time_s).iter().sum::<f64>() / 3.0;
-        let lights: Vec<f64> = scene.lights.iter().map(intensity).collect();
-        let emitted =
-            |&facet: &ElementId| surfaces.area_m2(facet.0) * mean(surfaces.lit(facet.0).exitance);
-        let spread = |light: &scene::Light| match light.kind {
-            LightKind::Directional => total_area,
-            LightKind::Point | LightKind::Spot { .. } => 4.0 * std::f64::consts::PI,
-        };
-        let shone = scene.lights.iter().zip(&lights).map(|(light, i)| i * spread(light));
-        let emitted_w = surfaces.facets().iter().map(emitted).chain(shone).sum::<f64>();
+        let mut lights: Vec<f64> = scene.lights.iter().map(intensity).collect();
         let floor = arriving / total_area * DARK_FLOOR;
         let light_of = |(&id, irradiance): (&u32, &f64)| {
             let emitted = mean(surfaces.lit(surfaces.facet_of(id)).exitance);
@@ -116,10 +113,11 @@ impl Coarse {
             let reflected = (radiosity - emitted).max(0.0);
             Light { radiosity, reflected, irradiance: irradiance + floor }
         };
-        let known = if arriving > LOST * emitted_w {
+        let known = if arriving > 0.0 {
             coarse.iter().zip(&irradiance).map(light_of).collect()
         } else {
-            // Nothing emits, or all of it is lost: every surface weighs the same, and errors are relative to row sums.
+            // Nothing arrives: every surface and light weighs the same, and errors are relative to row sums.
+            lights.iter_mut().for_each(|i| *i = f64::from(u8::from(*i > 0.0)));
             vec![Light::UNIFORM; coarse.len()]
         };
         Brightness::new(known, lights, total_area * REFERENCE_SHARE)

@@ -99,6 +99,8 @@ struct Solved {
     radiosity: Radiosity,
     /// Mean radiosity when no link was extrapolated last, W/m2.
     sound_mean_w_m2: f64,
+    /// When that was.
+    sound_time_s: f64,
     events: Vec<LinkEvent>,
     report: FrameReport,
 }

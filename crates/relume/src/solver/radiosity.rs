@@ -165,11 +165,13 @@ impl Radiosity {
         let to_residual = !matches!(stop, Stop::Sweeps(_));
         let mut last_mean = self.mean_w_m2(surfaces);
         let mut limit = limit_of(last_mean);
-        let start = (to_residual && self.trend.is_wide).then(|| {
+        if self.trend.is_wide {
+            // Nothing is known of what is owed.
             work.start_all(surfaces);
             grow(&mut self.owed, self.pending.len());
-            self.trend.follow(&mut self.radiosity)
-        });
+        }
+        let start = (to_residual && self.trend.is_wide)
+            .then(|| self.trend.follow(surfaces, &mut self.radiosity));
         let mut is_wide = work.all && !is_first;
         loop {
             if self.held > HELD_MAX * limit && !work.all && to_residual {
@@ -222,7 +224,7 @@ impl Radiosity {
             }
         }
         match start {
-            Some(start) => self.trend.learn(&start, &self.radiosity, limit),
+            Some(start) => self.trend.learn(surfaces, &start, &self.radiosity, limit),
             None => self.trend.is_wide = is_wide,
         }
         if self.trend.is_wide {

@@ -3,6 +3,7 @@
 use crate::element::Renumbering;
 
 use super::field::{Field, NINE, SLACK};
+use super::surfaces::{Surfaces, for_each_below};
 
 /// The last change of every mean radiosity; nothing where the last solve changed few. 4 bytes an element, since it only
 /// says where to begin: a step of 1/127 of the largest of the three channels.
@@ -30,32 +31,42 @@ pub(super) struct Start(Vec<[f32; 3]>);
 
 impl Trend {
     /// Goes on as before, from `field`; returns where that was.
-    pub(super) fn follow(&self, field: &mut Field) -> Start {
+    pub(super) fn follow(&self, surfaces: &impl Surfaces, field: &mut Field) -> Start {
         let start = Start(means(field).copied().collect());
-        if self.share > 0.0 {
-            for (mean, step) in means_mut(field).zip(&self.steps) {
-                let change = step.value();
+        if self.share > 0.0 && !self.steps.is_empty() {
+            for_each_element(surfaces, &mut |id| {
+                let change = self.steps[id].value();
+                let mean = &mut field.0[id * NINE..][..3];
                 (0..3).for_each(|c| mean[c] += self.share * change[c]);
-            }
+            });
         }
         start
     }
 
     /// Learns from what the solve changed; all is forgotten where few changed by more than `limit`.
-    pub(super) fn learn(&mut self, start: &Start, field: &Field, limit: f32) {
+    pub(super) fn learn(
+        &mut self,
+        surfaces: &impl Surfaces,
+        start: &Start,
+        field: &Field,
+        limit: f32,
+    ) {
+        let before = std::mem::take(&mut self.steps);
         self.steps.resize(start.0.len(), Step::default());
-        let (mut along, mut last, mut wide) = (0.0, 0.0, 0);
-        for ((now, before), step) in means(field).zip(&start.0).zip(&mut self.steps) {
-            let (expected, change) = (step.value(), [0, 1, 2].map(|c| now[c] - before[c]));
+        let (mut along, mut last, mut wide, mut all) = (0.0, 0.0, 0, 0);
+        for_each_element(surfaces, &mut |id| {
+            let expected = before.get(id).copied().unwrap_or_default().value();
+            let change = [0, 1, 2].map(|c| field.0[id * NINE + c] - start.0[id][c]);
+            all += 1;
             wide += usize::from(change.iter().any(|d| d.abs() > limit));
             for c in 0..3 {
                 along += f64::from(expected[c] * change[c]);
                 last += f64::from(expected[c] * expected[c]);
             }
-            *step = Step::of(change);
-        }
+            self.steps[id] = Step::of(change);
+        });
         self.share = if last > 0.0 { (along / last).clamp(0.0, 1.0) as f32 } else { 1.0 };
-        if wide * WIDE < start.0.len() {
+        if wide * WIDE < all {
             *self = Trend::default();
         }
     }
@@ -95,8 +106,11 @@ fn means(field: &Field) -> impl Iterator<Item = &[f32; 3]> {
     field.0.chunks_exact(NINE).map(|nine| nine.first_chunk().expect("nine numbers"))
 }
 
-fn means_mut(field: &mut Field) -> impl Iterator<Item = &mut [f32; 3]> {
-    field.0.chunks_exact_mut(NINE).map(|nine| nine.first_chunk_mut().expect("nine numbers"))
+/// Visits all elements of surfaces, parents first.
+fn for_each_element(surfaces: &impl Surfaces, visit: &mut dyn FnMut(usize)) {
+    for facet in surfaces.facets() {
+        for_each_below(surfaces, facet.0, &mut |id| visit(id as usize));
+    }
 }
 
 impl Step {
@@ -126,6 +140,9 @@ fn unit(exponent: i8) -> f32 {
 mod tests {
     use proptest::prelude::*;
 
+    use crate::element::ElementId;
+    use crate::solver::{Lit, Place};
+
     use super::*;
 
     proptest! {
@@ -147,27 +164,60 @@ mod tests {
         }
     }
 
+    /// One element; another is vacant.
+    struct One([ElementId; 1], Lit);
+
+    impl Surfaces for One {
+        fn len(&self) -> usize {
+            2
+        }
+        fn facets(&self) -> &[ElementId] {
+            &self.0
+        }
+        fn facet_of(&self, id: u32) -> u32 {
+            id
+        }
+        fn parent(&self, _: u32) -> Option<u32> {
+            None
+        }
+        fn children(&self, _: u32) -> std::ops::Range<u32> {
+            0..0
+        }
+        fn area_m2(&self, _: u32) -> f64 {
+            1.0
+        }
+        fn place(&self, _: u32) -> Place {
+            Place { centroid: [0.0; 2], radius: 1.0, moment: [1.0, 0.0, 1.0] }
+        }
+        fn lit(&self, _: u32) -> &Lit {
+            &self.1
+        }
+    }
+
     #[test]
     fn what_goes_on_is_expected_and_what_turns_back_is_not() {
+        let one = One([ElementId(0)], Lit { reflectance: [0.5; 3], exitance: [0.0; 3] });
         let field = |value: f32| {
             let mut field = Field::default();
-            field.extend(1);
+            field.extend(2);
             field.0[..3].fill(value);
+            field.0[NINE..NINE + 3].fill(7.0);
             field
         };
         let mut trend = Trend::default();
         for (before, after, expected) in
             [(1.0, 2.0, 3.0), (2.0, 3.0, 4.0), (3.0, 3.5, 3.75), (3.5, 3.0, 3.0)]
         {
-            let start = trend.follow(&mut field(before));
-            assert_eq!(start.0, [[before; 3]]);
-            trend.learn(&start, &field(after), 0.1);
+            let start = trend.follow(&one, &mut field(before));
+            assert_eq!(start.0, [[before; 3], [7.0; 3]]);
+            trend.learn(&one, &start, &field(after), 0.1);
             let mut next = field(after);
-            trend.follow(&mut next);
+            trend.follow(&one, &mut next);
             assert!((next.0[0] - expected).abs() < 0.02, "{} {expected}", next.0[0]);
+            assert_eq!(next.0[NINE], 7.0);
         }
-        let start = trend.follow(&mut field(3.0));
-        trend.learn(&start, &field(3.05), 0.1);
+        let start = trend.follow(&one, &mut field(3.0));
+        trend.learn(&one, &start, &field(3.05), 0.1);
         assert!(!trend.is_wide && trend.steps.is_empty());
     }
 }

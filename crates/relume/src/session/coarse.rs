@@ -3,9 +3,9 @@
 //! instant: links are summed in the order of the coarse elements, whatever their history.
 
 use crate::element::{ElementId, Forest, Kind};
-use crate::pair::{self, Brightness, Changes, Held, Light};
+use crate::pair::{self, Brightness, Carried, Changes, Held, Light};
 use crate::scene::{self, PatchId, Scene};
-use crate::solver::{Dirty, Links, Radiosity, Stop, Surfaces};
+use crate::solver::{Dirty, Link, Links, Radiosity, Stop, Surfaces};
 
 use super::surfaces::{LitForest, set_pairs};
 
@@ -22,9 +22,9 @@ const SWEEPS: u32 = 8;
 /// Errors on dark receivers are measured against at least this share of the mean irradiance.
 const DARK_FLOOR: f64 = 0.1;
 
-/// Visibility, in 65,535ths, below which a coarse element sees no more of another than rounding lets through between two
-/// shadows: some 1e-4. Where that is all the light there is (a lamp outside a closed room), errors relative to it would have no end.
-const SEAM: u16 = 7;
+/// Share of what would arrive directly if nothing were in the way, below which what arrives is what rounding lets through
+/// between shadows: errors relative to that would have no end. (A lamp outside a closed room.)
+const LOST: f64 = 1e-4;
 
 /// Splits facets down to coarse elements, numbers them and keeps them for good; returns their ids
 /// by number.
@@ -56,6 +56,8 @@ pub(super) fn number(scene: &Scene, forest: &mut Forest) -> Vec<u32> {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Coarse {
     links: Links,
+    /// The same with nothing in the way.
+    open: Links,
     radiosity: Radiosity,
     pub(super) brightness: Brightness,
 }
@@ -64,14 +66,15 @@ impl Coarse {
     /// Takes over what an update found on the coarse pairs. Whether any of them changed.
     pub(super) fn follow(&mut self, seed: &Forest, changes: &Changes) -> bool {
         let held = changes.held.iter();
-        let held = held.map(|&Held { a, b, mut carried }| {
-            if carried.visibility < SEAM {
-                carried.visibility = 0;
-            }
-            pair::Link { a, b, carried }
+        let held = held.map(|&Held { a, b, carried }| pair::Link { a, b, carried });
+        let open = held.clone().map(|link| {
+            let carried = Carried { visibility: u16::MAX, ..link.carried };
+            pair::Link { carried, ..link }
         });
         set_pairs(&mut self.links, seed, changes.dropped.iter().copied(), held);
+        set_pairs(&mut self.open, seed, changes.dropped.iter().copied(), open);
         self.links.tidy();
+        self.open.tidy();
         !changes.dropped.is_empty() || !changes.held.is_empty()
     }
 
@@ -79,6 +82,7 @@ impl Coarse {
     pub(super) fn solve(&mut self, (scene, time_s): (&Scene, f64), seed: &Forest, coarse: &[u32]) {
         for &id in coarse {
             self.links.sort(id);
+            self.open.sort(id);
         }
         let surfaces = LitForest::new(scene, seed, time_s).with_places();
         self.radiosity = start((scene, time_s), seed, &surfaces);
@@ -113,10 +117,17 @@ impl Coarse {
             let reflected = (radiosity - emitted).max(0.0);
             Light { radiosity, reflected, irradiance: irradiance + floor }
         };
-        let known = if arriving > 0.0 {
+        let emits = |source: u32| match seed.light(ElementId(source)) {
+            Some(light) => lights[light],
+            None => mean(surfaces.lit(surfaces.facet_of(source)).exitance),
+        };
+        let brings = |link: &Link| f64::from(link.coupling) * emits(link.source);
+        let open =
+            |&id: &u32| surfaces.area_m2(id) * self.open.of(id).iter().map(brings).sum::<f64>();
+        let known = if arriving > LOST * coarse.iter().map(open).sum::<f64>() {
             coarse.iter().zip(&irradiance).map(light_of).collect()
         } else {
-            // Nothing arrives: every surface and light weighs the same, and errors are relative to row sums.
+            // Nothing emits, or all is hidden: every surface and light weighs the same, and errors are relative to row sums.
             lights.iter_mut().for_each(|i| *i = f64::from(u8::from(*i > 0.0)));
             vec![Light::UNIFORM; coarse.len()]
         };
@@ -130,7 +141,8 @@ impl Coarse {
 
     /// Bytes held.
     pub(super) fn memory_bytes(&self) -> u64 {
-        self.links.memory_bytes() + self.radiosity.memory_bytes()
+        let links = self.links.memory_bytes() + self.open.memory_bytes();
+        links + self.radiosity.memory_bytes()
     }
 }
 

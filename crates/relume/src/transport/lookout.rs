@@ -377,6 +377,35 @@ pub struct FactorPast {
     pub is_exact: bool,
 }
 
+/// What a single point sees of a convex polygon past convex occluders.
+struct PointLook {
+    frame: TargetFrame,
+    /// The point, and the polygon, in it.
+    from: DVec3,
+    flat: Vec<DVec2>,
+    cutter: Cutter,
+}
+
+impl PointLook {
+    fn new<'a>(
+        point: DVec3,
+        target: &[DVec3],
+        occluders: impl Iterator<Item = &'a [DVec3]>,
+    ) -> PointLook {
+        let frame = TargetFrame::of_polygon(target);
+        let from = frame.place(point);
+        let mut between = Occluders::default();
+        for occluder in occluders {
+            between.push(occluder.iter().map(|&c| frame.place(c)), from);
+        }
+        between.largest_first();
+        let mut cutter = Cutter::default();
+        let flat = frame.flat(target);
+        cutter.cut(from, &flat, &between);
+        PointLook { frame, from, flat, cutter }
+    }
+}
+
 /// Form factor from a point to the part of a convex polygon (wholly in front of the point's tangent
 /// plane) that convex occluders leave visible; exact up to rounding. Occluders must have been
 /// clipped to between the two.
@@ -386,16 +415,7 @@ pub fn form_factor_past<'a>(
     target: &[DVec3],
     occluders: impl Iterator<Item = &'a [DVec3]>,
 ) -> FactorPast {
-    let frame = TargetFrame::of_polygon(target);
-    let from = frame.place(point);
-    let mut between = Occluders::default();
-    for occluder in occluders {
-        between.push(occluder.iter().map(|&c| frame.place(c)), from);
-    }
-    between.largest_first();
-    let mut cutter = Cutter::default();
-    let flat = frame.flat(target);
-    cutter.cut(from, &flat, &between);
+    let PointLook { frame, from, flat, cutter } = PointLook::new(point, target, occluders);
     let normal = frame.direction(normal);
     let mut solid = Vec::new();
     let (mut factor, mut moment) = (0.0, DVec2::ZERO);
@@ -422,16 +442,7 @@ pub(super) fn is_hidden<'a>(
     target: &[DVec3],
     occluders: impl Iterator<Item = &'a [DVec3]>,
 ) -> bool {
-    let frame = TargetFrame::of_polygon(target);
-    let from = frame.place(point);
-    let mut between = Occluders::default();
-    for occluder in occluders {
-        between.push(occluder.iter().map(|&c| frame.place(c)), from);
-    }
-    between.largest_first();
-    let mut cutter = Cutter::default();
-    let flat = frame.flat(target);
-    cutter.cut(from, &flat, &between);
+    let PointLook { flat, cutter, .. } = PointLook::new(point, target, occluders);
     let left: f64 = cutter.left.iter().map(twice_area).sum();
     let dark: f64 = cutter.dark.iter().map(twice_area).sum();
     left - dark <= HIDDEN * twice_area(&flat)

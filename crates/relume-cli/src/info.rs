@@ -97,7 +97,7 @@ fn materials(out: &mut String, scene: &Scene) -> fmt::Result {
             write!(out, "  emits {}", triple(*exitance))?;
         }
         if material.emits() && glow.is_some() {
-            write!(out, " at first, up to {}", triple(material.most_exitance()))?;
+            write!(out, " at first, never above {}", triple(material.most_exitance()))?;
         }
         writeln!(out, "{}", if *double_sided { "  both sides" } else { "" })?;
     }

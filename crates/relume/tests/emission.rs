@@ -145,12 +145,13 @@ fn extrapolated_links_follow_a_lamp_that_changes() {
 fn bad_keys_are_refused_by_name() {
     let refused = |values: &[f64]| {
         let message = room(values).build().unwrap_err().to_string();
-        assert!(message.contains("material `lamp`"), "{message}");
+        assert!(message.contains("`of material lamp`"), "{message}");
         message
     };
     assert!(refused(&[1.0, -1.0]).contains("emission"));
     assert!(refused(&[1.0, f64::NAN]).contains("emission"));
     assert!(refused(&[]).contains("no keys"));
+    assert!(refused(&[1.0, 1e38]).contains("beyond"));
     let mut b = room(&[1.0]);
     b.animate_intensity("nothing", track(&[1.0], [1.0; 3], Interpolation::Step));
     assert!(b.build().unwrap_err().to_string().contains("light `nothing`"));

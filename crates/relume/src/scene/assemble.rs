@@ -222,8 +222,8 @@ fn duration_s(nodes: &[super::Node], draft: &Draft) -> f64 {
 
 /// All emissions that change, with what they are of.
 fn glows(draft: &Draft) -> impl Iterator<Item = (String, &Glow)> {
-    let materials = draft.materials.iter().map(|m| (format!("material `{}`", m.name), &m.glow));
-    let lights = draft.lights.iter().map(|l| (format!("light `{}`", l.name), &l.glow));
+    let materials = draft.materials.iter().map(|m| (format!("of material {}", m.name), &m.glow));
+    let lights = draft.lights.iter().map(|l| (format!("of light {}", l.name), &l.glow));
     materials.chain(lights).filter_map(|(of, glow)| Some((of, glow.as_ref()?)))
 }
 
@@ -241,12 +241,20 @@ fn check_glows(draft: &Draft) -> Result<(), SceneError> {
                 v.is_finite() && (v.min_element() >= -OVERSHOT || (cubic && k % 3 != 1))
             };
             if let Some(bad) = (0..).zip(&track.values).find(|&key| !(finite && is_good(key))) {
+                let at_s = track.times_s[bad.0 / if cubic { 3 } else { 1 }];
                 return Err(SceneError::Animation {
                     animation: of,
-                    what: format!("its emission has the value {}", bad.1),
+                    what: format!("the emission at {at_s} s has the value {}", bad.1),
                     remedy: "choose finite values of 0 or more".into(),
                 });
             }
+        }
+        if glow.most().iter().any(|&m| !(m as f32).is_finite()) {
+            return Err(SceneError::Animation {
+                animation: of,
+                what: "the emission grows beyond all numbers".into(),
+                remedy: "choose smaller values".into(),
+            });
         }
     }
     Ok(())

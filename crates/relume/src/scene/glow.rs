@@ -1,4 +1,4 @@
-//! Emission that changes: keyframes of a material's exitance or of a light's intensity.
+//! Emission that changes: keyframes of a material's exitance or of a light's intensity. In files: KHR_animation_pointer.
 
 use glam::DVec3;
 
@@ -75,6 +75,12 @@ impl Material {
         self.glow.as_ref().map_or(self.exitance, Glow::most)
     }
 
+    /// Whether its exitance differs between two times, seconds.
+    pub fn is_relit(&self, times_s: [f64; 2]) -> bool {
+        let [from, to] = times_s.map(|t| self.exitance_at(t));
+        from != to
+    }
+
     /// Whether it emits at any time.
     pub fn emits(&self) -> bool {
         self.most_exitance().iter().any(|&m| m > 0.0)
@@ -87,6 +93,12 @@ impl Light {
         self.glow.as_ref().map_or(self.intensity, |glow| glow.at(time_s))
     }
 
+    /// Whether its intensity differs between two times, seconds.
+    pub fn is_relit(&self, times_s: [f64; 2]) -> bool {
+        let [from, to] = times_s.map(|t| self.intensity_at(t));
+        from != to
+    }
+
     /// The most that its intensity is at any time; a bound.
     pub fn most_intensity(&self) -> [f64; 3] {
         self.glow.as_ref().map_or(self.intensity, Glow::most)
@@ -94,12 +106,10 @@ impl Light {
 }
 
 impl Scene {
-    /// Whether any emission differs between two times.
-    pub fn is_relit(&self, [from_s, to_s]: [f64; 2]) -> bool {
-        let materials = self.materials.iter().filter(|m| m.glow.is_some());
-        let lights = self.lights.iter().filter(|l| l.glow.is_some());
-        materials.into_iter().any(|m| m.exitance_at(from_s) != m.exitance_at(to_s))
-            || lights.into_iter().any(|l| l.intensity_at(from_s) != l.intensity_at(to_s))
+    /// Whether any emission differs between two times, seconds.
+    pub fn is_relit(&self, times_s: [f64; 2]) -> bool {
+        self.materials.iter().any(|m| m.is_relit(times_s))
+            || self.lights.iter().any(|l| l.is_relit(times_s))
     }
 }
 

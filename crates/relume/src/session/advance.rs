@@ -84,7 +84,7 @@ impl Session {
                 parents.extend(self.relit_facets(&solved, from_s));
             }
         }
-        if relit && self.lights_relit([from_s, time_s]) {
+        if self.scene.lights.iter().any(|light| light.is_relit([from_s, time_s])) {
             // Whoever gathers from a light gathers anew.
             let lit = (&*self.scene, time_s);
             coarse::set_lights(lit, &solved.forest, &mut solved.radiosity);
@@ -101,7 +101,7 @@ impl Session {
         } else {
             let brightened = self.brightened(solved.sound_time_s, time_s);
             // From nothing on, no growth is too much.
-            let mean = (solved.sound_mean_w_m2 * brightened).max(0.0);
+            let mean = solved.sound_mean_w_m2 * brightened;
             let mean = if mean > 0.0 { mean } else { f64::INFINITY };
             while_extrapolated(residual, mean, self.most_mean_w_m2())
         };
@@ -297,17 +297,12 @@ impl Session {
     fn relit_facets(&self, solved: &Solved, from_s: f64) -> Vec<u32> {
         let forest = &solved.forest;
         let times = [from_s, solved.time_s];
-        let differs = |m: &scene::Material| m.exitance_at(times[0]) != m.exitance_at(times[1]);
-        let relit: Vec<bool> = self.scene.materials.iter().map(differs).collect();
+        let relit: Vec<bool> = self.scene.materials.iter().map(|m| m.is_relit(times)).collect();
         let is_relit = |facet: &&ElementId| {
             let patch = forest.patch(**facet).expect("a facet has a patch");
             relit[self.scene.patches[patch.0 as usize].material.0 as usize]
         };
         forest.facets().iter().filter(is_relit).map(|f| f.0).collect()
-    }
-
-    fn lights_relit(&self, [from_s, to_s]: [f64; 2]) -> bool {
-        self.scene.lights.iter().any(|l| l.intensity_at(from_s) != l.intensity_at(to_s))
     }
 
     /// The coarse solution, where there is one; else exitances.

@@ -37,7 +37,8 @@ pub struct ImportOptions {
 /// surfaces are one, obstructions are in [`Scene::obstructions`]. Of glTF:
 ///
 /// Units are metres, seconds and W: emissive factors are radiances in W/m2/sr, punctual lights are
-/// converted ([`super::Light::conversion`]). Emissions and visibility may be animated (KHR_animation_pointer). Extensions without effect on diffuse light are
+/// converted ([`super::Light::conversion`]). Emissions and visibility may be animated
+/// (KHR_animation_pointer). Extensions without effect on diffuse light are
 /// ignored; what is read otherwise than the file says is in [`Scene::notes`]. Skinned and morphed
 /// meshes are read in their rest shape, with a warning that names the node.
 ///

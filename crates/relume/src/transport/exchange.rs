@@ -9,6 +9,7 @@ use std::f64::consts::FRAC_1_PI;
 use fearless_simd::dispatch;
 use glam::{DVec2, DVec3};
 
+use super::contour::exchange_along_outlines;
 use super::kernel::{GaussPoints, Simd, kernel_grid};
 use super::point::{LANES, PointBundle, bundle_sums, sum_of_lanes};
 use crate::element::{WorldElement, WorldLight, bilinear, bilinear_area};
@@ -266,7 +267,8 @@ fn exchange_of_grids(a: &WorldElement, b: &WorldElement) -> Exchange {
     Exchange { area_m2: over_a.value, over_a: over_a.variation(), over_b: over_b.variation() }
 }
 
-/// The closed form from points of each side to the whole of the other; the area from the smaller.
+/// The closed form from points of each side to the whole of the other; the area from the smaller, or where
+/// that may be wrong from the outlines of both.
 fn close_exchange(simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
     let slack = a.rounding_m + b.rounding_m;
     let part =
@@ -277,8 +279,29 @@ fn close_exchange(simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
     }
     let (from_a, over_a) = integrate_polygon(simd, a, &of_a, of_b.corners());
     let (from_b, over_b) = integrate_polygon(simd, b, &of_b, of_a.corners());
-    Exchange { area_m2: if no_smaller(b.area, a.area) { from_a } else { from_b }, over_a, over_b }
+    let (large, small) = (from_a.max(from_b), from_a.min(from_b));
+    let bend = over_a.bend.min(over_b.bend);
+    let area_m2 = if large - small > AGREE * large || small <= 0.0 || bend > BENT {
+        // No more than either has room for.
+        let most = of_a.area().min(of_b.area());
+        let error_max = OUTLINE_ERROR * large.max(1e-3 * most);
+        exchange_along_outlines(of_a.corners(), of_b.corners(), error_max).min(most)
+    } else if no_smaller(b.area, a.area) {
+        from_a
+    } else {
+        from_b
+    };
+    Exchange { area_m2, over_a, over_b }
 }
+
+/// Relative difference of what points of both sides find up to which they are right.
+const AGREE: f64 = 2e-3;
+
+/// Bend over both sides above which points may have missed what is between them, though they agree.
+const BENT: f64 = 0.3;
+
+/// Relative error of exchange areas along outlines.
+const OUTLINE_ERROR: f64 = 1e-4;
 
 /// Integral over `part` of `e` of the form factor to `seen`, m2, and its variation over `e`.
 fn integrate_polygon(
@@ -494,6 +517,53 @@ mod tests {
         }
         println!("largest relative error {worst:.2e}; {grids} pairs by 4 x 4 points");
         assert!(grids > 20);
+    }
+
+    #[test]
+    #[ignore]
+    fn explore() {
+        use super::super::contour::exchange_along_outlines;
+        let mut seed = 1_u64;
+        let mut unit = || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let simd = Simd::detect();
+        for n in 0..3000 {
+            let kind = n % 5;
+            let log = |u: f64, lo: f64, hi: f64| lo * (hi / lo).powf(u);
+            let (w, h) = (log(unit(), 0.01, 1.0), log(unit(), 0.01, 1.0));
+            let a = rectangle(DVec3::ZERO, DVec3::X * w, DVec3::Y * h);
+            let (bw, bh) = (log(unit(), 0.01, 1.0), log(unit(), 0.01, 1.0));
+            let gap = log(unit(), 1e-4, 0.5);
+            let o = DVec3::new((unit() - 0.5) * w, (unit() - 0.5) * h, gap);
+            let b = match kind {
+                // Parallel, aligned.
+                0 => rectangle(o, DVec3::Y * bh, DVec3::X * bw),
+                // Standing on it or above.
+                1 => rectangle(o.with_z(0.0), DVec3::Z * bh, DVec3::X * bw),
+                2 => rectangle(o, DVec3::Z * bh, DVec3::X * bw),
+                // Parallel, turned.
+                3 => { let t = DMat3::from_rotation_z(unit() * 3.0); rectangle(o, t * DVec3::Y * bh, t * DVec3::X * bw) }
+                // Anything.
+                _ => { let t = DMat3::from_rotation_z(unit() * 3.0) * DMat3::from_rotation_x(unit() * 3.0); rectangle(o, t * DVec3::Y * bh, t * DVec3::X * bw) }
+            };
+            let m = meeting(&a, &b);
+            if m == Meeting::Away { continue; }
+            let (reach, apart) = (a.radius + b.radius, (b.centre - a.centre).length_squared());
+            if m == Meeting::Facing && reach * reach <= CLOSE * apart { continue; }
+            let slack = a.rounding_m + b.rounding_m;
+            let part = |e: &WorldElement, plane| ConvexPolygon::new(&e.corners[..e.len]).clipped(plane, slack);
+            let (of_a, of_b) = (part(&a, &b.plane), part(&b, &a.plane));
+            if of_a.corners().len() < 3 || of_b.corners().len() < 3 { continue; }
+            let (from_a, va) = integrate_polygon(simd, &a, &of_a, of_b.corners());
+            let (from_b, vb) = integrate_polygon(simd, &b, &of_b, of_a.corners());
+            let exact = exchange_along_outlines(of_a.corners(), of_b.corners(), 1e-12);
+            let start = std::time::Instant::now();
+            let rough = exchange_along_outlines(of_a.corners(), of_b.corners(), 1e-4 * exact);
+            let t = start.elapsed().as_nanos();
+            println!("{kind} {w:.4} {h:.4} {bw:.4} {bh:.4} {gap:.5} {exact:.6e} {:.2e} {:.2e} {:.2e} {t} bend {:.3} {:.3} {}", from_a / exact - 1.0, from_b / exact - 1.0, rough / exact - 1.0, va.bend, vb.bend, a.area < b.area);
+        }
     }
 
     #[test]

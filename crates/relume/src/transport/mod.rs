@@ -4,6 +4,7 @@
 
 mod bend;
 mod clip;
+mod contour;
 mod exchange;
 mod kernel;
 mod lookout;

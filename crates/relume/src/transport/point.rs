@@ -49,7 +49,7 @@ const ATAN: [f64; 10] = [
 /// The angle of (x, y) for y >= 0, in [0, pi]; error below 1e-15. The system's atan2 differs from
 /// machine to machine; this one is plain arithmetic, and has no branches.
 #[inline(always)]
-fn angle(y: f64, x: f64) -> f64 {
+pub(super) fn angle(y: f64, x: f64) -> f64 {
     let ax = x.abs();
     let (low, high) = (ax.min(y), ax.max(y));
     // Above tan(pi/8): atan t = pi/4 + atan((t - 1) / (t + 1)), with t = low / high.

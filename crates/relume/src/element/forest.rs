@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 use super::clusters::{Branch, binary_tree};
 use super::split::{Chart, Extent, Place, Shape};
 use crate::geometry::{Aabb, split_convex};
-use crate::scene::{BodyId, PatchId, Scene, Solid, Solids};
+use crate::scene::{BodyId, Enclosure, PatchId, Scene, Solid, Solids};
 
 /// Index of a node in a [`Forest`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -143,6 +143,10 @@ struct Fixed {
     facets: Vec<ElementId>,
     /// The convex solids that patches are faces of.
     solids: Solids,
+    /// Box around the unit normals of the patches at or below each node, in their bodies' frames.
+    normals: Vec<Aabb>,
+    /// Whether a patch emits light at any time, by patch.
+    glows: Vec<bool>,
 }
 
 /// Where elements went when the forest was put together: those that stayed keep their order.
@@ -214,7 +218,27 @@ impl Forest {
         forest.fixed_len = forest.nodes.len() as u32;
         forest.kept_len = forest.fixed_len;
         forest.sum_areas();
+        forest.fixed_mut().normals = forest.boxes_of_normals(scene);
+        forest.fixed_mut().glows = scene
+            .patches
+            .iter()
+            .map(|patch| scene.materials[patch.material.0 as usize].emits())
+            .collect();
         forest
+    }
+
+    fn boxes_of_normals(&self, scene: &Scene) -> Vec<Aabb> {
+        let mut boxes = vec![Aabb::EMPTY; self.nodes.len()];
+        for id in (0..self.nodes.len()).rev() {
+            let element = ElementId(id as u32);
+            if let Some(patch) = self.patch(element) {
+                boxes[id] = Aabb::of([scene.patches[patch.0 as usize].frame.normal]);
+            }
+            if let Some(parent) = self.parent(element) {
+                boxes[parent.0 as usize] = boxes[parent.0 as usize].union(boxes[id]);
+            }
+        }
+        boxes
     }
 
     fn push_fixed(&mut self, kind: Kind, parent: u32, count: u32) -> u32 {
@@ -527,6 +551,24 @@ impl Forest {
     /// The convex solid whose face a patch is, if it is one's.
     pub fn solid(&self, patch: PatchId) -> Option<u32> {
         self.fixed.solids.of_patch[patch.0 as usize]
+    }
+
+    /// What the closed surface that a patch belongs to encloses.
+    pub fn enclosure(&self, patch: PatchId) -> Enclosure {
+        self.fixed.solids.enclosures[patch.0 as usize]
+    }
+
+    /// Whether a patch emits light at any time.
+    pub fn glows(&self, patch: PatchId) -> bool {
+        self.fixed.glows[patch.0 as usize]
+    }
+
+    /// Whether a node may hold a patch with a normal opposed to `normal`, which is in the frame of the node's
+    /// body. Conservative.
+    pub fn may_oppose(&self, id: ElementId, normal: DVec3) -> bool {
+        let bounds = &self.fixed.normals[self.fixed(id).0 as usize];
+        let least = (bounds.lo * normal).min(bounds.hi * normal);
+        least.x + least.y + least.z < -0.5 + 1e-6
     }
 
     /// A convex solid.

@@ -169,6 +169,12 @@ impl WorldView {
         self.present[body.0 as usize]
     }
 
+    /// Unit normal of a patch: in its body's frame if `in_body`, else in the world.
+    pub fn normal(&self, patch: PatchId, in_body: bool) -> DVec3 {
+        let patch = self.patch(patch);
+        if in_body { patch.local.normal } else { patch.world.normal }
+    }
+
     /// A patch as a blocker in the world.
     #[inline]
     pub fn occluder(&self, patch: PatchId) -> OccluderPolygon<'_> {

@@ -9,7 +9,7 @@ use crate::element::{
     ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldPatch, WorldView,
 };
 use crate::event::Foresight;
-use crate::geometry::{Aabb, Plane, shaft_meets_box};
+use crate::geometry::{Aabb, Plane, Pose, shaft_meets_box};
 use crate::scene::{BodyId, Drift, PatchId};
 
 use super::judge::{LightPlace, body_of};
@@ -230,7 +230,7 @@ impl SpaceOutlook<'_> {
                 false => !turns_c && (span_lo > tilt || span_hi < -tilt),
             };
             let turned = !rides && (turns || turns_c);
-            let faces = turned || c.plane.normal.dot(e.plane.normal) < -0.5 + 1e-9;
+            let faces = turned || c.plane.normal.dot(e.plane.normal).abs() > 0.5 - 1e-9;
             let other_side = twin.is_some() && twin == end.1;
             AtEnd { behind: known && hi + shift.1 <= half, may_cover: !other_side && !off && faces }
         };
@@ -284,7 +284,16 @@ impl SpaceOutlook<'_> {
             let corner = DVec3::select(n.cmpge(DVec3::ZERO), bounds.hi, bounds.lo);
             (plane.distance(corner), patch.rounding_m)
         };
-        far + shift <= 0.5 * slack
+        // What may come to lie in the plane and faces it may touch it.
+        let opposes = || match self.body(b) {
+            Some(body) if matches!(self.ahead.drift(h, body), Drift::Turns(_)) => true,
+            Some(body) => {
+                let pose = self.view.poses()[body.0 as usize].unwrap_or(Pose::IDENTITY);
+                self.forest.may_oppose(b, pose.rotation.transpose() * plane.normal)
+            }
+            None => true,
+        };
+        far + shift < -2.0 * slack || (far + shift <= 0.5 * slack && !opposes())
     }
 }
 

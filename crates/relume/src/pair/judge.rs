@@ -10,7 +10,8 @@ use crate::geometry::{Aabb, Plane, no_smaller, shaft_meets_box};
 use crate::scene::{BodyId, LightKind, PatchId};
 use crate::transport::{
     CELLS_MAX, CLIPPED_MAX, Clipping, Exchange, Meeting, SegmentBundle, Shaft, Simd, Visibility,
-    clipping, exchange, light_at, light_exchange, light_visibility, meeting, visibility,
+    clipping, contact_exchange, exchange, light_at, light_exchange, light_visibility, meeting,
+    visibility,
 };
 
 use super::brightness::Brightness;
@@ -171,6 +172,9 @@ impl Judge for Placed<'_> {
     }
 }
 
+/// Depth behind a plane, in roundings of its patch, up to which a group may hold what touches it.
+const IN_PLANE: f64 = 64.0;
+
 /// A verdict of which the numbers do not matter.
 fn passing(verdict: Verdict, segments: u32) -> Judgement {
     Judgement { verdict, carried: Carried::default(), margin: Margin::Firm, segments }
@@ -228,7 +232,11 @@ impl Placed<'_> {
             None => (box_a, box_b),
         };
         let one_body = body.is_some();
-        if self.box_is_behind(a, box_b, one_body) || self.box_is_behind(b, box_a, one_body) {
+        let is_behind = |(of, other): (ElementId, ElementId), bounds: &Aabb| {
+            self.box_is_behind(of, bounds, one_body)
+                .is_some_and(|is_in_plane| !is_in_plane || !self.may_touch(of, other, one_body))
+        };
+        if is_behind((a, b), box_b) || is_behind((b, a), box_a) {
             return culled(CullReason::FacingAway);
         }
         BoxShaft::new(self.view, self.forest, (a, b), body).narrow(candidates, narrowed);
@@ -242,16 +250,31 @@ impl Placed<'_> {
         passing(Verdict::Refine(side), 0)
     }
 
-    /// Whether a box is wholly behind the plane of a polygon or element; the box is in the body's
-    /// frame if `in_body`.
-    fn box_is_behind(&self, id: ElementId, bounds: &Aabb, in_body: bool) -> bool {
-        let Some(patch) = self.forest.patch(id) else { return false };
+    /// Whether a group may hold a patch that opposes a polygon or element.
+    fn may_touch(&self, of: ElementId, group: ElementId, in_body: bool) -> bool {
+        let (Some(patch), Some(body)) = (self.forest.patch(of), self.body_of(group)) else {
+            return true;
+        };
+        let normal = self.view.normal(patch, in_body);
+        let turned = match self.view.poses()[body.0 as usize] {
+            Some(pose) if !in_body => pose.rotation.transpose() * normal,
+            _ => normal,
+        };
+        self.forest.may_oppose(group, turned)
+    }
+
+    /// Whether a box is wholly behind the plane of a polygon or element, and if so whether it reaches into the
+    /// plane; the box is in the body's frame if `in_body`.
+    fn box_is_behind(&self, id: ElementId, bounds: &Aabb, in_body: bool) -> Option<bool> {
+        let patch = self.forest.patch(id)?;
         let patch = self.view.patch(patch);
         let frame = if in_body { &patch.local } else { &patch.world };
         let n = frame.normal;
         let plane = Plane::through(frame.origin, n);
         let far = DVec3::select(n.cmpge(DVec3::ZERO), bounds.hi, bounds.lo);
-        plane.distance(far) <= patch.rounding_m
+        let above = plane.distance(far);
+        // What is in contact with this one may be off by the rounding of both.
+        (above <= patch.rounding_m).then_some(above >= -IN_PLANE * patch.rounding_m)
     }
 
     fn judge_elements(
@@ -268,10 +291,10 @@ impl Placed<'_> {
         }
         let places = Places::new(self, (a, b), !candidates.is_empty());
         let met = meeting(&places.own.0, &places.own.1);
-        if met == Meeting::Away {
+        let shaft = places.shaft(self);
+        if met == Meeting::Away || (met == Meeting::Coplanar && !shaft.is_contact()) {
             return culled(CullReason::FacingAway);
         }
-        let shaft = places.shaft(self);
         let start = narrowed.len();
         shaft.narrow(candidates, narrowed);
         let candidates = &narrowed[start..];
@@ -309,7 +332,16 @@ impl Placed<'_> {
         candidates: &[u32],
     ) -> Judgement {
         let key = pair_key(self.forest.key(a), self.forest.key(b));
-        let x = exchange(self.simd, place_a, place_b, met);
+        let in_contact = met == Meeting::Coplanar;
+        let x = match in_contact {
+            true => {
+                contact_exchange(place_a, place_b, shaft.contact_m2(&shaft.blockers(candidates)))
+            }
+            false => exchange(self.simd, place_a, place_b, met),
+        };
+        if in_contact && x.area_m2 <= 0.0 {
+            return culled(CullReason::FacingAway);
+        }
         let mut firm = Margin::Firm;
         if let (Oracle::FormFactor { epsilon, min_area_m2 }, Stage::Fine(_)) =
             (self.oracle, self.stage)
@@ -328,7 +360,7 @@ impl Placed<'_> {
                 }
             }
         }
-        let blockers = shaft.blockers(candidates);
+        let blockers = if in_contact { Vec::new() } else { shaft.blockers(candidates) };
         let occluders = shaft.occluders(&blockers);
         let mut most = CLIPPED_MAX;
         let mut way = Margin::ENDLESS;
@@ -341,10 +373,18 @@ impl Placed<'_> {
                 way = Margin::between(brings.max(limit), brings.min(limit));
             }
         }
+        let factor = x.area_m2 / place_a.area.min(place_b.area);
+        // Of the canonical brightness, which is coarse, less is asked.
+        let overlooked_max = match (self.stage, self.oracle) {
+            (Stage::Fine(_), Oracle::Error { threshold }) => {
+                OVERLOOKED_MAX * threshold.max(FINEST) / factor.max(f64::MIN_POSITIVE)
+            }
+            _ => f64::INFINITY,
+        };
         let mut clipped =
             (1..=most).contains(&occluders).then(|| clipping(self.simd, shaft, &blockers));
         let (v, doubt) = match &mut clipped {
-            Some(clipped) => clipped.first_look(),
+            Some(clipped) => clipped.first_look(overlooked_max),
             None => (visibility(self.simd, shaft, &blockers, key, 4), 0.0),
         };
         let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
@@ -358,8 +398,9 @@ impl Placed<'_> {
         };
         let end = |id, area| End { area, light: brightness.of(self.forest, id) };
         let ends = (end(a, place_a.area), end(b, place_b.area));
-        let e = estimate(&x, &v, (&ends.0, &ends.1), brightness.reference_area_m2());
-        let stake = x.area_m2 / place_a.area.min(place_b.area) / threshold.max(FINEST);
+        let shone = shaft.shone_on(&blockers);
+        let e = estimate(&x, &v, (&ends.0, &ends.1), shone, brightness.reference_area_m2());
+        let stake = factor / threshold.max(FINEST);
         let both_ways = way != Margin::ENDLESS;
         let (better, ahead) = e.side(&ends.0, &ends.1);
         let wish = self.splittable((a, b), better);
@@ -490,7 +531,9 @@ impl Placed<'_> {
                     End { area: e.area, light: brightness.of(self.forest, element) },
                     End { area: 0.0, light: brightness.of(self.forest, light) },
                 );
-                let est = estimate(&x, &v, (&ends.0, &ends.1), brightness.reference_area_m2());
+                let ends = (&ends.0, &ends.1);
+                let reference = brightness.reference_area_m2();
+                let est = estimate(&x, &v, ends, (false, false), reference);
                 let (error, may_split) = (est.on[0], self.forest.can_split(element));
                 let wanted = error > threshold;
                 if may_split && wanted {
@@ -570,6 +613,9 @@ const CLIPPED_MAX_CLOSE: usize = 96;
 
 /// The same for pairs that bring less: sampling a few of their shares of light does little harm.
 const CLIPPED_MAX_REST: usize = 4;
+
+/// Share of a receiver's light, over what a link may err by, that a pair may bring unseen.
+const OVERLOOKED_MAX: f64 = 0.25;
 
 /// Thresholds below this ask for no more points a link: elements shrink instead.
 const FINEST: f64 = 0.002;

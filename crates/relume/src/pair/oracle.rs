@@ -94,6 +94,10 @@ const EDGE_REFLECTED: f64 = 3.0;
 /// when the solution is read.
 const BENT: f64 = 0.5;
 
+/// Share of a source's reflected radiosity that comes from what a lamp hides of it and lights, over the standard
+/// deviation of visibility over the source.
+const SHONE_ON: f64 = 4.0;
+
 /// Weight of the sampling error of V: it is independent from link to link and averages out.
 const NOISE: f64 = 0.2;
 
@@ -109,6 +113,7 @@ pub(super) fn estimate(
     x: &Exchange,
     v: &Visibility,
     (a, b): (&End, &End),
+    (shone_on_a, shone_on_b): (bool, bool),
     reference_area: f64,
 ) -> Estimate {
     // Fewer than a bundle: clipped, without noise.
@@ -118,12 +123,14 @@ pub(super) fn estimate(
         ((v.value * (1.0 - v.value) + 0.02) / f64::from(v.segments)).sqrt() * NOISE
     };
     let sends = |over: &Variation, spread: f64| length(v.value * (over.slope + over.bend), spread);
-    let over = |over: &Variation, edge: f64| Uneven {
+    let over = |over: &Variation, edge: f64, is_shone_on: bool| Uneven {
         bend: BENT * v.value * over.bend,
         edge,
         sends: sends(over, edge),
+        hidden: if is_shone_on { (SHONE_ON * edge).min(1.0) } else { 0.0 },
     };
-    let (over_a, over_b) = (over(&x.over_a, v.spread_a), over(&x.over_b, v.spread_b));
+    let over_a = over(&x.over_a, v.spread_a, shone_on_a);
+    let over_b = over(&x.over_b, v.spread_b, shone_on_b);
     let link = LinkSize { exchange: x.area_m2, noise, reference_area };
     let (on_a, by_a, by_b) = one_way(&link, (a, &over_a), (b, &over_b));
     let (on_b, cy_b, cy_a) = one_way(&link, (b, &over_b), (a, &over_a));
@@ -150,6 +157,9 @@ struct Uneven {
     edge: f64,
     /// Of both, with the gradient: what uneven radiosity is weighed with.
     sends: f64,
+    /// Share of the reflected radiosity that may leave what is hidden alone: a lamp close to a wall lights just the
+    /// part of it that it hides.
+    hidden: f64,
 }
 
 /// Error on the receiver, and the parts of it that splitting receiver and source would mend.
@@ -171,7 +181,8 @@ fn one_way(
     let edge = EDGE_EMITTED * (radiosity - reflected) + EDGE_REFLECTED * reflected;
     let uneven = length(radiosity * over_receiver.bend, edge * over_receiver.edge);
     let by_receiver = per_radiosity * uneven * whole;
-    let by_source = per_radiosity * reflected * varies * over_source.sends;
+    let sends = (varies * over_source.sends).max(over_source.hidden);
+    let by_source = per_radiosity * reflected * sends;
     let by_noise = per_radiosity * radiosity * link.noise;
     let error = (by_receiver.powi(2) + by_source.powi(2) + by_noise.powi(2)).sqrt();
     (error, by_receiver, by_source)

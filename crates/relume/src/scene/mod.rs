@@ -37,7 +37,7 @@ pub use glow::Glow;
 pub use import::{ImportOptions, import};
 pub use join::{Joined, Part};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
-pub use solid::{Solid, SolidEdge, SolidFace, Solids};
+pub use solid::{Enclosure, Solid, SolidEdge, SolidFace, Solids};
 
 /// Index of a [`Body`] in [`Scene::bodies`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

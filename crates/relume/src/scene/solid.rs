@@ -41,9 +41,22 @@ pub struct SolidEdge {
     pub faces: [u32; 2],
 }
 
+/// What the closed surface that a patch belongs to encloses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Enclosure {
+    /// Nothing: the patch is two-sided, or the surface has a border.
+    Open,
+    /// Matter: the surface looks outwards, as that of a crate does.
+    Body,
+    /// Space: the surface looks inwards, as that of a room does.
+    Space,
+}
+
 /// The convex solids of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct Solids {
+    /// For each patch what its surface encloses.
+    pub enclosures: Vec<Enclosure>,
     /// For each patch the solid whose face it is, if it is one's.
     pub of_patch: Vec<Option<u32>>,
     /// The solids.
@@ -64,7 +77,11 @@ impl Scene {
     /// Its convex solids: closed, convex groups of one-sided patches of one body that look outwards
     /// and meet along whole sides.
     pub fn solids(&self) -> Solids {
-        let mut out = Solids { of_patch: vec![None; self.patches.len()], list: Vec::new() };
+        let mut out = Solids {
+            enclosures: vec![Enclosure::Open; self.patches.len()],
+            of_patch: vec![None; self.patches.len()],
+            list: Vec::new(),
+        };
         (0..self.bodies.len() as u32).for_each(|body| self.add_solids(BodyId(body), &mut out));
         out
     }
@@ -86,6 +103,9 @@ impl Scene {
         let faces: Vec<Face> = one_sided().map(face).filter(|f| f.corners.len() > 2).collect();
         for group in closed(&faces) {
             let group: Vec<&Face> = group.into_iter().map(|f| &faces[f]).collect();
+            let volume = group.iter().map(|face| face.cone(&weld)).sum::<f64>();
+            let enclosure = if volume > 0.0 { Enclosure::Body } else { Enclosure::Space };
+            group.iter().for_each(|f| out.enclosures[f.patch as usize] = enclosure);
             if group.len() <= FACES_MAX
                 && is_convex(&group, &weld)
                 && let Some(solid) = solid(body, &group, &weld)
@@ -184,6 +204,12 @@ impl Face {
     /// How far a corner is in front of it, metres.
     fn above(&self, weld: &Weld, corner: u32) -> f64 {
         (weld.points[corner as usize] - self.origin).dot(self.normal)
+    }
+
+    /// Six times the signed volume of the cone from the first corner of all to the face, m3.
+    fn cone(&self, weld: &Weld) -> f64 {
+        let at = |k: usize| weld.points[self.corners[k] as usize] - weld.points[0];
+        (1..self.corners.len() - 1).map(|k| at(0).dot(at(k).cross(at(k + 1)))).sum()
     }
 
     fn sides(&self) -> impl Iterator<Item = (u32, u32)> + '_ {

@@ -10,7 +10,8 @@ use crate::element::{ElementId, Forest, Kind, WorldElement};
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
 use crate::scene::{LightKind, PatchId};
 use crate::transport::{
-    covers, form_factor_from_point, form_factor_past, keep_in_front, light_at, segment_is_clear,
+    InPlane, form_factor_from_point, form_factor_past, in_plane, keep_in_front, lies_in, light_at,
+    segment_is_clear,
 };
 
 use super::{Session, Solved};
@@ -167,8 +168,9 @@ impl<'a> Look<'a> {
                 continue;
             }
             let polygon = view.occluder(patch);
-            let on_target =
-                view.patch(patch).twin != Some(target) && covers(&polygon, &plane, rounding_m);
+            let on_target = lies_in(&polygon, &plane, rounding_m).is_some_and(|opposed| {
+                in_plane(self.forest, view, patch, target, opposed) != InPlane::Apart
+            });
             let lift = if on_target { plane.normal * (LIFT * rounding_m) } else { DVec3::ZERO };
             let mut corners: Vec<DVec3> = polygon.corners.iter().map(|&c| c + lift).collect();
             front.iter().for_each(|p| keep_in_front(&mut corners, p));

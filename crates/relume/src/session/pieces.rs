@@ -9,7 +9,8 @@ use crate::element::{ElementId, Forest, Shape, WorldElement, WorldPatch, WorldVi
 use crate::pair::Link;
 use crate::scene::{BodyId, PatchId};
 use crate::transport::{
-    Exchange, Looker, Meeting, Shaft, Simd, exchange, exchange_of_points, lookout, meeting,
+    Exchange, Looker, Meeting, Shaft, Simd, contact_exchange, exchange, exchange_of_points,
+    lookout, meeting, overlap_m2,
 };
 
 use super::{Session, Solved};
@@ -334,6 +335,7 @@ impl<'a> Sharing<'a> {
         }
         match meeting(a, b) {
             Meeting::Away => Exchange::default(),
+            Meeting::Coplanar => contact_exchange(a, b, overlap_m2(a, b, std::iter::empty())),
             met => exchange(self.simd, a, b, met),
         }
     }

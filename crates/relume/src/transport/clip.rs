@@ -244,6 +244,28 @@ impl Cutter {
         }
     }
 
+    /// Whether one of the occluders hides all of `target` from each of the points.
+    pub(super) fn hides_from_all(
+        &mut self,
+        points: &[DVec3],
+        target: &[DVec2],
+        occluders: &Occluders,
+    ) -> bool {
+        let target = &Target::new(target);
+        occluders.list.iter().any(|occluder| {
+            points.iter().all(|&point| {
+                self.lines.clear();
+                let is_met = match &occluder.kind {
+                    Kind::Polygon(range, area) => {
+                        self.cast(point, &occluders.corners[range.clone()], *area, target)
+                    }
+                    Kind::Solid(solid) => self.cast_solid(point, solid, target),
+                };
+                is_met && self.lines.is_empty()
+            })
+        })
+    }
+
     fn lines_of(&self, shadow: usize) -> std::ops::Range<usize> {
         let start = if shadow == 0 { 0 } else { self.shadows[shadow - 1] };
         start..self.shadows[shadow]

@@ -30,7 +30,12 @@ pub(super) fn exchange_along_outlines(a: &[DVec3], b: &[DVec3], error_max_m2: f6
     let mut p = a[a.len() - 1] / unit;
     for &corner in a {
         let q = corner / unit;
-        sum += over_edge(&Edge { from: p, along: q - p }, b, unit, error_max_m2 / (unit * unit * a.len() as f64));
+        sum += over_edge(
+            &Edge { from: p, along: q - p },
+            b,
+            unit,
+            error_max_m2 / (unit * unit * a.len() as f64),
+        );
         p = q;
     }
     (sum / (2.0 * PI)).max(0.0) * unit * unit
@@ -156,8 +161,7 @@ fn adaptive(f: &dyn Fn(f64) -> f64, (lo, hi): (f64, f64), error_max: f64, levels
     let values: [f64; 7] = std::array::from_fn(|k| f(middle + half * KRONROD[k].0));
     let kronrod: f64 = (0..7).map(|k| KRONROD[k].1 * values[k]).sum();
     let gauss: f64 = (0..3).map(|k| GAUSS[k] * values[2 * k + 1]).sum();
-    let varies: f64 =
-        (0..7).map(|k| KRONROD[k].1 * (values[k] - 0.5 * kronrod).abs()).sum();
+    let varies: f64 = (0..7).map(|k| KRONROD[k].1 * (values[k] - 0.5 * kronrod).abs()).sum();
     // Where the integrand is smooth, Kronrod's error is of the order of the square of Gauss's.
     let differs = (kronrod - gauss).abs();
     let error = half * differs * (SMOOTH * differs / varies.max(f64::MIN_POSITIVE)).min(1.0);

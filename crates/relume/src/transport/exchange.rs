@@ -25,6 +25,9 @@ pub enum Meeting {
     Facing,
     /// At least one is cut by the other's plane.
     Cut,
+    /// They lie in one plane and face opposite ways. Whether that is contact the rule of
+    /// [`in_plane`](super::in_plane) says.
+    Coplanar,
 }
 
 /// How what arrives on one end varies over it, relative to its mean.
@@ -54,10 +57,12 @@ pub struct Exchange {
 pub fn meeting(a: &WorldElement, b: &WorldElement) -> Meeting {
     let slack = a.rounding_m + b.rounding_m;
     let (b_lo, b_hi) = b.span(&a.plane);
-    if b_hi <= slack {
-        return Meeting::Away;
-    }
     let (a_lo, a_hi) = a.span(&b.plane);
+    if b_hi <= slack {
+        let is_flat = b_lo >= -slack && a_lo >= -slack && a_hi <= slack;
+        let opposed = is_flat && a.plane.normal.dot(b.plane.normal) < -0.5;
+        return if opposed { Meeting::Coplanar } else { Meeting::Away };
+    }
     if a_hi <= slack {
         return Meeting::Away;
     }
@@ -70,6 +75,18 @@ const NEAR: f64 = 0.1193;
 
 /// The same below which 4 x 4 points are accurate to 0.02 %.
 const CLOSE: f64 = 0.3993;
+
+/// Exchange of two elements in contact that have `overlap_m2` in common: all that leaves it arrives.
+pub fn contact_exchange(a: &WorldElement, b: &WorldElement, overlap_m2: f64) -> Exchange {
+    let over = |e: &WorldElement| {
+        let share = (overlap_m2 / e.area).clamp(f64::MIN_POSITIVE, 1.0);
+        Variation { bend: ((1.0 - share) / share).sqrt().min(UNEVEN), ..Variation::default() }
+    };
+    Exchange { area_m2: overlap_m2, over_a: over(a), over_b: over(b) }
+}
+
+/// Relative standard deviation that contact over a part of an end counts for at most.
+const UNEVEN: f64 = 4.0;
 
 /// Exchange area of two elements that meet as `meeting` says, not [`Meeting::Away`].
 ///
@@ -376,7 +393,7 @@ impl Looker<'_> {
 }
 
 /// Halvings of a quadrilateral in the near field.
-const DEPTH: u32 = 3;
+const DEPTH: u32 = 1;
 
 /// "Exchange area" of a punctual light and an element: the integral over the element of
 /// cos / r^2 (point and spot, with the cone's falloff; sr) or of cos (directional; m2), so that
@@ -544,25 +561,48 @@ mod tests {
                 1 => rectangle(o.with_z(0.0), DVec3::Z * bh, DVec3::X * bw),
                 2 => rectangle(o, DVec3::Z * bh, DVec3::X * bw),
                 // Parallel, turned.
-                3 => { let t = DMat3::from_rotation_z(unit() * 3.0); rectangle(o, t * DVec3::Y * bh, t * DVec3::X * bw) }
+                3 => {
+                    let t = DMat3::from_rotation_z(unit() * 3.0);
+                    rectangle(o, t * DVec3::Y * bh, t * DVec3::X * bw)
+                }
                 // Anything.
-                _ => { let t = DMat3::from_rotation_z(unit() * 3.0) * DMat3::from_rotation_x(unit() * 3.0); rectangle(o, t * DVec3::Y * bh, t * DVec3::X * bw) }
+                _ => {
+                    let t =
+                        DMat3::from_rotation_z(unit() * 3.0) * DMat3::from_rotation_x(unit() * 3.0);
+                    rectangle(o, t * DVec3::Y * bh, t * DVec3::X * bw)
+                }
             };
             let m = meeting(&a, &b);
-            if m == Meeting::Away { continue; }
+            if m == Meeting::Away {
+                continue;
+            }
             let (reach, apart) = (a.radius + b.radius, (b.centre - a.centre).length_squared());
-            if m == Meeting::Facing && reach * reach <= CLOSE * apart { continue; }
+            if m == Meeting::Facing && reach * reach <= CLOSE * apart {
+                continue;
+            }
             let slack = a.rounding_m + b.rounding_m;
-            let part = |e: &WorldElement, plane| ConvexPolygon::new(&e.corners[..e.len]).clipped(plane, slack);
+            let part = |e: &WorldElement, plane| {
+                ConvexPolygon::new(&e.corners[..e.len]).clipped(plane, slack)
+            };
             let (of_a, of_b) = (part(&a, &b.plane), part(&b, &a.plane));
-            if of_a.corners().len() < 3 || of_b.corners().len() < 3 { continue; }
+            if of_a.corners().len() < 3 || of_b.corners().len() < 3 {
+                continue;
+            }
             let (from_a, va) = integrate_polygon(simd, &a, &of_a, of_b.corners());
             let (from_b, vb) = integrate_polygon(simd, &b, &of_b, of_a.corners());
             let exact = exchange_along_outlines(of_a.corners(), of_b.corners(), 1e-12);
             let start = std::time::Instant::now();
             let rough = exchange_along_outlines(of_a.corners(), of_b.corners(), 1e-4 * exact);
             let t = start.elapsed().as_nanos();
-            println!("{kind} {w:.4} {h:.4} {bw:.4} {bh:.4} {gap:.5} {exact:.6e} {:.2e} {:.2e} {:.2e} {t} bend {:.3} {:.3} {}", from_a / exact - 1.0, from_b / exact - 1.0, rough / exact - 1.0, va.bend, vb.bend, a.area < b.area);
+            println!(
+                "{kind} {w:.4} {h:.4} {bw:.4} {bh:.4} {gap:.5} {exact:.6e} {:.2e} {:.2e} {:.2e} {t} bend {:.3} {:.3} {}",
+                from_a / exact - 1.0,
+                from_b / exact - 1.0,
+                rough / exact - 1.0,
+                va.bend,
+                vb.bend,
+                a.area < b.area
+            );
         }
     }
 

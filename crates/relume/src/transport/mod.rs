@@ -4,6 +4,7 @@
 
 mod bend;
 mod clip;
+mod contact;
 mod contour;
 mod exchange;
 mod kernel;
@@ -15,14 +16,16 @@ mod visibility;
 
 pub use bend::{Bend, Receiver};
 pub use clip::keep_in_front;
+pub use contact::{InPlane, in_plane, lies_in, overlap_m2};
 pub use exchange::{
-    Exchange, Meeting, Variation, exchange, exchange_of_points, light_at, light_exchange, meeting,
+    Exchange, Meeting, Variation, contact_exchange, exchange, exchange_of_points, light_at,
+    light_exchange, meeting,
 };
 pub use kernel::Simd;
 pub use lookout::{CELLS_MAX, Clipping, FactorPast, Looker, Lookout, form_factor_past};
 pub use point::form_factor_from_point;
 pub use segments::{SEGMENTS, SegmentBundle};
 pub use visibility::{
-    CLIPPED_MAX, Candidates, Shaft, Visibility, clipping, covers, light_visibility, lookout,
+    CLIPPED_MAX, Candidates, Shaft, Visibility, clipping, light_visibility, lookout,
     segment_is_clear, visibility,
 };

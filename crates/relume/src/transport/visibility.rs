@@ -6,6 +6,8 @@ use crate::geometry::{Aabb, Plane, Pose, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
 use super::clip::keep_in_front;
+use super::contact::{InPlane, in_plane, lies_in, overlap_m2};
+use super::exchange::{Meeting, meeting};
 use super::kernel::Simd;
 use super::lookout::{Between, Clipping, Looker, Lookout, PlacedSolid, is_hidden};
 use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
@@ -78,14 +80,6 @@ const COVER: f64 = 0.5;
 /// disregarded because it is close to an end.
 const LIFT: f64 = 8.0;
 
-/// Whether a polygon lies on an end and faces it: a box on a floor hides what it stands on.
-/// Of two coincident surfaces that face the same way neither hides the other. `within_m` is the
-/// distance from the end's plane up to which a corner lies in it.
-pub fn covers(polygon: &OccluderPolygon<'_>, end: &Plane, within_m: f64) -> bool {
-    polygon.plane.normal.dot(end.normal) < -0.5
-        && polygon.corners.iter().all(|&c| end.distance(c).abs() <= within_m)
-}
-
 /// A polygon, moved.
 struct Lifted<'a> {
     polygon: OccluderPolygon<'a>,
@@ -144,6 +138,10 @@ impl<'a> Shaft<'a> {
             |e: &WorldElement| occluder.corners.iter().all(|&c| e.plane.distance(c) <= slack);
         let (on_a, on_b) = self.covered(patch, &occluder, (a, b), margin);
         if on_a || on_b {
+            // What two ends in contact exchange is found within their plane.
+            if self.is_contact() {
+                return true;
+            }
             return if on_a { !behind(b) } else { !behind(a) };
         }
         let (a_lo, a_hi) = a.span(&occluder.plane);
@@ -154,7 +152,47 @@ impl<'a> Shaft<'a> {
         !behind(a) && !behind(b)
     }
 
-    /// Which ends a polygon lies on and faces; not the other side of itself.
+    /// Whether blockers that emit light at any time shine on each of the ends: what they hide of it is what they
+    /// light.
+    pub fn shone_on(&self, blockers: &[PatchId]) -> (bool, bool) {
+        let mut shine = (false, false);
+        for &patch in blockers.iter().filter(|&&patch| self.forest.glows(patch)) {
+            let both = self.view.patch(patch).twin.is_some();
+            let (_, a, b) = self.seen_by(Some(self.view.patch(patch).body));
+            let plane = self.view.occluder(patch).plane;
+            let faces = |e: &WorldElement| both || plane.distance(e.centre) > 0.0;
+            shine = (shine.0 || faces(a), shine.1 || faces(b));
+        }
+        shine
+    }
+
+    /// Whether both ends lie in one plane and touch.
+    pub fn is_contact(&self) -> bool {
+        let (a, b) = self.own.map_or((self.a, self.b), |(_, a, b)| (a, b));
+        let (of_a, of_b) = self.patches;
+        meeting(a, b) == Meeting::Coplanar
+            && in_plane(self.forest, self.view, of_a, of_b, true) == InPlane::Touches
+    }
+
+    /// Area in contact, without what other surfaces in the same plane show in place of the ends', m2.
+    pub fn contact_m2(&self, blockers: &[PatchId]) -> f64 {
+        let (own, a, b) = self.own.map_or((false, self.a, self.b), |(_, a, b)| (true, a, b));
+        let polygon = |patch| match own {
+            true => self.view.occluder_in_body(patch),
+            false => self.view.occluder(patch),
+        };
+        let rides = |patch| !own || Some(self.view.patch(patch).body) == self.own.map(|own| own.0);
+        let shows = |patch: &PatchId| {
+            let of = |end| {
+                let opposed = polygon(*patch).plane.normal.dot(self.view.normal(end, own)) < 0.0;
+                in_plane(self.forest, self.view, *patch, end, opposed) == InPlane::Covers
+            };
+            rides(*patch) && (of(self.patches.0) || of(self.patches.1))
+        };
+        overlap_m2(a, b, blockers.iter().copied().filter(shows).map(polygon))
+    }
+
+    /// Which ends a polygon lies on and hides, in their plane.
     fn covered(
         &self,
         patch: PatchId,
@@ -162,8 +200,11 @@ impl<'a> Shaft<'a> {
         (a, b): (&WorldElement, &WorldElement),
         within_m: f64,
     ) -> (bool, bool) {
-        let twin = self.view.patch(patch).twin;
-        let on = |e: &WorldElement, of| twin != Some(of) && covers(polygon, &e.plane, within_m);
+        let on = |e: &WorldElement, of| {
+            lies_in(polygon, &e.plane, within_m).is_some_and(|opposed| {
+                in_plane(self.forest, self.view, patch, of, opposed) != InPlane::Apart
+            })
+        };
         (on(a, self.patches.0), on(b, self.patches.1))
     }
 

@@ -383,9 +383,18 @@ impl Placed<'_> {
         };
         let mut clipped =
             (1..=most).contains(&occluders).then(|| clipping(self.simd, shaft, &blockers));
-        let (v, doubt) = match &mut clipped {
-            Some(clipped) => clipped.first_look(overlooked_max),
-            None => (visibility(self.simd, shaft, &blockers, key, 4), 0.0),
+        let mut sampled = None;
+        if clipped.is_none() {
+            let v = visibility(self.simd, shaft, &blockers, key, 4);
+            // Segments that are all blocked prove nothing.
+            if v.value <= 0.0 && occluders <= CLIPPED_MAX_CLOSE && SAMPLED_MAX > overlooked_max {
+                clipped = Some(clipping(self.simd, shaft, &blockers));
+            }
+            sampled = Some(v);
+        }
+        let (v, doubt) = match (&mut clipped, sampled) {
+            (Some(clipped), _) => clipped.first_look(overlooked_max),
+            (None, sampled) => (sampled.expect("what is not clipped is sampled"), 0.0),
         };
         let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
         else {
@@ -613,6 +622,9 @@ const CLIPPED_MAX_CLOSE: usize = 96;
 
 /// The same for pairs that bring less: sampling a few of their shares of light does little harm.
 const CLIPPED_MAX_REST: usize = 4;
+
+/// What segments that are all blocked may have overlooked of V.
+const SAMPLED_MAX: f64 = 0.15;
 
 /// Share of a receiver's light, over what a link may err by, that a pair may bring unseen.
 const OVERLOOKED_MAX: f64 = 0.25;

@@ -98,6 +98,9 @@ const BENT: f64 = 0.5;
 /// deviation of visibility over the source.
 const SHONE_ON: f64 = 4.0;
 
+/// Standard deviation of visibility over both ends, at least, where a pair is partly hidden and its kernel is steep.
+const STEEP: f64 = 0.3;
+
 /// Weight of the sampling error of V: it is independent from link to link and averages out.
 const NOISE: f64 = 0.2;
 
@@ -129,8 +132,10 @@ pub(super) fn estimate(
         sends: sends(over, edge),
         hidden: if is_shone_on { (SHONE_ON * edge).min(1.0) } else { 0.0 },
     };
-    let over_a = over(&x.over_a, v.spread_a, shone_on_a);
-    let over_b = over(&x.over_b, v.spread_b, shone_on_b);
+    // The points that V is found from tell no more than those of the kernel.
+    let least = if x.is_steep && v.segments > 0 && v.value > 0.0 { STEEP } else { 0.0 };
+    let over_a = over(&x.over_a, v.spread_a.max(least), shone_on_a);
+    let over_b = over(&x.over_b, v.spread_b.max(least), shone_on_b);
     let link = LinkSize { exchange: x.area_m2, noise, reference_area };
     let (on_a, by_a, by_b) = one_way(&link, (a, &over_a), (b, &over_b));
     let (on_b, cy_b, cy_a) = one_way(&link, (b, &over_b), (a, &over_a));

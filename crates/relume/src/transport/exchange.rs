@@ -50,6 +50,8 @@ pub struct Exchange {
     pub over_a: Variation,
     /// How it varies over the second end.
     pub over_b: Variation,
+    /// It varies more than a few points of either end can tell.
+    pub is_steep: bool,
 }
 
 /// How two elements face each other; corners within rounding of a plane count as on it.
@@ -82,7 +84,7 @@ pub fn contact_exchange(a: &WorldElement, b: &WorldElement, overlap_m2: f64) -> 
         let share = (overlap_m2 / e.area).clamp(f64::MIN_POSITIVE, 1.0);
         Variation { bend: ((1.0 - share) / share).sqrt().min(UNEVEN), ..Variation::default() }
     };
-    Exchange { area_m2: overlap_m2, over_a: over(a), over_b: over(b) }
+    Exchange { area_m2: overlap_m2, over_a: over(a), over_b: over(b), is_steep: false }
 }
 
 /// Relative standard deviation that contact over a part of an end counts for at most.
@@ -114,6 +116,7 @@ pub fn exchange(simd: Simd, a: &WorldElement, b: &WorldElement, meeting: Meeting
         area_m2,
         over_a: over(a, &grid.points.0, &grid.from_a),
         over_b: over(b, &grid.points.1, &grid.from_b),
+        is_steep: false,
     }
 }
 
@@ -134,7 +137,7 @@ pub fn exchange_of_points(a: &WorldElement, b: &WorldElement) -> Exchange {
         Variation { gradient, ..Variation::default() }
     };
     let area_m2 = a.area * b.area * up * down / (std::f64::consts::PI * r2 * r2);
-    Exchange { area_m2, over_a: over(a, rise), over_b: over(b, -rise) }
+    Exchange { area_m2, over_a: over(a, rise), over_b: over(b, -rise), is_steep: false }
 }
 
 /// A weighted linear least-squares fit over points of an element.
@@ -281,7 +284,7 @@ fn exchange_of_grids(a: &WorldElement, b: &WorldElement) -> Exchange {
         fit
     };
     let (over_a, over_b) = (over(&of_a, &from_a), over(&of_b, &from_b));
-    Exchange { area_m2: over_a.value, over_a: over_a.variation(), over_b: over_b.variation() }
+    Exchange { area_m2: over_a.value, over_a: over_a.variation(), over_b: over_b.variation(), is_steep: false }
 }
 
 /// The closed form from points of each side to the whole of the other; the area from the smaller, or where
@@ -298,7 +301,8 @@ fn close_exchange(simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
     let (from_b, over_b) = integrate_polygon(simd, b, &of_b, of_a.corners());
     let (large, small) = (from_a.max(from_b), from_a.min(from_b));
     let bend = over_a.bend.min(over_b.bend);
-    let area_m2 = if large - small > AGREE * large || small <= 0.0 || bend > BENT {
+    let is_steep = large - small > AGREE * large || small <= 0.0 || bend > BENT;
+    let area_m2 = if is_steep {
         // No more than either has room for.
         let most = of_a.area().min(of_b.area());
         let error_max = OUTLINE_ERROR * large.max(1e-3 * most);
@@ -308,7 +312,7 @@ fn close_exchange(simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
     } else {
         from_b
     };
-    Exchange { area_m2, over_a, over_b }
+    Exchange { area_m2, over_a, over_b, is_steep }
 }
 
 /// Relative difference of what points of both sides find up to which they are right.
@@ -410,7 +414,7 @@ pub fn light_exchange(light: &WorldLight, e: &WorldElement) -> Exchange {
         }
     }
     let over_a = if fit.value > 0.0 { fit.variation() } else { Variation::default() };
-    Exchange { area_m2: fit.value, over_a, over_b: Variation::default() }
+    Exchange { area_m2: fit.value, over_a, over_b: Variation::default(), is_steep: false }
 }
 
 /// Irradiance at a point with unit `normal` from a light of unit intensity, without occlusion.

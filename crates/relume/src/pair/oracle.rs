@@ -186,7 +186,8 @@ fn one_way(
     let edge = EDGE_EMITTED * (radiosity - reflected) + EDGE_REFLECTED * reflected;
     let uneven = length(radiosity * over_receiver.bend, edge * over_receiver.edge);
     let by_receiver = per_radiosity * uneven * whole;
-    let sends = (varies * over_source.sends).max(over_source.hidden);
+    // The edges of what is hidden run through as many sources as it is long: all err in the same sense.
+    let sends = (varies * over_source.sends).max(over_source.hidden * whole.sqrt());
     let by_source = per_radiosity * reflected * sends;
     let by_noise = per_radiosity * radiosity * link.noise;
     let error = (by_receiver.powi(2) + by_source.powi(2) + by_noise.powi(2)).sqrt();

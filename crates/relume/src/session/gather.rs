@@ -9,11 +9,13 @@ use rayon::prelude::*;
 use crate::element::{ElementId, Forest, Kind, WorldElement};
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
 use crate::scene::{LightKind, PatchId};
+use crate::solver::SQUARE_MOMENT;
 use crate::transport::{
     InPlane, form_factor_from_point, form_factor_past, in_plane, keep_in_front, lies_in, light_at,
     segment_is_clear,
 };
 
+use super::surfaces::place_of;
 use super::{Session, Solved};
 
 /// A place and a direction at which irradiance is asked for.
@@ -216,13 +218,17 @@ impl<'a> Look<'a> {
             children.for_each(|child| self.add_element(ElementId(child), &in_the_way, sum));
             return;
         }
-        let b = self.solved.radiosity.linear(id.0);
         let (factor, b) = if in_the_way.is_empty() {
-            (form_factor_from_point(self.point, self.normal, seen), b.mean)
+            (
+                form_factor_from_point(self.point, self.normal, seen),
+                self.solved.radiosity.radiosity(id.0),
+            )
         } else {
             // The part in view may be much brighter or darker than the rest.
             let (factor, moment) = self.factor_past(seen, &in_the_way, SPLITS);
             let at = e.offset(moment / factor.max(f64::MIN_POSITIVE)) / e.radius;
+            let place = place_of(self.forest, id);
+            let b = self.solved.radiosity.linear(id.0, &place, SQUARE_MOMENT);
             (factor, b.at(at.x as f32, at.y as f32).map(|b| b.max(0.0)))
         };
         if factor > 0.0 {

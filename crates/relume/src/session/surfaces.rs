@@ -52,7 +52,7 @@ impl<'a> LitForest<'a> {
     }
 }
 
-fn place_of(forest: &Forest, id: ElementId) -> Place {
+pub(super) fn place_of(forest: &Forest, id: ElementId) -> Place {
     if forest.kind(id) != Kind::Element {
         return Place { centroid: [0.0; 2], radius: 1.0, moment: [1.0, 0.0, 1.0] };
     }

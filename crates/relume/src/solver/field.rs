@@ -9,7 +9,8 @@ use super::surfaces::Place;
 pub struct Linear {
     /// Mean over the element.
     pub mean: [f32; 3],
-    /// Gradient in the patch's frame, per metre (of radiosities: per radius).
+    /// Gradient in the patch's frame, per metre. Of radiosities that are kept: first moments, relative to those of a
+    /// gradient per radius over a square.
     pub gradient: [[f32; 3]; 2],
 }
 

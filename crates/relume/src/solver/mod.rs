@@ -17,5 +17,5 @@ pub use field::Linear;
 pub use links::{Link, Links, LinksBuilder};
 pub use push::row_sums;
 pub use radiosity::{Radiosity, Stop};
-pub use surfaces::{Lit, Place, Surfaces};
+pub use surfaces::{Lit, Place, SQUARE_MOMENT, Surfaces};
 pub use work::Dirty;

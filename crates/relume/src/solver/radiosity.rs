@@ -12,7 +12,7 @@ use super::jump::Jump;
 use super::links::Links;
 use super::push::push;
 use super::settle::{Below, News, Settled};
-use super::surfaces::{Surfaces, for_each_below};
+use super::surfaces::{Place, Surfaces, for_each_below};
 use super::trend::Trend;
 use super::work::{Batch, Dirty, PENDING_SHARE, Way, Work};
 
@@ -36,7 +36,7 @@ pub enum Stop {
 /// The solution: 80 bytes an element.
 #[derive(Clone, Debug, Default)]
 pub struct Radiosity {
-    /// Gradients are per radius of the element.
+    /// With first moments ([`Place::first_moments`]).
     radiosity: Field,
     /// What an element's own links bring, without those of its ancestors. Gradients are per metre.
     gathered: Field,
@@ -125,13 +125,19 @@ impl Radiosity {
     /// Gives the new children of an element its radiosity to begin with.
     pub fn inherit(&mut self, surfaces: &impl Surfaces, parent: u32) {
         let own = surfaces.place(parent);
-        let from = self.radiosity.get(parent);
+        let from = self.linear(parent, &own, surfaces.source_moment());
+        let moment = surfaces.source_moment();
         for child in surfaces.children(parent) {
             let place = surfaces.place(child);
             let [x, y] = [0, 1].map(|k| (place.centroid[k] - own.centroid[k]) / own.radius);
             let scale = place.radius / own.radius;
-            let gradient = from.gradient.map(|g| g.map(|v| v * scale));
-            self.radiosity.set(child, &Linear { mean: from.at(x, y), gradient });
+            let mut own = Linear { mean: from.at(x, y), ..Linear::default() };
+            for c in 0..3 {
+                let slope = from.gradient.map(|g| g[c] * scale);
+                let moments = place.first_moments(slope, moment);
+                (own.gradient[0][c], own.gradient[1][c]) = (moments[0], moments[1]);
+            }
+            self.radiosity.set(child, &own);
             self.gathered.set(child, &Linear::default());
             if let Some(owed) = self.owed.get_mut(child as usize) {
                 *owed = 0.0;
@@ -373,8 +379,13 @@ impl Radiosity {
     }
 
     /// Radiosity of an element with its gradient per radius, W/m2.
-    pub fn linear(&self, id: u32) -> Linear {
-        self.radiosity.get(id)
+    pub fn linear(&self, id: u32, place: &Place, moment: f32) -> Linear {
+        let mut b = self.radiosity.get(id);
+        for c in 0..3 {
+            let slope = place.gradient([0, 1].map(|axis| b.gradient[axis][c]), moment);
+            (b.gradient[0][c], b.gradient[1][c]) = (slope[0], slope[1]);
+        }
+        b
     }
 
     /// Calls `visit` with the irradiance (mean, and gradient per metre) of each leaf of a facet,

@@ -63,13 +63,14 @@ impl<S: Surfaces> Below<'_, S> {
         let children = self.surfaces.children(id);
         let mut owed = 0.0_f32;
         let b = if children.is_empty() {
-            self.reflect(&h, place.radius)
+            self.reflect(&h, place)
         } else {
             let news = match self.way {
                 Some(way) => self.add_own(news, way, id),
                 None => News::default(),
             };
             let mut fit = Fit::default();
+            let moment = self.surfaces.source_moment();
             for child in children {
                 let at = self.surfaces.place(child);
                 let news = news.about(place, &at);
@@ -84,9 +85,9 @@ impl<S: Surfaces> Below<'_, S> {
                         None => self.settle(child, &at, &h.about(place, &at), &news, out),
                     };
                 owed = owed.max(below);
-                fit.add(self.surfaces.area_m2(child), place, &at, &b);
+                fit.add(self.surfaces.area_m2(child), (place, &at), moment, &b);
             }
-            fit.linear(place.radius)
+            fit.linear(place, moment)
         };
         let difference = b.difference(&self.radiosity.get(id));
         if difference > self.limit || self.way.is_none() {
@@ -124,58 +125,52 @@ impl<S: Surfaces> Below<'_, S> {
         (self.owed[id as usize] - below.fold(0.0, f32::max)).max(0.0)
     }
 
-    fn reflect(&self, h: &Linear, radius: f32) -> Linear {
+    /// Radiosity of a leaf, with first moments, from its irradiance, with a gradient per metre.
+    fn reflect(&self, h: &Linear, place: &Place) -> Linear {
+        let moment = self.surfaces.source_moment();
         let mut b = Linear::default();
         for c in 0..3 {
             let rho = self.lit.reflectance[c];
             // A gradient pushed down a long way may reach below zero; light does not.
             b.mean[c] = self.lit.exitance[c] + rho * h.mean[c].max(0.0);
-            for axis in 0..2 {
-                b.gradient[axis][c] = rho * h.gradient[axis][c] * radius;
-            }
+            let slope = [0, 1].map(|axis| rho * h.gradient[axis][c] * place.radius);
+            let moments = place.first_moments(slope, moment);
+            (b.gradient[0][c], b.gradient[1][c]) = (moments[0], moments[1]);
         }
         b
     }
 }
 
-/// The linear function over an element that fits those over its children best.
+/// Mean and first moments over an element from those over its children: exact.
 #[derive(Default)]
 struct Fit {
     area: f64,
     mean: [f64; 3],
     first: [[f64; 3]; 2],
-    moment: [f64; 3],
 }
 
 impl Fit {
-    fn add(&mut self, area: f64, own: &Place, place: &Place, b: &Linear) {
+    fn add(&mut self, area: f64, (own, place): (&Place, &Place), moment: f32, b: &Linear) {
         let dx = f64::from(place.centroid[0] - own.centroid[0]);
         let dy = f64::from(place.centroid[1] - own.centroid[1]);
-        let [xx, xy, yy] = place.moment.map(f64::from);
+        let scale = f64::from(place.radius * moment);
         self.area += area;
-        self.moment[0] += area * (dx * dx + xx);
-        self.moment[1] += area * (dx * dy + xy);
-        self.moment[2] += area * (dy * dy + yy);
         for c in 0..3 {
             let value = f64::from(b.mean[c]);
-            let gx = f64::from(b.gradient[0][c] / place.radius);
-            let gy = f64::from(b.gradient[1][c] / place.radius);
             self.mean[c] += area * value;
-            self.first[0][c] += area * (dx * value + xx * gx + xy * gy);
-            self.first[1][c] += area * (dy * value + xy * gx + yy * gy);
+            self.first[0][c] += area * (dx * value + scale * f64::from(b.gradient[0][c]));
+            self.first[1][c] += area * (dy * value + scale * f64::from(b.gradient[1][c]));
         }
     }
 
-    fn linear(&self, radius: f32) -> Linear {
+    fn linear(&self, own: &Place, moment: f32) -> Linear {
         let per_area = 1.0 / self.area;
-        let [xx, xy, yy] = self.moment.map(|m| m * per_area);
-        let scale = f64::from(radius) * per_area / (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
+        let scale = per_area / f64::from(own.radius * moment);
         let mut out = Linear::default();
         for c in 0..3 {
-            let [x, y] = [self.first[0][c], self.first[1][c]];
             out.mean[c] = (self.mean[c] * per_area) as f32;
-            out.gradient[0][c] = ((x * yy - y * xy) * scale) as f32;
-            out.gradient[1][c] = ((y * xx - x * xy) * scale) as f32;
+            out.gradient[0][c] = (self.first[0][c] * scale) as f32;
+            out.gradient[1][c] = (self.first[1][c] * scale) as f32;
         }
         out
     }

@@ -40,6 +40,30 @@ pub struct Place {
     pub moment: [f32; 3],
 }
 
+impl Place {
+    /// From a gradient (per radius) the first moments that it makes, relative to those over a square of this radius.
+    ///
+    /// Radiosities keep these in place of gradients: the mean of the product of two linear functions over a source
+    /// is that of their means and `moment` times one's first moments times the other's gradient, for any shape.
+    pub(super) fn first_moments(&self, [x, y]: [f32; 2], moment: f32) -> [f32; 2] {
+        let scale = 1.0 / (self.radius * self.radius * moment);
+        let [xx, xy, yy] = self.moment.map(|m| m * scale);
+        [xx * x + xy * y, xy * x + yy * y]
+    }
+
+    /// The gradient (per radius) that makes these first moments.
+    pub(crate) fn gradient(&self, [x, y]: [f32; 2], moment: f32) -> [f32; 2] {
+        let [xx, xy, yy] = self.moment.map(f64::from);
+        let scale = f64::from(self.radius * self.radius * moment)
+            / (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
+        let (x, y) = (f64::from(x), f64::from(y));
+        [((x * yy - y * xy) * scale) as f32, ((y * xx - x * xy) * scale) as f32]
+    }
+}
+
+/// Mean of x^2 / radius^2 over a square.
+pub const SQUARE_MOMENT: f32 = 1.0 / 6.0;
+
 /// The hierarchy as the solver sees it: quadtrees over facets.
 pub trait Surfaces: Sync {
     /// Room for elements: ids are below this.
@@ -64,7 +88,7 @@ pub trait Surfaces: Sync {
     fn lit(&self, facet: u32) -> &Lit;
     /// Mean of x^2 / radius^2 over an element, for the product of two gradients: 1/6 for a square.
     fn source_moment(&self) -> f32 {
-        1.0 / 6.0
+        SQUARE_MOMENT
     }
 }
 

@@ -284,7 +284,12 @@ fn exchange_of_grids(a: &WorldElement, b: &WorldElement) -> Exchange {
         fit
     };
     let (over_a, over_b) = (over(&of_a, &from_a), over(&of_b, &from_b));
-    Exchange { area_m2: over_a.value, over_a: over_a.variation(), over_b: over_b.variation(), is_steep: false }
+    Exchange {
+        area_m2: over_a.value,
+        over_a: over_a.variation(),
+        over_b: over_b.variation(),
+        is_steep: false,
+    }
 }
 
 /// The closed form from points of each side to the whole of the other; the area from the smaller, or where

@@ -158,8 +158,11 @@ impl<'a> Shaft<'a> {
         let mut shine = (false, false);
         for &patch in blockers.iter().filter(|&&patch| self.forest.glows(patch)) {
             let both = self.view.patch(patch).twin.is_some();
-            let (_, a, b) = self.seen_by(Some(self.view.patch(patch).body));
-            let plane = self.view.occluder(patch).plane;
+            let (own, a, b) = self.seen_by(Some(self.view.patch(patch).body));
+            let plane = match own {
+                true => self.view.occluder_in_body(patch).plane,
+                false => self.view.occluder(patch).plane,
+            };
             let faces = |e: &WorldElement| both || plane.distance(e.centre) > 0.0;
             shine = (shine.0 || faces(a), shine.1 || faces(b));
         }

@@ -1,0 +1,126 @@
+//! Numbers from outside: random scenes of the kinds that users and other programs found hard, each against exact
+//! values, rays or paths of the judge, which knows nothing of the engine.
+//!
+//! A few of each kind run here. Five hundred of each, with how many passed, the worst of them and the slowest:
+//!
+//!     cargo test --release -p relume --test outside five_hundred -- --ignored --nocapture
+//!
+//! with, if wanted, `RELUME_KINDS=slab,strip`, `RELUME_SEEDS=0..100`, `RELUME_TOLERANCE=0.02`, `RELUME_LIMIT_S=60`
+//! (a scene that takes longer is ended) and `RELUME_JOBS=2` in the environment. One alone, with all that was measured:
+//! `RELUME_SCENE='slab 17' cargo test ... one_scene -- --ignored --nocapture`.
+// Reference values may use the platform's functions: nothing that the engine decides rests on them.
+#![allow(clippy::disallowed_methods)]
+
+mod case;
+mod many;
+mod moving;
+mod near;
+mod survey;
+mod thin;
+mod verdict;
+
+use case::Case;
+use relume_judge::Random;
+
+/// A kind of scene: its name, the draw, and tolerances that seeds take in turn.
+pub(crate) struct Kind {
+    pub(crate) name: &'static str,
+    draw: fn(&mut Random, &mut Case),
+    tolerances: &'static [f64],
+}
+
+const MOST: &[f64] = &[0.02, 0.1, 0.02, 0.005];
+const COARSE: &[f64] = &[0.1, 0.1, 0.05];
+const LIGHT: &[f64] = &[0.1, 0.02, 0.02];
+
+pub(crate) const KINDS: &[Kind] = &[
+    Kind { name: "slab", draw: near::slab, tolerances: MOST },
+    Kind { name: "partitions", draw: near::partitions, tolerances: MOST },
+    Kind { name: "shelves", draw: near::shelves, tolerances: MOST },
+    Kind { name: "crossing", draw: many::crossing, tolerances: MOST },
+    Kind { name: "boxes", draw: near::boxes, tolerances: MOST },
+    Kind { name: "strip", draw: thin::strip, tolerances: MOST },
+    Kind { name: "strip-in-room", draw: thin::strip_in_room, tolerances: MOST },
+    Kind { name: "pipe", draw: thin::pipe, tolerances: MOST },
+    Kind { name: "edge", draw: thin::edge, tolerances: MOST },
+    Kind { name: "skirting", draw: thin::skirting, tolerances: MOST },
+    Kind { name: "cove", draw: thin::cove, tolerances: LIGHT },
+    Kind { name: "louvre", draw: many::louvre, tolerances: LIGHT },
+    Kind { name: "blades", draw: many::blades, tolerances: MOST },
+    Kind { name: "standing", draw: near::standing, tolerances: MOST },
+    Kind { name: "landing", draw: near::landing, tolerances: LIGHT },
+    Kind { name: "rug", draw: near::rug, tolerances: MOST },
+    Kind { name: "sensor-in-gap", draw: near::sensor_in_gap, tolerances: LIGHT },
+    Kind { name: "motion", draw: moving::motion, tolerances: COARSE },
+    Kind { name: "closet", draw: moving::closet, tolerances: COARSE },
+];
+
+impl Kind {
+    /// The scene of a seed; the tolerance in place of that of the seed.
+    pub(crate) fn case(&self, seed: u64, tolerance: Option<f64>) -> Case {
+        let salt =
+            self.name.bytes().fold(7_u64, |s, b| s.wrapping_mul(31).wrapping_add(u64::from(b)));
+        let mut random = Random::of_part(salt, seed);
+        let own = self.tolerances[seed as usize % self.tolerances.len()];
+        let mut case = Case::new(tolerance.unwrap_or(own));
+        (self.draw)(&mut random, &mut case);
+        case.lay(&mut random);
+        case
+    }
+}
+
+/// The kind of a name.
+pub(crate) fn kind(name: &str) -> &'static Kind {
+    let found = KINDS.iter().find(|k| k.name == name);
+    found.unwrap_or_else(|| {
+        let names: Vec<&str> = KINDS.iter().map(|k| k.name).collect();
+        panic!("no kind `{name}`: one of {}", names.join(", "))
+    })
+}
+
+/// Judges a few scenes of a kind and lists those that fail.
+fn check(name: &str, seeds: std::ops::Range<u64>) {
+    let kind = kind(name);
+    let mut failed = Vec::new();
+    for seed in seeds {
+        let case = kind.case(seed, None);
+        let verdict = verdict::judge(&case);
+        let line = survey::line(name, seed, &case, &verdict);
+        println!("{line}");
+        if !verdict.passes() {
+            failed.push(line);
+        }
+    }
+    assert!(failed.is_empty(), "{} of {name} fail:\n{}", failed.len(), failed.join("\n"));
+}
+
+macro_rules! a_few {
+    ($($test:ident: $kind:literal, $seeds:expr;)*) => {
+        $(#[test]
+        fn $test() {
+            check($kind, $seeds);
+        })*
+    };
+}
+
+a_few! {
+    slabs_at_a_gap: "slab", 0..3;
+    partitions_with_slots: "partitions", 0..3;
+    shelves_that_share_edges: "shelves", 0..3;
+    panels_through_each_other: "crossing", 0..3;
+    turned_boxes_side_by_side: "boxes", 0..3;
+    strips_over_a_floor: "strip", 0..8;
+    strips_in_a_room: "strip-in-room", 0..3;
+    pipes_near_a_floor: "pipe", 0..3;
+    edges_of_plates: "edge", 0..3;
+    skirting_boards: "skirting", 0..3;
+    lamps_under_a_ceiling: "cove", 0..2;
+    egg_crate_louvres: "louvre", 0..2;
+    blades_in_a_row: "blades", 0..3;
+    crates_on_a_floor: "standing", 0..4;
+    crates_that_land: "landing", 0..2;
+    rugs_on_a_floor: "rug", 0..4;
+    sensors_in_gaps: "sensor-in-gap", 0..2;
+    bodies_through_each_other_in_motion: "motion", 0..3;
+    white_closets: "closet", 0..2;
+}

@@ -132,6 +132,7 @@ pub(crate) fn closet(r: &mut Random, case: &mut Case) {
     let white = if chance(r, 0.5) { 0.98 } else { 0.9 };
     case.panels.iter_mut().filter(|p| p.name != "lamp").for_each(|p| p.reflectance = white);
     (case.lit, case.factors, case.sealed) = (true, false, false);
+    case.elements = true;
     case.story =
         format!("closet {wide:.3?} with {drawers} drawers, gaps of {gap:.4}, reflectance {white}");
 }

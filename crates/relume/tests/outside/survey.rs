@@ -1,6 +1,7 @@
 //! Hundreds of scenes of each kind, each in a process of its own, so that one that panics or does not end is a line
 //! among others.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -60,16 +61,18 @@ fn one_scene() {
             println!("{:8.3} of the limit: off {:9.2e}, {}", m.share(), m.off, m.what);
         }
     }
-    let share = verdict.worst().map_or(f64::NAN, crate::verdict::Measure::share);
-    println!("{RESULT}{share} {} {}", verdict.engine_s, line(name, seed, &case, &verdict));
+    let classes = verdict.by_class();
+    let classes: Vec<String> = classes.iter().map(|(c, s)| format!("{c}={s}")).collect();
+    let line = line(name, seed, &case, &verdict);
+    println!("{RESULT}{} {} {line}", classes.join(","), verdict.engine_s);
 }
 
 /// What became of a scene.
 struct Outcome {
     passes: bool,
     seed: u64,
-    /// Worst error in its limit.
-    share: f64,
+    /// Worst error of each class of measures, in its limit; none where there is no result.
+    shares: BTreeMap<String, f64>,
     engine_s: f64,
     line: String,
 }
@@ -105,14 +108,17 @@ fn apart(name: &str, seed: u64, limit: Duration) -> Outcome {
     let found = out.lines().find_map(|l| l.split_once(RESULT)).map(|l| l.1.splitn(3, ' '));
     let failed = |line: String| {
         let engine_s = start.elapsed().as_secs_f64();
-        Outcome { passes: false, seed, share: f64::INFINITY, engine_s, line }
+        Outcome { passes: false, seed, shares: BTreeMap::new(), engine_s, line }
     };
     match found {
         Some(mut words) => {
-            let mut number = || words.next().and_then(|w| w.parse().ok()).unwrap_or(f64::NAN);
-            let (share, engine_s) = (number(), number());
+            let class =
+                |c: &str| c.split_once('=').map(|(c, s)| Some((c.to_owned(), s.parse().ok()?)));
+            let shares =
+                words.next().unwrap_or_default().split(',').filter_map(|c| class(c)?).collect();
+            let engine_s = words.next().and_then(|w| w.parse().ok()).unwrap_or(f64::NAN);
             let line = words.next().unwrap_or_default().to_owned();
-            Outcome { passes: line.starts_with("pass"), seed, share, engine_s, line }
+            Outcome { passes: line.starts_with("pass"), seed, shares, engine_s, line }
         }
         None if !ended => failed(format!("FAIL {name} {seed}: not done after {limit:?}")),
         None => {
@@ -128,6 +134,28 @@ fn seeds() -> std::ops::Range<u64> {
     let Some(text) = variable("RELUME_SEEDS") else { return 0..500 };
     let (lo, hi) = text.split_once("..").expect("RELUME_SEEDS is like 0..500");
     lo.parse().expect("a number")..hi.parse().expect("a number")
+}
+
+/// Of each class of measures: how many scenes keep it, and the worst, in the limit.
+fn by_class(outcomes: &[Outcome]) -> String {
+    let classes: BTreeSet<&String> = outcomes.iter().flat_map(|o| o.shares.keys()).collect();
+    let mut text = String::new();
+    for class in classes {
+        let mut of: Vec<(f64, u64)> =
+            outcomes.iter().filter_map(|o| Some((*o.shares.get(class)?, o.seed))).collect();
+        let kept = of.iter().filter(|s| s.0 <= 1.0).count();
+        of.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let worst: Vec<String> =
+            of.iter().take(3).map(|(share, seed)| format!("{share:.3} (seed {seed})")).collect();
+        let worst = worst.join(", ");
+        text +=
+            &format!("    {class:10} {kept:4} of {:4}; worst, of the limit: {worst}\n", of.len());
+    }
+    let none = outcomes.iter().filter(|o| o.shares.is_empty()).count();
+    if none > 0 {
+        text += &format!("    no result  {none:4}\n");
+    }
+    text
 }
 
 #[test]
@@ -159,15 +187,11 @@ fn five_hundred_of_each() {
         all &= passed == outcomes.len();
         outcomes.sort_by(|a, b| b.engine_s.total_cmp(&a.engine_s));
         let slowest = outcomes.first().map(|o| format!("{:.1} s (seed {})", o.engine_s, o.seed));
-        let rank = |o: &Outcome| if o.share.is_nan() { f64::INFINITY } else { o.share };
-        outcomes.sort_by(|a, b| rank(b).total_cmp(&rank(a)));
-        let worst: Vec<String> =
-            outcomes.iter().take(4).map(|o| format!("{:.2} (seed {})", o.share, o.seed)).collect();
         let row = format!(
-            "{name:14} {passed:4} of {:4} pass; worst, of the limit: {}; slowest {}\n",
+            "{name:14} {passed:4} of {:4} pass; slowest {}\n{}",
             outcomes.len(),
-            worst.join(", "),
-            slowest.unwrap_or_default()
+            slowest.unwrap_or_default(),
+            by_class(&outcomes)
         );
         print!("{row}");
         table += &row;

@@ -185,7 +185,7 @@ pub(crate) fn cove(r: &mut Random, case: &mut Case) {
         sensor(v(0.1 * size.x, 0.2 * size.y, 0.0), DVec3::Z),
         sensor(v(0.0, size.y / 2.0, r.between(0.3, 0.9) * size.z), DVec3::X),
     ];
-    (case.lit, case.factors) = (true, false);
+    (case.lit, case.factors, case.by_particles) = (true, false, true);
     case.story =
         format!("lamp {length:.3} x {width:.4} m, {gap:.4} m under the ceiling, housed: {housed}");
 }

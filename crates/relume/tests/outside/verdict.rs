@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use relume::scene::{Scene, check};
-use relume::session::{Factors, FrameReport, Grouping, Options, Session};
-use relume_judge::path::{self, Site};
+use relume::session::{Factors, FrameReport, Grouping, Options, Sensor, Session};
+use relume_judge::path::{self, Estimate, Site};
 use relume_judge::rows;
 
 use crate::case::Case;
@@ -26,6 +26,8 @@ const MEMORY_BYTES: u64 = 1_500_000_000;
 /// One thing that was measured.
 #[derive(Clone, Debug)]
 pub(crate) struct Measure {
+    /// `row`, `factor`, `contact`, `sensor`, `energy`, `element` or `hash`.
+    pub(crate) class: &'static str,
     pub(crate) what: String,
     pub(crate) off: f64,
     pub(crate) allowed: f64,
@@ -63,8 +65,19 @@ impl Verdict {
         self.measures.iter().max_by(|a, b| rank(a).total_cmp(&rank(b)))
     }
 
-    fn add(&mut self, what: impl Into<String>, off: f64, allowed: f64) {
-        self.measures.push(Measure { what: what.into(), off, allowed });
+    /// The worst share of each class of measures.
+    pub(crate) fn by_class(&self) -> BTreeMap<&'static str, f64> {
+        let mut out = BTreeMap::new();
+        for m in &self.measures {
+            let share = if m.share().is_nan() { f64::INFINITY } else { m.share() };
+            let worst = out.entry(m.class).or_insert(share);
+            *worst = f64::max(*worst, share);
+        }
+        out
+    }
+
+    fn add(&mut self, class: &'static str, what: impl Into<String>, off: f64, allowed: f64) {
+        self.measures.push(Measure { class, what: what.into(), off, allowed });
     }
 }
 
@@ -119,7 +132,7 @@ fn run(case: &Case, scene: &Arc<Scene>, options: &Options, verdict: &mut Verdict
         verdict.element = verdict.element.max(highest);
         if case.elements {
             let what = format!("an element's row at {time_s} s above 1");
-            verdict.add(what, highest - 1.0, ELEMENT_SLACK);
+            verdict.add("element", what, highest - 1.0, ELEMENT_SLACK);
         }
         look(&session, &report, time_s, verdict);
         if case.cold {
@@ -128,6 +141,7 @@ fn run(case: &Case, scene: &Arc<Scene>, options: &Options, verdict: &mut Verdict
                 Ok(found) => {
                     let differs = if found.hash == report.hash { 0.0 } else { 1.0 };
                     verdict.add(
+                        "hash",
                         format!("hash at {time_s} s is not that of a cold build"),
                         differs,
                         0.5,
@@ -175,15 +189,15 @@ fn factors(case: &Case, session: &Session, time_s: f64, verdict: &mut Verdict) {
     for k in &case.known {
         let off = (table.factor(&k.from, &k.to) - k.factor).abs();
         let what = format!("{} -> {} at {time_s} s, exactly {:.6}", k.from, k.to, k.factor);
-        verdict.add(what, off, allowed + k.error);
+        verdict.add("factor", what, off, allowed + k.error);
     }
     let said = case.may_overlap && overlap_is_said(scene);
     for (name, sum) in &table.sums {
         let in_contact = touching.is_some_and(|c| [&c.bottom, &c.floor].contains(&name));
         if case.sealed && !in_contact && !said {
-            verdict.add(format!("row of {name} at {time_s} s"), (sum - 1.0).abs(), allowed);
+            verdict.add("row", format!("row of {name} at {time_s} s"), (sum - 1.0).abs(), allowed);
         } else if !said {
-            verdict.add(format!("row of {name} at {time_s} s above 1"), sum - 1.0, allowed);
+            verdict.add("row", format!("row of {name} at {time_s} s above 1"), sum - 1.0, allowed);
         }
     }
     if let Some(contact) = touching {
@@ -202,7 +216,7 @@ fn factors(case: &Case, session: &Session, time_s: f64, verdict: &mut Verdict) {
             let (exact, error) = row.to(&of(to));
             let off = (table.factor(from, to) - exact).abs();
             let what = format!("{from} -> {to} at {time_s} s, {exact:.5} +- {error:.0e}");
-            verdict.add(what, off, allowed + NOISE * error);
+            verdict.add("factor", what, off, allowed + NOISE * error);
         }
         let off = (table.environment(from) - row.lost).abs();
         let what = format!(
@@ -210,7 +224,7 @@ fn factors(case: &Case, session: &Session, time_s: f64, verdict: &mut Verdict) {
             row.lost, row.lost_error
         );
         if !said {
-            verdict.add(what, off, allowed + NOISE * row.lost_error);
+            verdict.add("row", what, off, allowed + NOISE * row.lost_error);
         }
     }
 }
@@ -243,6 +257,7 @@ fn contact_holds(
     let escapes = [table.environment(bottom), table.environment(floor)];
     let off = escapes.iter().fold(0.0_f64, |m, e| m.max(e.abs()));
     verdict.add(
+        "contact",
         format!("contact: {bottom} and {floor} -> environment {escapes:.5?}"),
         off,
         allowed,
@@ -250,12 +265,14 @@ fn contact_holds(
     let to_floor = table.factor(bottom, floor);
     if to_floor > allowed {
         verdict.add(
+            "contact",
             format!("contact: {bottom} -> {floor}, not 1"),
             (to_floor - 1.0).abs(),
             allowed,
         );
         let off = (table.factor(floor, bottom) - contact.share).abs();
         verdict.add(
+            "contact",
             format!("contact: {floor} -> {bottom}, not {:.5}", contact.share),
             off,
             allowed,
@@ -271,14 +288,16 @@ fn energy(case: &Case, report: &FrameReport, time_s: f64, verdict: &mut Verdict)
     );
     let allowed = BALANCE * e.emitted_w;
     verdict.add(
+        "energy",
         format!("balance {words}"),
         (e.emitted_w - e.absorbed_w - e.escaped_w).abs(),
         allowed,
     );
-    verdict.add(format!("absorbed {words}"), e.absorbed_w - e.emitted_w, allowed);
-    verdict.add(format!("escaped {words}"), -e.escaped_w, allowed);
+    verdict.add("energy", format!("absorbed {words}"), e.absorbed_w - e.emitted_w, allowed);
+    verdict.add("energy", format!("escaped {words}"), -e.escaped_w, allowed);
     if case.sealed {
         verdict.add(
+            "energy",
             format!("escaped {words}"),
             e.escaped_w,
             f64::max(BALANCE, case.tolerance) * e.emitted_w,
@@ -286,8 +305,8 @@ fn energy(case: &Case, report: &FrameReport, time_s: f64, verdict: &mut Verdict)
     }
 }
 
-/// Batches of paths of the first try and the last, which has an eighth of the tolerance or is as good as it gets.
-const BATCHES: [u32; 2] = [500, 16_000];
+/// Batches of paths of the first try and the last, which has a sixth of the tolerance or is as good as it gets.
+const BATCHES: [u32; 2] = [500, 8_000];
 
 fn sensors(case: &Case, session: &Session, time_s: f64, verdict: &mut Verdict) {
     if case.sensors.is_empty() {
@@ -296,23 +315,23 @@ fn sensors(case: &Case, session: &Session, time_s: f64, verdict: &mut Verdict) {
     let sensors = case.world_sensors();
     let found = session.irradiances_at(&sensors);
     let (world, _) = case.world(time_s);
-    for (k, (sensor, found)) in sensors.iter().zip(found).enumerate() {
-        let site = [Site::point(sensor.at, sensor.normal)];
-        let mut batches = BATCHES[0];
-        let (exact, error) = loop {
-            let e = path::irradiance(&world, &site, batches, 77 + k as u64)[0];
-            let (exact, error) = (e.irradiance[0], e.standard_error[0]);
-            if batches >= BATCHES[1] || error <= case.tolerance / 8.0 * exact {
-                break (exact, error);
-            }
-            batches *= 4;
-        };
-        let what =
-            format!("sensor {k} at {time_s} s: {:.5}, not {exact:.5} +- {error:.0e}", found[0]);
-        verdict.add(
-            what,
-            (f64::from(found[0]) - exact).abs(),
-            case.tolerance * exact + NOISE * error,
-        );
+    let site = |s: &Sensor| Site::point(s.at, s.normal);
+    let sites: Vec<Site> = sensors.iter().map(site).collect();
+    let trace = if case.by_particles { path::irradiance_by_particles } else { path::irradiance };
+    let mut batches = BATCHES[0];
+    let exact = loop {
+        let exact = trace(&world, &sites, batches, 77);
+        let good = |e: &Estimate| e.standard_error[0] <= case.tolerance / 6.0 * e.irradiance[0];
+        if batches >= BATCHES[1] || exact.iter().all(good) {
+            break exact;
+        }
+        batches *= 4;
+    };
+    for (k, (exact, found)) in exact.iter().zip(found).enumerate() {
+        let (exact, error) = (exact.irradiance[0], exact.standard_error[0]);
+        let found = f64::from(found[0]);
+        let what = format!("sensor {k} at {time_s} s: {found:.5}, not {exact:.5} +- {error:.0e}");
+        let allowed = case.tolerance * exact + NOISE * error;
+        verdict.add("sensor", what, (found - exact).abs(), allowed);
     }
 }

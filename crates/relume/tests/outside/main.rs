@@ -15,6 +15,7 @@ mod case;
 mod many;
 mod moving;
 mod near;
+mod reports;
 mod survey;
 mod thin;
 mod verdict;

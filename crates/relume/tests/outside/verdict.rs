@@ -154,13 +154,13 @@ fn run(case: &Case, scene: &Arc<Scene>, options: &Options, verdict: &mut Verdict
 }
 
 /// A matrix by names, with what goes to the environment.
-struct Table {
+pub(crate) struct Table {
     rows: BTreeMap<String, BTreeMap<String, f64>>,
     sums: BTreeMap<String, f64>,
 }
 
 impl Table {
-    fn new(names: &[String], factors: &Factors) -> Table {
+    pub(crate) fn new(names: &[String], factors: &Factors) -> Table {
         let (mut rows, mut sums) = (BTreeMap::new(), BTreeMap::new());
         for (k, name) in names.iter().enumerate() {
             let row = factors.row(k as u32).map(|(to, f)| (names[to as usize].clone(), f));
@@ -170,12 +170,17 @@ impl Table {
         Table { rows, sums }
     }
 
-    fn factor(&self, from: &str, to: &str) -> f64 {
+    pub(crate) fn factor(&self, from: &str, to: &str) -> f64 {
         let row = self.rows.get(from).unwrap_or_else(|| panic!("no row `{from}`"));
         row.get(to).copied().unwrap_or(0.0)
     }
 
-    fn environment(&self, from: &str) -> f64 {
+    /// The names of all rows.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.sums.keys().map(String::as_str)
+    }
+
+    pub(crate) fn environment(&self, from: &str) -> f64 {
         1.0 - self.sums.get(from).unwrap_or_else(|| panic!("no row `{from}`"))
     }
 }
@@ -230,7 +235,7 @@ fn factors(case: &Case, session: &Session, time_s: f64, verdict: &mut Verdict) {
 }
 
 /// Whether reading or checking a scene says that things lie in one place.
-fn overlap_is_said(scene: &Scene) -> bool {
+pub(crate) fn overlap_is_said(scene: &Scene) -> bool {
     let words = ["overlap", "coincid", "coplanar", "duplicate", "same plane"];
     let found = check(scene);
     let mut notes = scene.notes.iter().chain(&found);

@@ -76,8 +76,13 @@ pub fn row_of_point(world: &World, point: DVec3, normal: DVec3, rays: u32, seed:
     shot(world, &Start::Point(point, &normal), rays, seed)
 }
 
-/// Counts of the fronts and the backs that one set of rays ends at.
-fn set(world: &World, start: &Start, rays: u32, random: &mut Random) -> (Vec<u32>, Vec<u32>) {
+/// How many rays of a set end at the front and at the back of each polygon.
+struct Counts {
+    fronts: Vec<u32>,
+    backs: Vec<u32>,
+}
+
+fn set(world: &World, start: &Start, rays: u32, random: &mut Random) -> Counts {
     let n = world.polygons().len();
     let (mut fronts, mut backs) = (vec![0_u32; n], vec![0_u32; n]);
     let shift: [f64; 4] = std::array::from_fn(|_| random.unit());
@@ -104,24 +109,25 @@ fn set(world: &World, start: &Start, rays: u32, random: &mut Random) -> (Vec<u32
             side[hit.polygon] += 1;
         }
     }
-    (fronts, backs)
+    Counts { fronts, backs }
 }
 
 fn shot(world: &World, start: &Start, rays: u32, seed: u64) -> Row {
     let each = rays.div_ceil(SETS).max(1);
     let one = |k: u32| set(world, start, each, &mut Random::of_part(seed, u64::from(k)));
-    let sets: Vec<(Vec<u32>, Vec<u32>)> = (0..SETS).into_par_iter().map(one).collect();
+    let sets: Vec<Counts> = (0..SETS).into_par_iter().map(one).collect();
     let share = |count: u32| f64::from(count) / f64::from(each);
-    let mean_of = |value: &dyn Fn(&(Vec<u32>, Vec<u32>)) -> f64| {
+    let mean_of = |value: &dyn Fn(&Counts) -> f64| {
         let n = f64::from(SETS);
         let mean = sets.iter().map(value).sum::<f64>() / n;
         let squares = sets.iter().map(|s| (value(s) - mean).powi(2)).sum::<f64>();
         (mean, (squares / (n * (n - 1.0))).sqrt())
     };
     let polygons = 0..world.polygons().len();
-    let found: Vec<(f64, f64)> = polygons.clone().map(|k| mean_of(&|s| share(s.0[k]))).collect();
-    let backs = polygons.map(|k| mean_of(&|s| share(s.1[k])).0).collect();
-    let (lost, lost_error) = mean_of(&|s| 1.0 - share(s.0.iter().sum()));
+    let found: Vec<(f64, f64)> =
+        polygons.clone().map(|k| mean_of(&|s| share(s.fronts[k]))).collect();
+    let backs = polygons.map(|k| mean_of(&|s| share(s.backs[k])).0).collect();
+    let (lost, lost_error) = mean_of(&|s| 1.0 - share(s.fronts.iter().sum()));
     Row {
         factors: found.iter().map(|f| f.0).collect(),
         errors: found.iter().map(|f| f.1).collect(),

@@ -35,6 +35,7 @@ const COARSE: &[f64] = &[0.1, 0.1, 0.05];
 const LIGHT: &[f64] = &[0.1, 0.02, 0.02];
 
 pub(crate) const KINDS: &[Kind] = &[
+    Kind { name: "pair", draw: near::pair, tolerances: MOST },
     Kind { name: "slab", draw: near::slab, tolerances: MOST },
     Kind { name: "partitions", draw: near::partitions, tolerances: MOST },
     Kind { name: "shelves", draw: near::shelves, tolerances: MOST },
@@ -54,6 +55,9 @@ pub(crate) const KINDS: &[Kind] = &[
     Kind { name: "sensor-in-gap", draw: near::sensor_in_gap, tolerances: LIGHT },
     Kind { name: "motion", draw: moving::motion, tolerances: COARSE },
     Kind { name: "closet", draw: moving::closet, tolerances: COARSE },
+    Kind { name: "table", draw: moving::table, tolerances: COARSE },
+    Kind { name: "device", draw: near::device, tolerances: LIGHT },
+    Kind { name: "downlight", draw: thin::downlight, tolerances: LIGHT },
 ];
 
 impl Kind {
@@ -105,6 +109,7 @@ macro_rules! a_few {
 }
 
 a_few! {
+    pairs_at_a_gap: "pair", 0..8;
     slabs_at_a_gap: "slab", 0..3;
     partitions_with_slots: "partitions", 0..3;
     shelves_that_share_edges: "shelves", 0..3;
@@ -124,4 +129,7 @@ a_few! {
     sensors_in_gaps: "sensor-in-gap", 0..2;
     bodies_through_each_other_in_motion: "motion", 0..3;
     white_closets: "closet", 0..2;
+    white_tables: "table", 0..2;
+    small_devices: "device", 0..2;
+    lamps_let_into_a_ceiling: "downlight", 0..2;
 }

@@ -136,3 +136,40 @@ pub(crate) fn closet(r: &mut Random, case: &mut Case) {
     case.story =
         format!("closet {wide:.3?} with {drawers} drawers, gaps of {gap:.4}, reflectance {white}");
 }
+
+/// A white table whose legs go through its top, and a bar or two through that.
+pub(crate) fn table(r: &mut Random, case: &mut Case) {
+    let size = room(r);
+    case.room(size);
+    let (z, a, b) = (size.z - 0.05, size * 0.4, size * 0.6);
+    let lamp = [v(a.x, a.y, z), v(a.x, b.y, z), v(b.x, b.y, z), v(b.x, a.y, z)];
+    case.panel("lamp", &lamp, false).exitance = 20.0;
+    let both = chance(r, 0.7);
+    let start = case.panels.len();
+    let lo = v(0.8, 0.8, r.between(0.4, 0.9));
+    let hi = lo + v(r.between(0.6, 1.4), r.between(0.5, 1.0), log_between(r, 0.01, 0.08));
+    case.cuboid("top", lo, hi, false);
+    // Flush with the top, or through it.
+    let end = hi.z + if chance(r, 0.25) { 0.0 } else { log_between(r, 1e-3, 0.2) };
+    let (thick, inset) = (r.between(0.03, 0.08), r.between(-0.02, 0.1));
+    for k in 0..4_usize {
+        let x = if k & 1 == 0 { lo.x + inset } else { hi.x - inset - thick };
+        let y = if k & 2 == 0 { lo.y + inset } else { hi.y - inset - thick };
+        case.cuboid(&format!("leg {k}"), v(x, y, 0.0), v(x + thick, y + thick, end), false);
+    }
+    if chance(r, 0.5) {
+        let (y, z) = ((lo.y + hi.y) / 2.0, r.between(0.2, 1.0));
+        let bar = [v(lo.x - 0.2, y, z), v(hi.x + 0.2, y + 0.04, z + 0.05)];
+        case.cuboid("bar", bar[0], bar[1], false);
+    }
+    let white = if chance(r, 0.5) { 0.98 } else { 0.9 };
+    for p in &mut case.panels[start..] {
+        (p.reflectance, p.both_sides) = (white, both);
+    }
+    (case.lit, case.factors, case.sealed, case.elements) = (true, false, false, true);
+    case.story = format!(
+        "table {:.3?}, legs {:.4} m through it, two sides: {both}, {white}",
+        hi - lo,
+        end - hi.z
+    );
+}

@@ -37,6 +37,46 @@ pub(crate) fn box_above(
     at
 }
 
+/// Two rectangles in parallel planes with nothing else, from a gap that is nearly none to one that is wide; or, as
+/// often, at right angles and not quite touching.
+pub(crate) fn pair(r: &mut Random, case: &mut Case) {
+    let mut range = |long: f64| {
+        let start = r.between(-0.6, 0.6);
+        [start, start + long * r.between(0.3, 1.0)]
+    };
+    let (x, y, s, t) = (range(1.0), range(1.5), range(1.0), range(1.5));
+    let gap = log_between(r, 1e-5, 0.3);
+    let flat = |[x0, x1]: [f64; 2], [y0, y1]: [f64; 2], z: f64| {
+        [v(x0, y0, z), v(x1, y0, z), v(x1, y1, z), v(x0, y1, z)]
+    };
+    let (lower, upper, factor, ratio);
+    if chance(r, 0.6) {
+        lower = flat(x, y, 0.0);
+        upper = {
+            let mut q = flat(s, t, gap);
+            q.reverse();
+            q
+        };
+        factor = exact::parallel_rectangles([x, y], [s, t], gap);
+        ratio = (x[1] - x[0]) * (y[1] - y[0]) / ((s[1] - s[0]) * (t[1] - t[0]));
+        case.story = format!("parallel rectangles {gap:.1e} apart");
+    } else {
+        // The wall stands at x = 0; floor and wall begin a little apart from the edge.
+        let other = log_between(r, 1e-5, 0.3);
+        let (x, z) = ([gap, gap + x[1] - x[0]], [other, other + s[1] - s[0]]);
+        lower = flat(x, y, 0.0);
+        upper = [v(0., t[0], z[0]), v(0., t[1], z[0]), v(0., t[1], z[1]), v(0., t[0], z[1])];
+        factor = exact::perpendicular_rectangles([x, y], [t, z]);
+        ratio = (x[1] - x[0]) * (y[1] - y[0]) / ((z[1] - z[0]) * (t[1] - t[0]));
+        case.story = format!("rectangles at right angles {gap:.1e} and {other:.1e} from the edge");
+    }
+    case.panel("a", &lower, false);
+    case.panel("b", &upper, false);
+    for (from, to, factor) in [("a", "b", factor), ("b", "a", factor * ratio)] {
+        case.known.push(Known { from: from.into(), to: to.into(), factor, error: 1e-7 });
+    }
+}
+
 /// A slab at a gap from the floor of a closed room, turned a little or not.
 pub(crate) fn slab(r: &mut Random, case: &mut Case) {
     let size = room(r);
@@ -258,4 +298,33 @@ pub(crate) fn sensor_in_gap(r: &mut Random, case: &mut Case) {
     }
     (case.lit, case.factors) = (true, false);
     case.story = format!("plates {:.3?} {gap:.4} m apart", half * 2.0);
+}
+
+/// A small device on (or just above) a table in a hall: light beside it and on its sides.
+pub(crate) fn device(r: &mut Random, case: &mut Case) {
+    let size = r.point(v(6.0, 6.0, 3.0), v(12.0, 12.0, 6.0));
+    case.room(size);
+    let z = size.z - 0.01;
+    let at = r.point(size * 0.1, size * 0.3);
+    let [a, b] = [at, at + r.between(0.5, 1.5)];
+    let lamp = [v(a.x, a.y, z), v(a.x, b.y, z), v(b.x, b.y, z), v(b.x, a.y, z)];
+    let lamp = case.panel("lamp", &lamp, false);
+    (lamp.exitance, lamp.reflectance) = (150.0, 0.0);
+    let table = v(size.x * 0.45, size.y * 0.45, 0.7);
+    case.cuboid("table", table, table + v(1.0, 1.0, 0.05), false);
+    let half = DVec3::splat(log_between(r, 0.005, 0.05)) * r.point(DVec3::splat(0.6), DVec3::ONE);
+    let gap = if chance(r, 0.5) { 0.0 } else { log_between(r, 0.01, 0.2) * half.z };
+    let middle = table + v(0.5, 0.5, 0.05 + gap + half.z);
+    let sides = case.cuboid("device", middle - half, middle + half, false);
+    case.panels[sides].iter_mut().for_each(|p| p.reflectance = 0.3);
+    for _ in 0..2 {
+        let beside = log_between(r, 0.05, 2.0) * half.x;
+        let at =
+            v(middle.x + half.x + beside, middle.y + r.between(-0.8, 0.8) * half.y, table.z + 0.05);
+        case.sensors.push(Sensor { at, normal: DVec3::Z });
+    }
+    let height = r.between(-0.9, 0.9) * half.z;
+    case.sensors.push(Sensor { at: middle + v(half.x, 0.0, height), normal: DVec3::X });
+    (case.lit, case.factors, case.sealed) = (true, false, false);
+    case.story = format!("device {:.4?} at {gap:.5} m in a hall of {size:.1?}", half * 2.0);
 }

@@ -189,3 +189,30 @@ pub(crate) fn cove(r: &mut Random, case: &mut Case) {
     case.story =
         format!("lamp {length:.3} x {width:.4} m, {gap:.4} m under the ceiling, housed: {housed}");
 }
+
+/// A small lamp let into a ceiling: a box through it that shows by a little, or not at all.
+pub(crate) fn downlight(r: &mut Random, case: &mut Case) {
+    let size = room(r);
+    case.room(size);
+    let half = log_between(r, 0.005, 0.1);
+    let below = if chance(r, 0.2) { 0.0 } else { log_between(r, 0.02, 1.0) * half };
+    let middle = r.point(size * 0.3, size * 0.7).with_z(size.z - below + half);
+    let lamp = case.cuboid("lamp", middle - half, middle + half, false);
+    for side in &mut case.panels[lamp] {
+        (side.exitance, side.reflectance) = (1000.0, 0.3);
+    }
+    if chance(r, 0.5) {
+        let x = size.x * r.between(0.4, 0.6);
+        let corners =
+            [v(x, 0., 0.), v(x, size.y * 0.6, 0.), v(x, size.y * 0.6, size.z), v(x, 0., size.z)];
+        case.panel("partition", &corners, true);
+    }
+    if below > 0.0 {
+        case.sensors.push(Sensor { at: middle.with_z(0.0), normal: DVec3::Z });
+        let at = v(size.x * 0.15, size.y * 0.9, 0.0);
+        case.sensors.push(Sensor { at, normal: DVec3::Z });
+    }
+    // What is above the ceiling shines into the open.
+    (case.lit, case.factors, case.sealed) = (true, false, false);
+    case.story = format!("lamp of {:.4} m, {below:.5} m below the ceiling", 2.0 * half);
+}

@@ -334,7 +334,7 @@ fn sensors(case: &Case, session: &Session, time_s: f64, verdict: &mut Verdict) {
     };
     for (k, (exact, found)) in exact.iter().zip(found).enumerate() {
         let (exact, error) = (exact.irradiance[0], exact.standard_error[0]);
-        let found = f64::from(found[0]);
+        let found = found[0];
         let what = format!("sensor {k} at {time_s} s: {found:.5}, not {exact:.5} +- {error:.0e}");
         let allowed = case.tolerance * exact + NOISE * error;
         verdict.add("sensor", what, (found - exact).abs(), allowed);

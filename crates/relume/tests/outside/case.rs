@@ -78,6 +78,8 @@ pub(crate) struct Case {
     pub(crate) times_s: Vec<f64>,
     /// Light at sensors is that of particles from lamps: for small bright places in view.
     pub(crate) by_particles: bool,
+    /// Whether a line is printed for each frame solved.
+    pub(crate) says_steps: bool,
     /// In words, for messages.
     pub(crate) story: String,
     /// Applied to everything at last: turned and scaled.
@@ -104,6 +106,7 @@ impl Case {
             cold: false,
             times_s: vec![0.0],
             by_particles: false,
+            says_steps: false,
             story: String::new(),
             scale: 1.0,
             world_from_case: DQuat::IDENTITY,

@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use crate::case::Case;
-use crate::verdict::{Verdict, judge};
+use crate::verdict::{STEP, Verdict, judge};
 use crate::{KINDS, kind};
 
 /// One line about a scene.
-pub(crate) fn line(name: &str, seed: u64, case: &Case, verdict: &Verdict) -> String {
+fn line(name: &str, seed: u64, case: &Case, verdict: &Verdict) -> String {
     let worst = match (&verdict.refused, verdict.worst()) {
         (Some(why), _) => format!("refused: {why}"),
         (None, Some(m)) => format!("{:.2} of the limit: off {:.2e}, {}", m.share(), m.off, m.what),
@@ -50,13 +50,18 @@ fn one_scene() {
     };
     let (name, seed) = scene.split_once(' ').expect("RELUME_SCENE is a kind and a seed");
     let seed = seed.parse().expect("a seed is a number");
-    let case = kind(name).case(seed, tolerance());
-    let verdict = judge(&case);
-    if variable("RELUME_QUIET").is_none() {
+    let mut case = kind(name).case(seed, tolerance());
+    case.says_steps = true;
+    let loud = variable("RELUME_QUIET").is_none();
+    if loud {
+        println!("{}, at {}", case.story, case.tolerance);
         for panel in &case.panels {
             println!("{panel:?}");
         }
         println!("{:?}\n{:?}", case.movers, case.sensors);
+    }
+    let verdict = judge(&case);
+    if loud {
         for m in &verdict.measures {
             println!("{:8.3} of the limit: off {:9.2e}, {}", m.share(), m.off, m.what);
         }
@@ -68,17 +73,18 @@ fn one_scene() {
 }
 
 /// What became of a scene.
-struct Outcome {
-    passes: bool,
+pub(crate) struct Outcome {
+    pub(crate) passes: bool,
     seed: u64,
     /// Worst error of each class of measures, in its limit; none where there is no result.
     shares: BTreeMap<String, f64>,
     engine_s: f64,
-    line: String,
+    /// All in one line.
+    pub(crate) line: String,
 }
 
 /// Runs a scene in a process of its own.
-fn apart(name: &str, seed: u64, limit: Duration) -> Outcome {
+pub(crate) fn apart(name: &str, seed: u64, limit: Duration) -> Outcome {
     let this = std::env::current_exe().expect("a test has a path");
     let mut child = Command::new(this)
         .args(["--ignored", "--exact", "survey::one_scene", "--nocapture", "--test-threads=1"])
@@ -120,7 +126,11 @@ fn apart(name: &str, seed: u64, limit: Duration) -> Outcome {
             let line = words.next().unwrap_or_default().to_owned();
             Outcome { passes: line.starts_with("pass"), seed, shares, engine_s, line }
         }
-        None if !ended => failed(format!("FAIL {name} {seed}: not done after {limit:?}")),
+        None if !ended => {
+            let last = out.lines().filter_map(|l| l.split_once(STEP)).last();
+            let last = last.map_or("no frame solved".to_owned(), |l| format!("solved {}", l.1));
+            failed(format!("FAIL {name} {seed}: not done after {limit:?}, {last}"))
+        }
         None => {
             let why = err.lines().find(|l| l.contains("panicked")).unwrap_or("");
             let next = err.lines().skip_while(|l| !l.contains("panicked")).nth(1).unwrap_or("");

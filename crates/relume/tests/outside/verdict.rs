@@ -23,6 +23,9 @@ const NOISE: f64 = 4.0;
 /// The engine's own memory, at most.
 const MEMORY_BYTES: u64 = 1_500_000_000;
 
+/// What begins a line about a frame that is solved.
+pub(crate) const STEP: &str = "STEP ";
+
 /// One thing that was measured.
 #[derive(Clone, Debug)]
 pub(crate) struct Measure {
@@ -128,6 +131,9 @@ fn run(case: &Case, scene: &Arc<Scene>, options: &Options, verdict: &mut Verdict
         };
         verdict.engine_s += start.elapsed().as_secs_f64();
         verdict.links = verdict.links.max(report.links);
+        if case.says_steps {
+            println!("{STEP}at {time_s} s: {:.1} s, {} links", verdict.engine_s, report.links);
+        }
         let highest = session.row_sums().iter().map(|r| r.1).fold(0.0, f64::max);
         verdict.element = verdict.element.max(highest);
         if case.elements {

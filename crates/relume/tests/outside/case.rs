@@ -76,6 +76,8 @@ pub(crate) struct Case {
     /// Whether links are compared with a cold build.
     pub(crate) cold: bool,
     pub(crate) times_s: Vec<f64>,
+    /// What arrives at every sensor, where that is known.
+    pub(crate) irradiance: Option<f64>,
     /// Light at sensors is that of particles from lamps: for small bright places in view.
     pub(crate) by_particles: bool,
     /// Whether a line is printed for each frame solved.
@@ -105,6 +107,7 @@ impl Case {
             elements: false,
             cold: false,
             times_s: vec![0.0],
+            irradiance: None,
             by_particles: false,
             says_steps: false,
             story: String::new(),

@@ -53,6 +53,7 @@ pub(crate) const KINDS: &[Kind] = &[
     Kind { name: "landing", draw: near::landing, tolerances: LIGHT },
     Kind { name: "rug", draw: near::rug, tolerances: MOST },
     Kind { name: "sensor-in-gap", draw: near::sensor_in_gap, tolerances: LIGHT },
+    Kind { name: "furnace", draw: near::furnace, tolerances: MOST },
     Kind { name: "motion", draw: moving::motion, tolerances: COARSE },
     Kind { name: "closet", draw: moving::closet, tolerances: COARSE },
     Kind { name: "table", draw: moving::table, tolerances: COARSE },
@@ -127,6 +128,7 @@ a_few! {
     crates_that_land: "landing", 0..2;
     rugs_on_a_floor: "rug", 0..4;
     sensors_in_gaps: "sensor-in-gap", 0..2;
+    furnaces_with_gaps: "furnace", 0..3;
     bodies_through_each_other_in_motion: "motion", 0..3;
     white_closets: "closet", 0..2;
     white_tables: "table", 0..2;

@@ -5,9 +5,10 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DQuat, DVec3};
 use relume::session::Sensor;
-use relume_judge::{Random, exact};
+use relume_judge::{Random, exact, rows};
 
 use crate::case::{Case, Contact, Known, Mover, chance, cuboid_sides, log_between, v, whole};
+use crate::{many, thin};
 
 /// The size of some room, m.
 pub(crate) fn room(r: &mut Random) -> DVec3 {
@@ -327,4 +328,39 @@ pub(crate) fn device(r: &mut Random, case: &mut Case) {
     case.sensors.push(Sensor { at: middle + v(half.x, 0.0, height), normal: DVec3::X });
     (case.lit, case.factors, case.sealed) = (true, false, false);
     case.story = format!("device {:.4?} at {gap:.5} m in a hall of {size:.1?}", half * 2.0);
+}
+
+/// A scene of another kind in which every surface emits and reflects alike, without a way out: what arrives is the
+/// same everywhere, in the narrowest gap too.
+pub(crate) fn furnace(r: &mut Random, case: &mut Case) {
+    let draws =
+        [slab, partitions, shelves, boxes, standing, many::blades, many::crossing, thin::pipe];
+    draws[whole(r, 0, draws.len() - 1)](r, case);
+    for p in &mut case.panels {
+        (p.reflectance, p.exitance) = (0.5, 1.0);
+        // Black backs in view would make it darker.
+        p.both_sides |= p.name.starts_with('p') && p.name != "pipe";
+    }
+    let (world, _) = case.world(0.0);
+    let loses = |k: usize| rows::row(&world, &[k], 1024, 6).lost > 0.0;
+    let pierced = case.contact.is_none() && (0..world.polygons().len()).any(loses);
+    for _ in 0..if pierced { 0 } else { 200 } {
+        let k = whole(r, 0, world.polygons().len() - 1);
+        let corners = &world.polygons()[k].corners;
+        let weights: Vec<f64> = corners.iter().map(|_| -r.between(1e-9, 1.0).ln()).collect();
+        let sum: f64 = weights.iter().sum();
+        let at: DVec3 = corners.iter().zip(&weights).map(|(&c, w)| c * (w / sum)).sum();
+        let normal = world.normal(k);
+        let Some(hit) = world.first_hit(at, normal, Some(k)) else { continue };
+        let lift = [0.0, 0.1, 0.5][whole(r, 0, 2)] * hit.distance;
+        let at = at + normal * lift;
+        // Not where it looks onto black backs: under a crate, or inside another box.
+        let row = rows::row_of_point(&world, at + normal * (1e-3 * hit.distance), normal, 4096, 5);
+        if row.lost == 0.0 && case.sensors.len() < 6 {
+            case.sensors.push(Sensor { at, normal });
+        }
+    }
+    case.sealed &= case.contact.is_none();
+    (case.lit, case.factors, case.irradiance) = (true, false, Some(2.0));
+    case.story = format!("furnace: {}", case.story);
 }

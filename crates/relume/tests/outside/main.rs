@@ -135,3 +135,56 @@ a_few! {
     small_devices: "device", 0..2;
     lamps_let_into_a_ceiling: "downlight", 0..2;
 }
+
+#[test]
+fn closed_forms_and_rays_agree_on_the_scenes_of_both() {
+    for name in ["strip", "pair", "standing"] {
+        for seed in 0..40 {
+            let case = kind(name).case(seed, None);
+            let (world, names) = case.world(0.0);
+            let of = |name: &str| -> Vec<usize> {
+                (0..names.len()).filter(|&k| names[k] == *name).collect()
+            };
+            for k in &case.known {
+                let row = relume_judge::rows::row(&world, &of(&k.from), 1 << 15, seed);
+                let (found, error) = row.to(&of(&k.to));
+                // A factor that no ray finds, or none misses, has no spread.
+                let off = (found - k.factor).abs();
+                let bound = 5.0 * error + k.error + 1e-4;
+                assert!(
+                    off <= bound,
+                    "{name} {seed}: {k:?}, {found} +- {error} by rays: {}",
+                    case.story
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn scenes_that_are_called_sealed_lose_nothing() {
+    for kind in KINDS {
+        for seed in 0..12 {
+            let case = kind.case(seed, None);
+            if !case.sealed || case.may_overlap {
+                continue;
+            }
+            for &time_s in &case.times_s {
+                if case.contact.as_ref().is_some_and(|c| time_s >= c.since_s) {
+                    continue;
+                }
+                let (world, names) = case.world(time_s);
+                for k in 0..names.len() {
+                    let lost = relume_judge::rows::row(&world, &[k], 2000, seed).lost;
+                    assert!(
+                        lost == 0.0,
+                        "{} {seed}: {} loses {lost}: {}",
+                        kind.name,
+                        names[k],
+                        case.story
+                    );
+                }
+            }
+        }
+    }
+}

@@ -127,7 +127,7 @@ pub(crate) fn apart(name: &str, seed: u64, limit: Duration) -> Outcome {
             Outcome { passes: line.starts_with("pass"), seed, shares, engine_s, line }
         }
         None if !ended => {
-            let last = out.lines().filter_map(|l| l.split_once(STEP)).last();
+            let last = out.lines().filter_map(|l| l.split_once(STEP)).next_back();
             let last = last.map_or("no frame solved".to_owned(), |l| format!("solved {}", l.1));
             failed(format!("FAIL {name} {seed}: not done after {limit:?}, {last}"))
         }

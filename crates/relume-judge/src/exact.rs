@@ -159,6 +159,33 @@ pub fn parallel_rectangles(first: [[f64; 2]; 2], second: [[f64; 2]; 2], c: f64) 
     sum / ((first[0][1] - first[0][0]) * (first[1][1] - first[1][0]))
 }
 
+/// Between rectangles at right angles, from the first, which lies in the plane z = 0 over its ranges of x
+/// and y; the second stands in the plane x = 0 over its ranges of y and z (Howell C-15; Ehlert and Smith 1993).
+/// Neither may reach to the other side of the other's plane: x > 0 or x = 0, and the same of z.
+pub fn perpendicular_rectangles(first: [[f64; 2]; 2], second: [[f64; 2]; 2]) -> f64 {
+    // The kernel x z / (pi r^4) integrated once along each of x, z and the two y.
+    let g = |x: f64, y: f64, z: f64| {
+        let root = (x * x + z * z).sqrt();
+        let turned = if root > 0.0 { y * root * (y / root).atan() } else { 0.0 };
+        let square = x * x + z * z + y * y;
+        let log = if square > 0.0 { (x * x + z * z - y * y) * square.ln() / 4.0 } else { 0.0 };
+        (turned - log) / (2.0 * PI)
+    };
+    let mut sum = 0.0;
+    for bits in 0..16_usize {
+        let [i, j, k, l] = [bits & 1, bits >> 1 & 1, bits >> 2 & 1, bits >> 3];
+        let sign = if (i + j + k + l) % 2 == 0 { 1.0 } else { -1.0 };
+        sum += sign * g(first[0][i], first[1][j] - second[0][k], second[1][l]);
+    }
+    sum / ((first[0][1] - first[0][0]) * (first[1][1] - first[1][0]))
+}
+
+/// From any plane surface to an endless plane on one side of it; `tilt` is the angle between their normals'
+/// opposites: 0 where they are face to face, pi / 2 at right angles, pi where both face the same way.
+pub fn to_an_endless_plane(tilt: f64) -> f64 {
+    (1.0 + tilt.cos()) / 2.0
+}
+
 /// Between concentric spheres of radii `inner` < `outer`, from the outer to itself; holds for any convex
 /// body in a closed one, with areas in place of squares.
 pub fn concentric_spheres_outer_to_itself(inner: f64, outer: f64) -> f64 {
@@ -191,6 +218,20 @@ mod tests {
 
     fn near(a: f64, b: f64, e: f64) {
         assert!((a - b).abs() < e, "{a} {b}");
+    }
+
+    #[test]
+    fn rectangles_at_right_angles_anywhere_agree_with_those_at_an_edge_and_with_the_contour() {
+        let f = perpendicular_rectangles([[0.0, 0.7], [0.2, 1.5]], [[0.2, 1.5], [0.0, 2.0]]);
+        near(f, rectangles_at_right_angles(0.7, 2.0, 1.3), 1e-12);
+        let f = perpendicular_rectangles([[0.1, 0.7], [0.2, 1.5]], [[-0.4, 1.0], [0.3, 2.0]]);
+        let wall = [v(0., -0.4, 0.3), v(0., 1., 0.3), v(0., 1., 2.), v(0., -0.4, 2.)];
+        near(f, parallelogram_to_polygon(&floor([0.1, 0.7], [0.2, 1.5], 0.0), &wall), 1e-8);
+        // The strips of issue 16: 4 mm standing on a floor, and its mirror on the other side of it.
+        let strip = [[0.0, 0.004], [0.7, 2.3]];
+        let floor = |lo: f64, hi: f64| perpendicular_rectangles(strip, [[0.0, 3.0], [lo, hi]]);
+        near(floor(0.0, 2.2), 0.499_357, 1e-6);
+        near(floor(0.0, 1e4), to_an_endless_plane(PI / 2.0), 1e-3);
     }
 
     #[test]

@@ -12,6 +12,7 @@ pub mod path;
 mod polygon;
 mod random;
 mod rays;
+pub mod rows;
 pub mod seen;
 
 pub use polygon::{Polygon, Quad};

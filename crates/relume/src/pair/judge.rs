@@ -542,7 +542,7 @@ impl Placed<'_> {
                 );
                 let ends = (&ends.0, &ends.1);
                 let reference = brightness.reference_area_m2();
-                let est = estimate(&x, &v, ends, (false, false), reference);
+                let est = estimate(&x, &v, ends, (f64::INFINITY, f64::INFINITY), reference);
                 let (error, may_split) = (est.on[0], self.forest.can_split(element));
                 let wanted = error > threshold;
                 if may_split && wanted {

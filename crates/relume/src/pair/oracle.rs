@@ -96,10 +96,13 @@ const BENT: f64 = 0.5;
 
 /// Share of a source's reflected radiosity that comes from what a lamp hides of it and lights, over the standard
 /// deviation of visibility over the source.
-const SHONE_ON: f64 = 4.0;
+const SHONE_ON: f64 = 1.0;
 
 /// Standard deviation of visibility over both ends, at least, where a pair is partly hidden and its kernel is steep.
 const STEEP: f64 = 0.3;
+
+/// V from which the end is seen, and not a sliver that rounding leaves between what covers it and its plane.
+const SEEN: f64 = 1e-4;
 
 /// Weight of the sampling error of V: it is independent from link to link and averages out.
 const NOISE: f64 = 0.2;
@@ -116,7 +119,7 @@ pub(super) fn estimate(
     x: &Exchange,
     v: &Visibility,
     (a, b): (&End, &End),
-    (shone_on_a, shone_on_b): (bool, bool),
+    (lamp_a_m, lamp_b_m): (f64, f64),
     reference_area: f64,
 ) -> Estimate {
     // Fewer than a bundle: clipped, without noise.
@@ -126,16 +129,25 @@ pub(super) fn estimate(
         ((v.value * (1.0 - v.value) + 0.02) / f64::from(v.segments)).sqrt() * NOISE
     };
     let sends = |over: &Variation, spread: f64| length(v.value * (over.slope + over.bend), spread);
-    let over = |over: &Variation, edge: f64, is_shone_on: bool| Uneven {
+    // What a narrow lamp lights, it lights the more.
+    let hidden = |edge: f64, end: &End, width_m: f64| {
+        let coarse_m = reference_area.sqrt();
+        let brighter = (coarse_m / width_m).max(1.0).min((reference_area / end.area).max(1.0));
+        if width_m.is_finite() { brighter * (SHONE_ON * edge).min(1.0) } else { 0.0 }
+    };
+    let over = |over: &Variation, edge: f64, hidden: f64| Uneven {
         bend: BENT * v.value * over.bend,
         edge,
         sends: sends(over, edge),
-        hidden: if is_shone_on { (SHONE_ON * edge).min(1.0) } else { 0.0 },
+        hidden,
     };
     // The points that V is found from tell no more than those of the kernel.
-    let least = if x.is_steep && v.segments > 0 && v.value > 0.0 { STEEP } else { 0.0 };
-    let over_a = over(&x.over_a, v.spread_a.max(least), shone_on_a);
-    let over_b = over(&x.over_b, v.spread_b.max(least), shone_on_b);
+    let least = match x.is_steep && v.segments > 0 {
+        true => STEEP * (v.value / SEEN).min(1.0),
+        false => 0.0,
+    };
+    let over_a = over(&x.over_a, v.spread_a.max(least), hidden(v.spread_a, a, lamp_a_m));
+    let over_b = over(&x.over_b, v.spread_b.max(least), hidden(v.spread_b, b, lamp_b_m));
     let link = LinkSize { exchange: x.area_m2, noise, reference_area };
     let (on_a, by_a, by_b) = one_way(&link, (a, &over_a), (b, &over_b));
     let (on_b, cy_b, cy_a) = one_way(&link, (b, &over_b), (a, &over_a));
@@ -162,8 +174,8 @@ struct Uneven {
     edge: f64,
     /// Of both, with the gradient: what uneven radiosity is weighed with.
     sends: f64,
-    /// Share of the reflected radiosity that may leave what is hidden alone: a lamp close to a wall lights just the
-    /// part of it that it hides.
+    /// How many times the mean reflected radiosity may be counted wrongly because it leaves what is hidden alone: a
+    /// lamp close to a wall lights just the part of it that it hides.
     hidden: f64,
 }
 

@@ -299,6 +299,11 @@ impl<'a> Clipping<'a> {
         }
     }
 
+    /// Whether no point sees more of the other end than slivers that rounding leaves between shadows.
+    fn sees_next_to_nothing(&self) -> bool {
+        self.lookout.room.looks.points.iter().all(|&(all, clear)| clear <= SLIVER * all)
+    }
+
     /// Visibility from four points, and how far it may be off: about its root mean square.
     ///
     /// V is smooth over an end while part of the other is seen, and has kinks where that begins and ends. So
@@ -312,7 +317,7 @@ impl<'a> Clipping<'a> {
         let mut v = self.visibility(1);
         let mut cells = 1;
         let mut is_hidden = None;
-        while cells < CELLS_MAX && self.lookout.room.looks.points.iter().all(|p| p.1 <= 0.0) {
+        while cells < CELLS_MAX && self.sees_next_to_nothing() {
             // A sliver of each in front of the other: V is not nothing because no point lies in it.
             let is_behind = self.lookout.room.looks.points.iter().all(|p| p.0 <= 0.0);
             let overlooked = OVERLOOKED / f64::from(cells * cells);
@@ -340,6 +345,9 @@ impl<'a> Clipping<'a> {
         (v, doubt)
     }
 }
+
+/// Share of the other end below which what a point sees may be a sliver between shadows.
+const SLIVER: f64 = 1e-4;
 
 /// What four points that see nothing may have overlooked of V, where nothing proves that it is hidden.
 const OVERLOOKED: f64 = 0.3;

@@ -152,21 +152,29 @@ impl<'a> Shaft<'a> {
         !behind(a) && !behind(b)
     }
 
-    /// Whether blockers that emit light at any time shine on each of the ends: what they hide of it is what they
-    /// light.
-    pub fn shone_on(&self, blockers: &[PatchId]) -> (bool, bool) {
-        let mut shine = (false, false);
+    /// For each end the width (area over length, m) of the narrowest blocker that emits light at any time and shines
+    /// on the end: what it hides of it is what it lights. Infinite if there is none.
+    pub fn shone_on(&self, blockers: &[PatchId]) -> (f64, f64) {
+        let mut widths = (f64::INFINITY, f64::INFINITY);
         for &patch in blockers.iter().filter(|&&patch| self.forest.glows(patch)) {
             let both = self.view.patch(patch).twin.is_some();
             let (own, a, b) = self.seen_by(Some(self.view.patch(patch).body));
-            let plane = match own {
-                true => self.view.occluder_in_body(patch).plane,
-                false => self.view.occluder(patch).plane,
+            let polygon = match own {
+                true => self.view.occluder_in_body(patch),
+                false => self.view.occluder(patch),
             };
-            let faces = |e: &WorldElement| both || plane.distance(e.centre) > 0.0;
-            shine = (shine.0 || faces(a), shine.1 || faces(b));
+            let first = polygon.corners[0];
+            let length = polygon.corners.iter().map(|c| c.distance(first)).fold(0.0, f64::max);
+            let width = self.forest.area_m2(self.forest.patch_root(patch)) / length;
+            let narrowed = |e: &WorldElement, before: f64| match both
+                || polygon.plane.distance(e.centre) > 0.0
+            {
+                true => before.min(width),
+                false => before,
+            };
+            widths = (narrowed(a, widths.0), narrowed(b, widths.1));
         }
-        shine
+        widths
     }
 
     /// Whether both ends lie in one plane and touch.

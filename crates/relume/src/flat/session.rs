@@ -8,9 +8,9 @@ use crate::event::Ticks;
 use crate::pair::{Carried, LinkEvent, PairHash, PairTree, Record, update};
 use crate::session::{
     Ahead, Clock, ElementName, Event, FrameReport, Memory, PairCounts, Receivers, Solution, Update,
-    apply_edits, balance_of, links_of, while_extrapolated, with_names,
+    apply_edits, balance_of, links_of, most_mean, while_extrapolated, with_names,
 };
-use crate::solver::{Dirty, Links, Lit, Place, Radiosity, Stop, Surfaces};
+use crate::solver::{Dirty, Links, Lit, Place, Radiosity, Surfaces};
 
 use super::forest::FlatForest;
 use super::judge::{FlatPlaced, PlaneView};
@@ -244,11 +244,14 @@ impl FlatSession {
             solved.radiosity = Radiosity::new(&lit);
         } else {
             let residual = self.options.residual;
-            let stop = match extrapolates {
-                true => while_extrapolated(residual, solved.sound_mean_w_m2, self.most_mean_w_m2()),
-                false => Stop::Residual(residual),
-            };
-            solved.radiosity.solve(&lit, &solved.links, dirty, stop);
+            let most = self.most_mean_w_m2();
+            if extrapolates {
+                let stop = while_extrapolated(residual, solved.sound_mean_w_m2, most);
+                solved.radiosity.solve(&lit, &solved.links, dirty, stop);
+            } else {
+                let bound = (residual, most_mean(most));
+                solved.radiosity.solve_bounded(&lit, &solved.links, dirty, bound);
+            }
         }
         report.seconds.solve = clock.lap();
         if solved.tree.live_count() == 0 {

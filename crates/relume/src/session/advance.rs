@@ -8,9 +8,9 @@ use crate::pair::{
     Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Record, Since, Stage, update,
 };
 use crate::scene::{self, BodyId, LightKind, Material};
-use crate::solver::{Dirty, Links, Radiosity, Stop};
+use crate::solver::{Dirty, Links, Radiosity};
 
-use super::ahead::{Ahead, while_extrapolated};
+use super::ahead::{Ahead, most_mean, while_extrapolated};
 use super::coarse::{self, Coarse};
 use super::report::FrameReport;
 use super::surfaces::{LitForest, apply_edits, links_of};
@@ -96,15 +96,6 @@ impl Session {
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
         let share = if cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE };
         let residual = self.options.tolerance * share;
-        let stop = if solved.is_settled() {
-            Stop::Residual(residual)
-        } else {
-            let brightened = self.brightened(solved.sound_time_s, time_s);
-            // From nothing on, no growth is too much.
-            let mean = solved.sound_mean_w_m2 * brightened;
-            let mean = if mean > 0.0 { mean } else { f64::INFINITY };
-            while_extrapolated(residual, mean, self.most_mean_w_m2())
-        };
         let shines = |(k, light): (usize, &scene::Light)| {
             solved.view.light(k).is_some() && light.intensity_at(time_s).iter().any(|&i| i > 0.0)
         };
@@ -113,7 +104,22 @@ impl Session {
             // What is left of earlier light would fade for ever.
             let none = (&*self.scene, time_s);
             solved.radiosity = coarse::start(none, &solved.forest, &lit);
+        } else if solved.is_settled() {
+            let bound = (residual, most_mean(self.most_mean_w_m2()));
+            solved.radiosity.solve_bounded(&lit, &solved.links, dirty, bound);
+            if !solved.radiosity.has_settled() {
+                return Err(SessionError::Unsettled {
+                    frame,
+                    residual: solved.radiosity.residual,
+                    surfaces: tally::suspects(&self.scene, &solved),
+                });
+            }
         } else {
+            let brightened = self.brightened(solved.sound_time_s, time_s);
+            // From nothing on, no growth is too much.
+            let mean = solved.sound_mean_w_m2 * brightened;
+            let mean = if mean > 0.0 { mean } else { f64::INFINITY };
+            let stop = while_extrapolated(residual, mean, self.most_mean_w_m2());
             solved.radiosity.solve(&lit, &solved.links, dirty, stop);
         }
         report.seconds.solve = clock.lap();

@@ -17,6 +17,15 @@ pub(crate) fn while_extrapolated(residual: f64, sound_mean_w_m2: f64, most_mean_
     Stop::Bounded { residual, mean_w_m2 }
 }
 
+/// What the mean radiosity of a solution cannot reach, from what all that is emitted can make of it, W/m2.
+pub(crate) fn most_mean(most_mean_w_m2: f64) -> f64 {
+    // A scene that is dark at all times has nothing to be measured against.
+    if most_mean_w_m2 > 0.0 { BEYOND * most_mean_w_m2 } else { f64::INFINITY }
+}
+
+/// How many times as bright as it can be a solution gets before it is given up.
+const BEYOND: f64 = 2.0;
+
 /// By how much the errors of links may make a scene brighter than it can be.
 const ROUNDING: f64 = 1.1;
 

@@ -42,7 +42,7 @@ pub use snapshot::{Leaf, Snapshot};
 pub use solution::Solution;
 
 // Flatland's session shares these.
-pub(crate) use ahead::{Ahead, while_extrapolated};
+pub(crate) use ahead::{Ahead, most_mean, while_extrapolated};
 pub(crate) use events::with_names;
 pub(crate) use surfaces::{Receivers, apply_edits, links_of};
 pub(crate) use tally::balance_of;
@@ -66,9 +66,31 @@ pub enum SessionError {
         /// Pairs made when the limit was met.
         links: u64,
     },
+    /// Light does not settle between some surfaces.
+    #[error(
+        "frame {frame}: light between {} does not settle (residual {residual:.1e} of the mean radiosity): they pierce each other, or lie so close that form factors between them sum to more than 1; move them apart, make their materials reflect less, or use a finer tolerance",
+        names(surfaces)
+    )]
+    Unsettled {
+        /// The frame being computed.
+        frame: u32,
+        /// What the last sweep left, relative to the mean radiosity.
+        residual: f64,
+        /// Names of the surfaces whose rows exceed 1 by most.
+        surfaces: Vec<String>,
+    },
     /// An option is out of its range.
     #[error("{0}")]
     Option(String),
+}
+
+/// Names in a sentence.
+fn names(surfaces: &[String]) -> String {
+    match surfaces {
+        [] => "the surfaces of this scene".to_owned(),
+        [one] => format!("the parts of `{one}`"),
+        several => several.iter().map(|s| format!("`{s}`")).collect::<Vec<_>>().join(" and "),
+    }
 }
 
 /// One scene being solved, frame by frame.

@@ -69,6 +69,9 @@ pub struct FrameReport {
     /// Where the flux goes, summed over the three channels, where it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy: Option<Energy>,
+    /// Where the balance is off, the surfaces that receive most light over rows that sum to more than 1.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub suspects: Vec<String>,
     /// Hash over the active pairs with their exchange areas and visibilities, in key order.
     pub hash: String,
     /// Wall-clock seconds by phase.
@@ -104,6 +107,14 @@ pub struct Energy {
     pub absorbed_w: f64,
     /// Left the scene.
     pub escaped_w: f64,
+}
+
+impl Energy {
+    /// Share of what is emitted that is neither absorbed nor escaped, or that is so without having been emitted.
+    pub fn unbalanced(&self) -> f64 {
+        let off = (self.emitted_w - self.absorbed_w - self.escaped_w).abs();
+        if self.emitted_w > 0.0 { off / self.emitted_w } else { 0.0 }
+    }
 }
 
 /// Wall-clock seconds by phase.
@@ -155,6 +166,7 @@ impl FrameReport {
             residual: self.residual,
             row_sum_error: self.row_sum_error,
             energy: self.energy,
+            suspects: self.suspects.clone(),
             hash: self.hash.clone(),
             ..label
         }

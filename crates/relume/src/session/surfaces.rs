@@ -73,6 +73,10 @@ impl Surfaces for LitForest<'_> {
         self.forest.facets()
     }
 
+    fn is_surface(&self, id: u32) -> bool {
+        self.forest.kind(ElementId(id)) == Kind::Element
+    }
+
     fn facet_of(&self, id: u32) -> u32 {
         self.forest.fixed(ElementId(id)).0
     }

@@ -27,7 +27,13 @@ pub(super) fn fill(report: &mut FrameReport, solved: &Solved) {
 pub(super) fn fill_balance(report: &mut FrameReport, scene: &Scene, solved: &Solved) {
     let (rows, energy) = balance(scene, solved);
     (report.row_sum_error, report.energy) = (Some(rows), Some(energy));
+    if energy.unbalanced() > UNBALANCED || solved.radiosity.is_bounded() {
+        report.suspects = suspects(scene, solved);
+    }
 }
+
+/// Share of what is emitted that may be unaccounted for before surfaces are named.
+const UNBALANCED: f64 = 0.01;
 
 /// Links between bodies (or lights) of which at least one is among those that moved.
 pub(super) fn dynamic_links(
@@ -132,6 +138,22 @@ fn lights_w(scene: &Scene, solved: &Solved) -> (f64, f64) {
 fn spot_sr(inner: f64, outer: f64) -> f64 {
     let (ci, co) = (libm::cos(inner), libm::cos(outer));
     2.0 * std::f64::consts::PI * ((1.0 - ci) + (ci - co) / 3.0)
+}
+
+/// Names of the two surfaces that receive most light over rows that sum to more than 1.
+pub(super) fn suspects(scene: &Scene, solved: &Solved) -> Vec<String> {
+    let mut excess = vec![0.0; scene.surfaces.len()];
+    for (id, sum) in row_sums_of(scene, solved) {
+        let patch = solved.forest.patch(id).expect("elements have patches");
+        let surface = scene.patches[patch.0 as usize].surface.0 as usize;
+        let b: f32 = solved.radiosity.radiosity(id.0).iter().sum();
+        // Of what grew beyond all numbers only the rows can be told.
+        let b = if b.is_finite() { f64::from(b) } else { 1.0 };
+        excess[surface] += (sum - 1.0).max(0.0) * solved.forest.area_m2(id) * b;
+    }
+    let mut order: Vec<usize> = (0..excess.len()).filter(|&k| excess[k] > 0.0).collect();
+    order.sort_by(|&one, &other| excess[other].total_cmp(&excess[one]));
+    order.iter().take(2).map(|&k| scene.surfaces[k].name.clone()).collect()
 }
 
 /// Row sums of all leaves.

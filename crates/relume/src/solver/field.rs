@@ -31,6 +31,12 @@ impl Linear {
         Linear { mean: self.at(dx, dy), ..*self }
     }
 
+    /// Divided by a number.
+    pub(super) fn divided(&self, by: f32) -> Linear {
+        let each = |numbers: [f32; 3]| numbers.map(|x| x / by);
+        Linear { mean: each(self.mean), gradient: self.gradient.map(each) }
+    }
+
     /// The sum, in the same units.
     pub fn plus(mut self, other: &Linear) -> Linear {
         for c in 0..3 {

@@ -10,7 +10,7 @@ use super::field::{Field, Linear, SLACK, grow};
 use super::gather::gather_some;
 use super::jump::Jump;
 use super::links::Links;
-use super::push::push;
+use super::push::{push, row_sums};
 use super::settle::{Below, News, Settled};
 use super::surfaces::{Place, Surfaces, for_each_below};
 use super::trend::Trend;
@@ -48,6 +48,9 @@ pub struct Radiosity {
     owed: Vec<f32>,
     /// Kept instead.
     trend: Trend,
+    /// For each leaf what its irradiance is divided by: its row sum where that is above 1. Empty unless the solution
+    /// would grow without end.
+    limits: Vec<f32>,
     /// Sweeps made by the last solve.
     pub sweeps: u32,
     /// Receivers gathered by the last solve, each time counted.
@@ -63,7 +66,7 @@ pub struct Radiosity {
 }
 
 /// Sweeps after which a solve is given up as not converging (reflectances are below 1).
-const SWEEPS_MAX: u32 = 10_000;
+const SWEEPS_MAX: u32 = 2_000;
 
 /// Receivers gathered by one task.
 const CHUNK: usize = 256;
@@ -144,6 +147,64 @@ impl Radiosity {
             }
             self.trend.inherit(parent, child);
         }
+    }
+
+    /// [`solve`](Radiosity::solve) to a residual, relative to the mean radiosity, whatever the links: where light would
+    /// grow without end, or not settle, because rows of leaves sum to more than 1, these rows are bounded by 1 and the
+    /// solution is found anew from nothing. `most_mean_w_m2` is what the mean radiosity cannot reach.
+    pub fn solve_bounded(
+        &mut self,
+        surfaces: &impl Surfaces,
+        links: &Links,
+        dirty: Dirty,
+        (residual, most_mean_w_m2): (f64, f64),
+    ) {
+        let stop = Stop::Bounded { residual, mean_w_m2: most_mean_w_m2 };
+        if self.limits.is_empty() {
+            self.solve(surfaces, links, dirty, stop);
+        } else {
+            // As a cold build would: it may do without this time.
+            self.limits = Vec::new();
+            self.start_anew(surfaces);
+            self.solve(surfaces, links, Dirty::All, stop);
+        }
+        if self.has_settled() {
+            return;
+        }
+        self.limits = vec![1.0; surfaces.len()];
+        let is_surface = |id: u32| surfaces.is_surface(id);
+        for facet in surfaces.facets() {
+            row_sums(surfaces, links, &is_surface, facet.0, &mut |leaf, sum| {
+                self.limits[leaf as usize] = sum.max(1.0);
+            });
+        }
+        self.start_anew(surfaces);
+        self.solve(surfaces, links, Dirty::All, stop);
+    }
+
+    /// Whether the last solve came to its end.
+    pub fn has_settled(&self) -> bool {
+        self.residual.is_finite() && self.sweeps < SWEEPS_MAX
+    }
+
+    /// Whether rows of leaves were bounded so that the solution does not grow without end.
+    pub fn is_bounded(&self) -> bool {
+        !self.limits.is_empty()
+    }
+
+    /// Exitances alone; punctual lights stay as they are.
+    fn start_anew(&mut self, surfaces: &impl Surfaces) {
+        for facet in surfaces.facets() {
+            let mean = surfaces.lit(facet.0).exitance;
+            for_each_below(surfaces, facet.0, &mut |id| {
+                self.radiosity.set(id, &Linear { mean, ..Linear::default() });
+                self.gathered.set(id, &Linear::default());
+            });
+        }
+        self.pending.fill(0.0);
+        self.owed.fill(0.0);
+        self.trend = Trend::default();
+        (self.held, self.passed_over, self.sweeps) = (0.0, 0.0, 0);
     }
 
     /// Gathers, pushes and pulls until the solution is settled, beginning with what is dirty.
@@ -358,6 +419,7 @@ impl Radiosity {
                 radiosity: &self.radiosity,
                 gathered: &self.gathered,
                 owed: &self.owed,
+                limits: &self.limits,
                 surfaces,
                 lit,
                 limit,
@@ -397,12 +459,17 @@ impl Radiosity {
         visit: &mut dyn FnMut(u32, &Linear),
     ) {
         let own = |id: u32| self.gathered.get(id);
-        push(surfaces, (facet, &surfaces.place(facet)), &Linear::default(), &own, visit);
+        push(surfaces, (facet, &surfaces.place(facet)), &Linear::default(), &own, &mut |id, h| {
+            match self.limits.get(id as usize) {
+                Some(&limit) => visit(id, &h.divided(limit)),
+                None => visit(id, h),
+            }
+        });
     }
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> u64 {
-        let single = self.pending.capacity() + self.owed.capacity();
+        let single = self.pending.capacity() + self.owed.capacity() + self.limits.capacity();
         let single = (single * size_of::<f32>()) as u64;
         self.radiosity.bytes() + self.gathered.bytes() + single + self.trend.bytes()
     }

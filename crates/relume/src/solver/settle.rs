@@ -41,6 +41,8 @@ pub(super) struct Below<'a, S> {
     /// By how much the radiosities at and below an element may be off, at most, for what was not pushed
     /// down to them, W/m2.
     pub(super) owed: &'a [f32],
+    /// What the irradiance of each leaf is divided by; empty where by nothing.
+    pub(super) limits: &'a [f32],
     pub(super) surfaces: &'a S,
     pub(super) lit: &'a Lit,
     pub(super) limit: f32,
@@ -63,7 +65,10 @@ impl<S: Surfaces> Below<'_, S> {
         let children = self.surfaces.children(id);
         let mut owed = 0.0_f32;
         let b = if children.is_empty() {
-            self.reflect(&h, place)
+            match self.limits.get(id as usize) {
+                Some(&limit) => self.reflect(&h.divided(limit), place),
+                None => self.reflect(&h, place),
+            }
         } else {
             let news = match self.way {
                 Some(way) => self.add_own(news, way, id),

@@ -80,6 +80,10 @@ pub trait Surfaces: Sync {
     fn parent(&self, id: u32) -> Option<u32>;
     /// Children of an element within its quadtree.
     fn children(&self, id: u32) -> Range<u32>;
+    /// Whether a source is a surface, not a punctual light: only those count in row sums.
+    fn is_surface(&self, _id: u32) -> bool {
+        true
+    }
     /// Area, m2.
     fn area_m2(&self, id: u32) -> f64;
     /// Where an element lies.

@@ -26,7 +26,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
     let mut notes = std::mem::take(&mut draft.notes);
     unique_names(&mut draft, &mut notes);
     let (nodes, residuals) = without_scales(&draft)?;
-    let duration_s = duration_s(&nodes, &draft);
+    let duration_s = duration_s(&draft);
     let motion = Motion { duration_s, nodes, animation: draft.animation.clone() };
     notes.extend(misdirected(&draft, &residuals));
     let mut parts = Parts::default();
@@ -209,15 +209,20 @@ fn pose_in_body(motion: &Motion, node: usize) -> Pose {
     still.fold(Pose::IDENTITY, |pose, n| n.local_pose(0.0) * pose)
 }
 
-/// The time of the last key.
-fn duration_s(nodes: &[super::Node], draft: &Draft) -> f64 {
-    let last = |n: &super::Node| {
+/// The time of the last key, whether anything still changes there or not: a clip lasts as long as its file says.
+fn duration_s(draft: &Draft) -> f64 {
+    let last = |n: &DraftNode| {
         let translation = n.translation_track.as_ref().and_then(|t| t.times_s.last().copied());
         let rotation = n.rotation_track.as_ref().and_then(|t| t.times_s.last().copied());
         let presence = n.presence.last().map(|k| k.0);
         [translation, rotation, presence].into_iter().flatten().fold(0.0, f64::max)
     };
-    glows(draft).map(|(_, glow)| glow.end_s()).chain(nodes.iter().map(last)).fold(0.0, f64::max)
+    let glowing = glows(draft).map(|(_, glow)| glow.end_s());
+    // Keys of files begin to count a little before their time: the end is told of its own.
+    match draft.end_s {
+        0.0 => glowing.chain(draft.nodes.iter().map(last)).fold(0.0, f64::max),
+        end_s => end_s,
+    }
 }
 
 /// All emissions that change, with what they are of.

@@ -70,6 +70,7 @@ impl Document {
         let wanted = match N {
             1 => "SCALAR",
             3 => "VEC3",
+            16 => "MAT4",
             _ => "VEC4",
         };
         if accessor.kind != wanted {

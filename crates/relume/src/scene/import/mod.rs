@@ -9,6 +9,7 @@ use std::path::Path;
 mod accessor;
 mod animation;
 mod base64;
+mod clock;
 mod document;
 mod json;
 mod light;

@@ -79,7 +79,7 @@ pub(crate) fn flat(args: &FlatArgs) -> Result<(), Failure> {
         ));
     }
     let frames = resolve(args.frames.as_ref(), scene.duration_s(), args.fps)
-        .map_err(|error| Failure::usage(error).help("choose other --frames"))?;
+        .map_err(|error| Failure::new(error).help("choose other --frames"))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let run = Run { scene: Arc::new(scene), name, args, frames };
     let measure = &args.measure;

@@ -11,6 +11,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::draft::{Draft, DraftNode};
+use super::limits::{COORDINATE_MAX_M, is_place};
 use super::motion::unit;
 use super::{Interpolation, Node, NodeId, RotationTrack, SceneError, Track};
 
@@ -59,12 +60,12 @@ fn shear(node: &DraftNode) -> SceneError {
 /// The node without its scale, below a parent of residual `above`; constant tracks are folded.
 fn rigid_node(node: &DraftNode, above: DMat3) -> Result<Node, SceneError> {
     let bend = |t: DVec3| if above == DMat3::IDENTITY { t } else { above * t };
-    let mut translation = bend(finite(node, "translation", node.translation)?);
+    let placed = |v: DVec3| finite(node, "translation", bend(finite(node, "translation", v)?));
+    let mut translation = placed(node.translation)?;
     let mut translation_track = None;
     if let Some(track) = &node.translation_track {
         check_track(&node.name, &track.times_s, track.values.len(), track.interpolation)?;
-        let values: Result<Vec<DVec3>, _> =
-            track.values.iter().map(|&v| Ok(bend(finite(node, "translation", v)?))).collect();
+        let values: Result<Vec<DVec3>, _> = track.values.iter().map(|&v| placed(v)).collect();
         let track = Track {
             times_s: track.times_s.clone(),
             values: values?,
@@ -266,14 +267,21 @@ pub(super) fn check_track(
     }
 }
 
-/// The vector, if all its components are finite.
+/// The vector, if its components are numbers to compute with.
 fn finite(node: &DraftNode, which: &str, v: DVec3) -> Result<DVec3, SceneError> {
-    if v.is_finite() {
+    if is_place(&v.to_array()) {
         return Ok(v);
     }
+    let what = match v.is_finite() {
+        false => format!("its {which} is not finite ({}, {}, {})", v.x, v.y, v.z),
+        true => format!(
+            "its {which} is ({:e}, {:e}, {:e}), more than {COORDINATE_MAX_M:e}",
+            v.x, v.y, v.z
+        ),
+    };
     Err(SceneError::Geometry {
         subject: format!("node `{}`", node.name),
-        what: format!("its {which} is not finite ({}, {}, {})", v.x, v.y, v.z),
+        what,
         remedy: "repair the transform or the keyframes and export again".into(),
     })
 }

@@ -44,7 +44,9 @@ fn all_animations_play_unless_one_is_chosen() {
     g.animate("again", 0, "translation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 0., 0., 5.]);
     let folder = tempfile::tempdir().unwrap();
     let file = g.write(folder.path(), "s");
-    let choose = |name: &str| import(&file, &ImportOptions { animation: Some(name.to_owned()) });
+    let choose = |name: &str| {
+        import(&file, &ImportOptions { animation: Some(name.to_owned()), ..Default::default() })
+    };
     let all = scene_of(&g).unwrap();
     assert_eq!((at(&all, 1.0), all.moves(BodyId(1)), all.motion.duration_s), (DVec3::X, true, 2.0));
     let conflict = with_code(&all.notes, "animation-conflict");

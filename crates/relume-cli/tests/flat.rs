@@ -139,6 +139,25 @@ fn the_tutorial_is_right() {
 }
 
 #[test]
+fn a_bad_file_ends_with_the_exit_code_of_a_bad_file_in_space() {
+    let dir = TempDir::new().unwrap();
+    let endless = "body b\nat 0 0 0\nat 1e9 0 0\nsegment p 0 0 1 0\n";
+    for (name, content, what) in [
+        ("empty.flat", "", "no segments"),
+        ("far.flat", "segment p 0 0 1e300 0\n", "larger than 1e12"),
+        ("bright.flat", "segment p 0 0 1 0 emit 1e38\n", "between 0 and 1e30"),
+        ("endless.flat", endless, "more frames than can be counted"),
+        ("deep.svg", &format!("<svg>{}", "<g>".repeat(5_000)), "no XML"),
+    ] {
+        let file = dir.path().join(name);
+        fs::write(&file, content).unwrap();
+        relume(&["flat", text(&file)]).fails(1, &[what]);
+        relume(&["solve", text(&file)]).fails(1, &["error"]);
+    }
+    relume(&["flat", text(dir.path())]).fails(1, &["cannot read"]);
+}
+
+#[test]
 fn messages_say_where_and_what() {
     let dir = TempDir::new().unwrap();
     let file = dir.path().join("wrong.flat");
@@ -156,7 +175,7 @@ fn messages_say_where_and_what() {
     with(&["--compare"]).fails(2, &["add --bench"]);
     with(&["--bench", "--verify"]).fails(2, &["cannot be used with"]);
     with(&["--bench", "--frames", "3"]).fails(1, &["two frames or more"]);
-    with(&["--frames", "9999"]).fails(2, &["outside the animation"]);
+    with(&["--frames", "9999"]).fails(1, &["outside the animation"]);
     relume(&["flat"]).fails(2, &["<SCENE>"]);
     relume(&["flat", "figure", "0.9"]).fails(2, &["0.1", "0.4"]);
     relume(&["figure", "0.4"]).fails(2, &["0.5", "table-0.1"]);

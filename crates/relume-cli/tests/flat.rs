@@ -157,6 +157,31 @@ fn a_bad_file_ends_with_the_exit_code_of_a_bad_file_in_space() {
     relume(&["flat", text(dir.path())]).fails(1, &["cannot read"]);
 }
 
+/// Bright walls through each other whose rows sum to more than 1.
+const CROSSED: &str = "segment wall 0 2 0 0 reflectance 0.8853079981
+body one
+segment one -0.4 0 -0.288 0.412 reflectance 0.3037953448
+body two
+at 0 0.2073 1.0
+segment lamp 0.156 -0.3 0.111 0.182 reflectance 0.99 emit 611496
+body three
+at 0 -0.0236 1.0 75.443
+segment blade -0.2 -0.383 0.311 -0.283 reflectance 0.99 two-sided
+";
+
+#[test]
+fn light_that_grows_between_walls_that_cross_is_an_error_in_every_command() {
+    let dir = TempDir::new().unwrap();
+    let file = dir.path().join("crossed.flat");
+    fs::write(&file, CROSSED).unwrap();
+    for more in [&[][..], &["--verify"], &["--print", "walls"]] {
+        let ran = relume(
+            &[&["flat", text(&file), "--epsilon", "0.2", "--min-length", "0.1"], more].concat(),
+        );
+        ran.fails(1, &["frame 0", "does not settle", "cross"]);
+    }
+}
+
 #[test]
 fn messages_say_where_and_what() {
     let dir = TempDir::new().unwrap();

@@ -383,7 +383,7 @@ fn emission(pointer: &str) -> Option<(Emitter, Property)> {
 fn constant_weights(when: &Keys, values: &[f64]) -> Option<Vec<f64>> {
     let keys = when.times_s.len();
     let per_key = values.len() / keys.max(1);
-    if values.is_empty() || values.len() % keys != 0 {
+    if values.is_empty() || !values.len().is_multiple_of(keys) {
         return None;
     }
     let mut sets = values.chunks(per_key);
@@ -396,7 +396,7 @@ fn constant_weights(when: &Keys, values: &[f64]) -> Option<Vec<f64>> {
                 k[third..2 * third] == *first
                     && k[..third].iter().chain(&k[2 * third..]).all(|&tangent| tangent == 0.0)
             };
-            (per_key % 3 == 0 && sets.all(still)).then(|| first.to_vec())
+            (per_key.is_multiple_of(3) && sets.all(still)).then(|| first.to_vec())
         }
         _ => sets.all(|k| *k == values[..per_key]).then(|| values[..per_key].to_vec()),
     }

@@ -91,26 +91,31 @@ mod tests {
 
     /// The key that a time shows.
     fn shown(onsets_s: &[f64], time_s: f64) -> usize {
-        onsets_s.partition_point(|&t| t <= time_s) - 1
+        onsets_s.partition_point(|&t| t <= time_s).saturating_sub(1)
     }
 
     #[test]
     fn a_frame_shows_its_own_key_at_any_rate_and_any_count() {
         let television = [24_000.0 / 1001.0, 30_000.0 / 1001.0, 60_000.0 / 1001.0, 23.976, 29.97];
-        let odd = (1..60).map(|k| 7.3 + 5.13 * f64::from(k));
+        let odd = (1..12).map(|k| 7.3 + 25.13 * f64::from(k));
+        let some = |from: u32| from..from + 3_000;
         for fps in [24.0, 25.0, 72.0, 90.0, 144.0, 240.0].into_iter().chain(television).chain(odd) {
-            let exact = keys((0..200_000).map(|k| (f64::from(k) / fps) as f32)).onsets_s();
-            for k in 0..200_000 {
-                assert_eq!(shown(&exact, f64::from(k) / fps), k as usize, "{fps}");
+            for from in [0, 30_000, 200_000] {
+                let exact = keys(some(from).map(|k| (f64::from(k) / fps) as f32)).onsets_s();
+                for (key, k) in some(from).enumerate() {
+                    assert_eq!(shown(&exact, f64::from(k) / fps), key, "{fps}");
+                }
             }
             // Exporters that multiply or divide in 32 bits.
             let (step, rate) = ((1.0 / fps) as f32, fps as f32);
-            for sloppy in [
-                keys((0..100_000).map(|k| k as f32 * step)).onsets_s(),
-                keys((0..100_000).map(|k| k as f32 / rate)).onsets_s(),
-            ] {
-                for k in 0..100_000 {
-                    assert_eq!(shown(&sloppy, f64::from(k) / fps), k as usize, "{fps}");
+            for from in [0, 30_000, 100_000] {
+                for sloppy in [
+                    keys(some(from).map(|k| k as f32 * step)).onsets_s(),
+                    keys(some(from).map(|k| k as f32 / rate)).onsets_s(),
+                ] {
+                    for (key, k) in some(from).enumerate() {
+                        assert_eq!(shown(&sloppy, f64::from(k) / fps), key, "{fps}");
+                    }
                 }
             }
         }

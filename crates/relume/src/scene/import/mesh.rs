@@ -37,14 +37,16 @@ pub(super) fn polygons(
     Ok(soups.iter().map(|soup| soup.merged(&soup.triangles, &name, notes)).collect())
 }
 
-/// The polygons of each joint of a skin, ascending, where every triangle hangs on one joint alone; else how
-/// many do not.
+/// The polygons of each joint of a skin, ascending; or how many triangles hang on several.
+pub(super) type Jointed = Result<Vec<(usize, Vec<Polygons>)>, usize>;
+
+/// The polygons of each joint of a skin where every triangle hangs on one joint alone.
 pub(super) fn by_joint(
     document: &Document,
     index: usize,
     weights: &[f64],
     notes: &mut Vec<Note>,
-) -> Result<Result<Vec<(usize, Vec<Polygons>)>, usize>, SceneError> {
+) -> Result<Jointed, SceneError> {
     let (name, soups) = soups(document, index, weights, notes)?;
     let mut parts: BTreeMap<usize, Vec<Polygons>> = BTreeMap::new();
     let mut bent = 0;

@@ -42,8 +42,9 @@ impl Stepping for Session {
 impl Stepping for FlatSession {
     fn go(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, Failure> {
         let report = self.step(frame, time_s);
-        // What settles comes to a few times the residual asked for. The negation refuses NaN too.
-        if !(report.residual <= 10.0 * FlatOptions::default().residual) {
+        // What settles comes to a few times the residual asked for.
+        let most = 10.0 * FlatOptions::default().residual;
+        if report.residual.is_nan() || report.residual > most {
             return Err(unsettled(self, &report));
         }
         Ok(report)

@@ -431,12 +431,15 @@ pub(crate) struct CheckArgs {
     pub(crate) animation: AnimationFlag,
 }
 
-/// Which animation plays.
+/// Which animation plays, and what a scene may be read from.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct AnimationFlag {
     /// Name of the animation to play; all of them together if left out.
     #[arg(long = "animation", value_name = "NAME")]
     pub(crate) name: Option<String>,
+    /// Read buffers and images of a glTF file wherever they are: outside its folder, devices, pipes.
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
 }
 
 /// What is solved, and how finely: what every command that solves takes.
@@ -478,7 +481,7 @@ impl Default for ClipFlags {
         ClipFlags {
             frames: None,
             fps: 24.0,
-            animation: AnimationFlag { name: None },
+            animation: AnimationFlag { name: None, allow_outside: false },
             tolerance: None,
             oracle: OracleFlag::Error,
             threads: None,

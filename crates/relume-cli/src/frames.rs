@@ -9,6 +9,8 @@ use std::str::FromStr;
 /// Shortfall forgiven when the duration is turned into frames, in frames: key times are stored
 /// as 32-bit floats, so 19/24 s reads back a little short of frame 19.
 const FRAME_SLACK: f64 = 1e-3;
+/// The same for long clips, as a share of the duration: two roundings to 32 bits.
+const FRAME_SLACK_OF_ALL: f64 = 1.2e-7;
 
 /// Frames asked for on the command line, not yet compared with an animation.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -153,7 +155,8 @@ pub(crate) enum FrameRangeError {
 ///
 /// At least one, the frame at time 0, also where nothing moves.
 pub(crate) fn frame_count(duration_s: f64, fps: f64) -> Result<u32, FrameRangeError> {
-    let last = (duration_s * fps + FRAME_SLACK).floor();
+    let frames = duration_s * fps;
+    let last = (frames + FRAME_SLACK.max(FRAME_SLACK_OF_ALL * frames).min(0.25)).floor();
     if last < f64::from(u32::MAX) {
         Ok(last.max(0.0) as u32 + 1)
     } else {
@@ -258,6 +261,11 @@ mod tests {
         // As the file stores it: a 32-bit float a little below 19/24.
         assert_eq!(resolve(None, f64::from(19.0_f32 / 24.0) - 1e-8, 24.0).unwrap().len(), 20);
         assert_eq!(resolve(None, 0.99, 1.0).unwrap(), [0]);
+        // Of long clips 32 bits tell less.
+        for k in [200_000_u32, 999_999, 1_234_567] {
+            let end_s = f64::from((f64::from(k) / 120.0) as f32);
+            assert_eq!(frame_count(end_s, 120.0).unwrap(), k + 1);
+        }
     }
 
     #[test]

@@ -10,7 +10,8 @@ use crate::output;
 
 /// Reads a scene.
 pub(crate) fn load(path: &Path, animation: &AnimationFlag) -> Result<Scene, Failure> {
-    import(path, &ImportOptions { animation: animation.name.clone() }).map_err(failure)
+    let AnimationFlag { name, allow_outside } = animation.clone();
+    import(path, &ImportOptions { animation: name, allow_outside }).map_err(failure)
 }
 
 /// The message of a scene error, its remedy on a line of its own.
@@ -19,6 +20,7 @@ pub(crate) fn failure(error: SceneError) -> Failure {
     let remedy = match &error {
         SceneError::Read { remedy, .. }
         | SceneError::Format { remedy, .. }
+        | SceneError::Outside { remedy, .. }
         | SceneError::View3d { remedy, .. }
         | SceneError::Extension { remedy, .. }
         | SceneError::Geometry { remedy, .. }

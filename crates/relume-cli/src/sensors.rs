@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use glam::DVec3;
+use relume::scene::limits::{COORDINATE_MAX_M, is_place};
 
 use crate::failure::Failure;
 
@@ -82,6 +83,11 @@ fn parse(text: &str) -> Result<Sensors, Flaw> {
         if let Some(k) = raw.numbers.iter().position(|v| !v.is_finite()) {
             let what = format!("{} is {}", COLUMNS[k], raw.numbers[k]);
             return Err((raw.line, what, "give finite numbers, in metres"));
+        }
+        if let Some(k) = raw.numbers[..3].iter().position(|&v| !is_place(&[v])) {
+            let what =
+                format!("{} is {:e}, more than {COORDINATE_MAX_M:e} m", COLUMNS[k], raw.numbers[k]);
+            return Err((raw.line, what, "give places in metres, nearer to the scene"));
         }
         // Of a vector too long or too short to be squared the direction is still known.
         let scaled = normal / normal.abs().max_element();
@@ -239,6 +245,7 @@ mod tests {
             ("x,y,z,nx,ny\n0,0,0,0,0", 1, "no column nz"),
             ("x,y,z,nx,ny,nz\n0,0,0,0,0,1\n0,0,0,0,1\n", 3, "5 columns instead of 6"),
             ("x,y,z,nx,ny,nz\n0,0,a,0,0,1\n", 2, "`a` is not a number"),
+            ("0 0 0 0 0 1\n0 -1e300 0 0 0 1", 2, "y is -1e300"),
             ("x,y,z,nx,ny,nz\n0,0,0,0,0,0\n", 2, "the normal is 0 0 0"),
         ] {
             let (at, said, remedy) = parse(text).unwrap_err();

@@ -1,7 +1,8 @@
 //! A sequence of frames to be followed, in space or in the plane: what `verify`, `bench` and its
 //! comparison ask of it. Knows nothing of scenes.
 
-use relume::flat::FlatSession;
+use relume::element::ElementId;
+use relume::flat::{FlatOptions, FlatSession};
 use relume::session::{FrameReport, Memory, Session, Solution};
 
 use crate::args::UpdateChoice;
@@ -40,7 +41,13 @@ impl Stepping for Session {
 
 impl Stepping for FlatSession {
     fn go(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, Failure> {
-        Ok(self.step(frame, time_s))
+        let report = self.step(frame, time_s);
+        // What settles comes to a few times the residual asked for.
+        let most = 10.0 * FlatOptions::default().residual;
+        if report.residual.is_nan() || report.residual > most {
+            return Err(unsettled(self, &report));
+        }
+        Ok(report)
     }
 
     fn count_from(&mut self, time_s: Option<f64>) {
@@ -50,6 +57,19 @@ impl Stepping for FlatSession {
     fn held(&self) -> Memory {
         self.memory()
     }
+}
+
+/// Light that grows from sweep to sweep: between bright walls that cross or lie on each other.
+fn unsettled(session: &FlatSession, report: &FrameReport) -> Failure {
+    let (_, forest) = session.pairs();
+    let size = |facet: &ElementId| session.radiosity(*facet).into_iter().fold(0.0, f32::max);
+    let brightest = forest.facets().iter().max_by(|a, b| size(a).total_cmp(&size(b)));
+    let name = brightest.map_or_else(String::new, |&facet| session.name(facet).short());
+    Failure::new(format_args!(
+        "frame {}: the light does not settle (residual {:.1e} after {} sweeps); it is brightest at `{name}`",
+        report.frame, report.residual, report.sweeps
+    ))
+    .help("part walls that cross or lie on each other, give them lower reflectances, or lower --epsilon")
 }
 
 /// A scene with the frames asked for and how it is to be solved.

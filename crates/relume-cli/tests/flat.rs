@@ -139,6 +139,50 @@ fn the_tutorial_is_right() {
 }
 
 #[test]
+fn a_bad_file_ends_with_the_exit_code_of_a_bad_file_in_space() {
+    let dir = TempDir::new().unwrap();
+    let endless = "body b\nat 0 0 0\nat 1e9 0 0\nsegment p 0 0 1 0\n";
+    for (name, content, what) in [
+        ("empty.flat", "", "no segments"),
+        ("far.flat", "segment p 0 0 1e300 0\n", "larger than 1e12"),
+        ("bright.flat", "segment p 0 0 1 0 emit 1e38\n", "between 0 and 1e30"),
+        ("endless.flat", endless, "more frames than can be counted"),
+        ("deep.svg", &format!("<svg>{}", "<g>".repeat(5_000)), "no XML"),
+    ] {
+        let file = dir.path().join(name);
+        fs::write(&file, content).unwrap();
+        relume(&["flat", text(&file)]).fails(1, &[what]);
+        relume(&["solve", text(&file)]).fails(1, &["error"]);
+    }
+    relume(&["flat", text(dir.path())]).fails(1, &["cannot read"]);
+}
+
+/// Bright walls through each other whose rows sum to more than 1.
+const CROSSED: &str = "segment wall 0 2 0 0 reflectance 0.8853079981
+body one
+segment one -0.4 0 -0.288 0.412 reflectance 0.3037953448
+body two
+at 0 0.2073 1.0
+segment lamp 0.156 -0.3 0.111 0.182 reflectance 0.99 emit 611496
+body three
+at 0 -0.0236 1.0 75.443
+segment blade -0.2 -0.383 0.311 -0.283 reflectance 0.99 two-sided
+";
+
+#[test]
+fn light_that_grows_between_walls_that_cross_is_an_error_in_every_command() {
+    let dir = TempDir::new().unwrap();
+    let file = dir.path().join("crossed.flat");
+    fs::write(&file, CROSSED).unwrap();
+    for more in [&[][..], &["--verify"], &["--print", "walls"]] {
+        let ran = relume(
+            &[&["flat", text(&file), "--epsilon", "0.2", "--min-length", "0.1"], more].concat(),
+        );
+        ran.fails(1, &["frame 0", "does not settle", "cross"]);
+    }
+}
+
+#[test]
 fn messages_say_where_and_what() {
     let dir = TempDir::new().unwrap();
     let file = dir.path().join("wrong.flat");
@@ -156,7 +200,7 @@ fn messages_say_where_and_what() {
     with(&["--compare"]).fails(2, &["add --bench"]);
     with(&["--bench", "--verify"]).fails(2, &["cannot be used with"]);
     with(&["--bench", "--frames", "3"]).fails(1, &["two frames or more"]);
-    with(&["--frames", "9999"]).fails(2, &["outside the animation"]);
+    with(&["--frames", "9999"]).fails(1, &["outside the animation"]);
     relume(&["flat"]).fails(2, &["<SCENE>"]);
     relume(&["flat", "figure", "0.9"]).fails(2, &["0.1", "0.4"]);
     relume(&["figure", "0.4"]).fails(2, &["0.5", "table-0.1"]);

@@ -22,7 +22,7 @@ use crate::frames::{resolve, time_of};
 use crate::interrupt;
 use crate::output;
 use crate::paper::make;
-use crate::sequence::Sequence;
+use crate::sequence::{Sequence, Stepping};
 use crate::verify;
 
 /// Name of the report's format.
@@ -79,7 +79,7 @@ pub(crate) fn flat(args: &FlatArgs) -> Result<(), Failure> {
         ));
     }
     let frames = resolve(args.frames.as_ref(), scene.duration_s(), args.fps)
-        .map_err(|error| Failure::usage(error).help("choose other --frames"))?;
+        .map_err(|error| Failure::new(error).help("choose other --frames"))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let run = Run { scene: Arc::new(scene), name, args, frames };
     let measure = &args.measure;
@@ -132,7 +132,7 @@ impl Run<'_> {
             if interrupt::requested() {
                 return Err(Failure::interrupted("interrupted; nothing more is written"));
             }
-            reports.push(session.step(frame, self.time_of(frame)));
+            reports.push(session.go(frame, self.time_of(frame))?);
             events.add(frame, &session.events());
             if let Some(dir) = &self.args.output {
                 write(&dir.join(format!("frame-{frame:04}.svg")), &picture(&session, part, frame))?;

@@ -4,7 +4,11 @@ use std::ops::Range;
 
 use glam::DVec2;
 
-use super::plane::{PlanePose, Segment};
+use super::plane::{PlanePose, ROUNDING, Segment};
+use crate::scene::limits::{EMISSION_MAX, is_place};
+
+/// Length of the shortest wall, m.
+const LENGTH_MIN_M: f64 = 1e-9;
 
 /// Index of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -121,16 +125,18 @@ pub struct FlatScene {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SceneError {
     /// A wall without a direction.
-    #[error("segment `{0}` has no length: give it two different ends")]
+    #[error(
+        "segment `{0}` has no length, or too little for where it is: give it two different ends"
+    )]
     NoLength(String),
-    /// A number that is none.
-    #[error("`{0}` has a number that is not finite")]
+    /// A number that is none, or too large to compute with.
+    #[error("`{0}` has a number that is not finite, or larger than 1e12")]
     NotFinite(String),
     /// A reflectance out of range.
     #[error("segment `{0}`: a reflectance lies in [0, 1), such as 0.5")]
     Reflectance(String),
     /// A negative exitance.
-    #[error("segment `{0}`: what is emitted cannot be negative")]
+    #[error("segment `{0}`: what is emitted lies between 0 and 1e30")]
     Exitance(String),
     /// A wall before any body, or a body without walls.
     #[error("body `{0}` has no segments: give it one, or leave it out")]
@@ -154,7 +160,7 @@ impl FlatScene {
     /// # Errors
     /// If its keys are not finite or their times do not ascend.
     pub fn body(&mut self, name: &str, motion: Motion) -> Result<BodyIndex, SceneError> {
-        let finite = |k: &Key| k.time_s.is_finite() && k.place.is_finite() && k.angle.is_finite();
+        let finite = |k: &Key| is_place(&[k.time_s, k.place.x, k.place.y, k.angle]);
         if !motion.keys.iter().all(finite) {
             return Err(SceneError::NotFinite(name.into()));
         }
@@ -177,17 +183,20 @@ impl FlatScene {
         material: Material,
     ) -> Result<WallIndex, SceneError> {
         let name = name.to_owned();
-        if !(local.start.is_finite() && local.end.is_finite()) {
+        let Segment { start, end } = local;
+        if !is_place(&[start.x, start.y, end.x, end.y]) {
             return Err(SceneError::NotFinite(name));
         }
-        if local.start == local.end {
+        // What is shorter than the rounding of its ends has no direction.
+        let least = LENGTH_MIN_M.max(1e3 * ROUNDING * local.size());
+        if local.start == local.end || local.length() < least {
             return Err(SceneError::NoLength(name));
         }
         // The solver holds it in single precision.
         if !material.reflectance.iter().all(|&r| r >= 0.0 && (r as f32) < 1.0) {
             return Err(SceneError::Reflectance(name));
         }
-        if !material.exitance.iter().all(|m| *m >= 0.0 && m.is_finite()) {
+        if !material.exitance.iter().all(|m| (0.0..=EMISSION_MAX).contains(m)) {
             return Err(SceneError::Exitance(name));
         }
         if self.bodies.is_empty() {

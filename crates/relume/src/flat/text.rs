@@ -199,6 +199,11 @@ mod tests {
             ("body b\nbody c\nsegment p 0 0 1 0", 3, "has no segments"),
             ("polygon p 0 0 1 0", 1, "three corners"),
             ("# nothing", 1, "no segments"),
+            ("segment p 0 0 1e300 0", 1, "larger than 1e12"),
+            ("segment p 0 0 nan 0", 1, "`nan` is not a number"),
+            ("segment p 1e6 0 1e6 1e-10", 1, "no length"),
+            ("segment p 0 0 1 0 emit 1e38", 1, "between 0 and 1e30"),
+            ("body b\nat 0 1e300 0\nsegment p 0 0 1 0", 1, "larger than 1e12"),
         ] {
             let error = parse(text).unwrap_err();
             assert_eq!(error.line, line, "{text}: {error}");

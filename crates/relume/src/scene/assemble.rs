@@ -10,6 +10,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::draft::{Draft, DraftNode, DraftSurface};
 use super::flatten::{Flaw, flatten, seen_from_behind};
+use super::limits::{COORDINATE_MAX_M, EMISSION_MAX, EXTENT_MIN_M, SPECK, is_place};
 use super::names::Names;
 use super::rigid::{check_track, without_scales};
 use super::{
@@ -22,11 +23,12 @@ use crate::geometry::Pose;
 pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
     check_materials(&draft.materials)?;
     check_glows(&draft)?;
+    check_lights(&draft)?;
     start_glows(&mut draft);
     let mut notes = std::mem::take(&mut draft.notes);
     unique_names(&mut draft, &mut notes);
     let (nodes, residuals) = without_scales(&draft)?;
-    let duration_s = duration_s(&nodes, &draft);
+    let duration_s = duration_s(&draft);
     let motion = Motion { duration_s, nodes, animation: draft.animation.clone() };
     notes.extend(misdirected(&draft, &residuals));
     let mut parts = Parts::default();
@@ -53,6 +55,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
             parts.bodies.push(Body { name, node: NodeId(node as u32), patches });
         }
     }
+    parts.leave_out_specks(&motion)?;
     notes.append(&mut parts.notes);
     notes.extend(parts.names.notes("surface"));
     if parts.patches.is_empty() {
@@ -116,8 +119,8 @@ impl Parts {
         let double_sided = materials[surface.material.0 as usize].double_sided;
         for polygon in &surface.polygons {
             let points = place.place(polygon);
-            if points.iter().any(|p| !p.is_finite()) {
-                return Err(not_finite(name, object));
+            if let Some(bad) = points.iter().find(|p| !is_place(&p.to_array())) {
+                return Err(no_place(name, object, *bad));
             }
             for piece in flat_pieces(&points) {
                 match piece {
@@ -141,6 +144,88 @@ impl Parts {
             self.notes.push(degenerate_note(name, degenerate));
         }
         Ok(())
+    }
+
+    /// Leaves out polygons that are too small for the scene, with a note for each surface.
+    fn leave_out_specks(&mut self, motion: &Motion) -> Result<(), SceneError> {
+        let Some(extent) = self.extent_m(motion) else { return Ok(()) };
+        if extent < EXTENT_MIN_M {
+            return Err(SceneError::Geometry {
+                subject: format!("surface `{}`", self.surfaces[0].name),
+                what: format!("it and the whole scene are {extent:e} m large"),
+                remedy: format!("scale the scene to metres: {EXTENT_MIN_M:e} m at least"),
+            });
+        }
+        let size = |p: &Patch| {
+            let far = |c: &DVec2| c.distance(p.corners[0]);
+            p.corners.iter().map(far).fold(0.0, f64::max)
+        };
+        let is_speck: Vec<bool> = self.patches.iter().map(|p| size(p) < SPECK * extent).collect();
+        if !is_speck.contains(&true) {
+            return Ok(());
+        }
+        let mut counts = vec![(0, 0); self.surfaces.len()];
+        for (patch, &speck) in self.patches.iter().zip(&is_speck) {
+            let count = &mut counts[patch.surface.0 as usize];
+            *count = (count.0 + usize::from(speck), count.1 + usize::from(!speck));
+        }
+        for (surface, &(specks, others)) in self.surfaces.iter().zip(&counts) {
+            if specks > 0 {
+                self.notes.push(speck_note(&surface.name, specks, others == 0));
+            }
+        }
+        // What nothing is left of goes; the others move up.
+        let mut new_of_surface = vec![SurfaceId(0); self.surfaces.len()];
+        let mut kept = 0;
+        for (new, &(_, others)) in new_of_surface.iter_mut().zip(&counts) {
+            *new = SurfaceId(kept);
+            kept += u32::from(others > 0);
+        }
+        // The number of patches kept before each one, and before the end.
+        let mut new_of_patch = vec![0];
+        for &speck in &is_speck {
+            new_of_patch.push(new_of_patch[new_of_patch.len() - 1] + u32::from(!speck));
+        }
+        let new = |k: u32| new_of_patch[k as usize];
+        for body in &mut self.bodies {
+            body.patches = new(body.patches.start)..new(body.patches.end);
+        }
+        let mut new_of_body = vec![BodyId(0); self.bodies.len()];
+        let mut kept = 0;
+        for (id, body) in new_of_body.iter_mut().zip(&self.bodies) {
+            *id = BodyId(kept);
+            kept += u32::from(!body.patches.is_empty());
+        }
+        self.bodies.retain(|body| !body.patches.is_empty());
+        let mut counted = counts.iter();
+        self.surfaces.retain(|_| counted.next().is_some_and(|c| c.1 > 0));
+        for surface in &mut self.surfaces {
+            surface.body = new_of_body[surface.body.0 as usize];
+        }
+        let mut specks = is_speck.iter();
+        self.patches.retain(|_| !*specks.next().unwrap_or(&false));
+        for patch in &mut self.patches {
+            patch.surface = new_of_surface[patch.surface.0 as usize];
+            patch.body = new_of_body[patch.body.0 as usize];
+            patch.twin = patch.twin.map(|twin| PatchId(new(twin.0)));
+        }
+        Ok(())
+    }
+
+    /// The scene's extent at the start, or what it would be if all were present.
+    fn extent_m(&self, motion: &Motion) -> Option<f64> {
+        let mut bounds: Option<(DVec3, DVec3)> = None;
+        for body in &self.bodies {
+            let moves = motion.moves(body.node);
+            let pose = if moves { motion.pose(body.node, 0.0) } else { None };
+            let pose = pose.unwrap_or(Pose::IDENTITY);
+            let range = body.patches.start as usize..body.patches.end as usize;
+            for point in self.patches[range].iter().flat_map(Patch::corners_in_body) {
+                let p = pose.point(point);
+                bounds = Some(bounds.map_or((p, p), |(low, high)| (low.min(p), high.max(p))));
+            }
+        }
+        bounds.map(|(low, high)| (high - low).length())
     }
 
     fn add_patch(
@@ -209,15 +294,20 @@ fn pose_in_body(motion: &Motion, node: usize) -> Pose {
     still.fold(Pose::IDENTITY, |pose, n| n.local_pose(0.0) * pose)
 }
 
-/// The time of the last key.
-fn duration_s(nodes: &[super::Node], draft: &Draft) -> f64 {
-    let last = |n: &super::Node| {
+/// The time of the last key, whether anything still changes there or not: a clip lasts as long as its file says.
+fn duration_s(draft: &Draft) -> f64 {
+    let last = |n: &DraftNode| {
         let translation = n.translation_track.as_ref().and_then(|t| t.times_s.last().copied());
         let rotation = n.rotation_track.as_ref().and_then(|t| t.times_s.last().copied());
         let presence = n.presence.last().map(|k| k.0);
         [translation, rotation, presence].into_iter().flatten().fold(0.0, f64::max)
     };
-    glows(draft).map(|(_, glow)| glow.end_s()).chain(nodes.iter().map(last)).fold(0.0, f64::max)
+    let glowing = glows(draft).map(|(_, glow)| glow.end_s());
+    // Keys of files begin to count a little before their time: the end is told of its own.
+    match draft.end_s {
+        0.0 => glowing.chain(draft.nodes.iter().map(last)).fold(0.0, f64::max),
+        end_s => end_s,
+    }
 }
 
 /// All emissions that change, with what they are of.
@@ -249,10 +339,10 @@ fn check_glows(draft: &Draft) -> Result<(), SceneError> {
                 });
             }
         }
-        if glow.most().iter().any(|&m| !(m as f32).is_finite()) {
+        if glow.most().iter().any(|&m| m.is_nan() || m > EMISSION_MAX) {
             return Err(SceneError::Animation {
                 animation: of,
-                what: "the emission grows beyond all numbers".into(),
+                what: format!("the emission grows beyond {EMISSION_MAX:e}"),
                 remedy: "choose smaller values".into(),
             });
         }
@@ -324,11 +414,25 @@ fn check_materials(materials: &[Material]) -> Result<(), SceneError> {
                 "choose each channel from 0 up to, but not including, 1",
             );
         }
-        if let Some(bad) = material.exitance.iter().find(|m| !(m.is_finite() && **m >= 0.0)) {
+        if let Some(bad) = material.exitance.iter().find(|m| !(0.0..=EMISSION_MAX).contains(*m)) {
             return fail(
-                format!("its exitance is {bad} W/m2"),
-                "choose finite values of 0 or more",
+                format!("its exitance is {bad:e} W/m2"),
+                &format!("choose values from 0 to {EMISSION_MAX:e}"),
             );
+        }
+    }
+    Ok(())
+}
+
+/// Intensities from 0 to what can be computed with.
+fn check_lights(draft: &Draft) -> Result<(), SceneError> {
+    for light in &draft.lights {
+        if let Some(bad) = light.intensity.iter().find(|m| !(0.0..=EMISSION_MAX).contains(*m)) {
+            return Err(SceneError::Geometry {
+                subject: format!("light `{}`", light.name),
+                what: format!("its intensity is {bad:e}"),
+                remedy: format!("choose values from 0 to {EMISSION_MAX:e}"),
+            });
         }
     }
     Ok(())
@@ -344,11 +448,31 @@ fn degenerate_note(surface: &str, count: usize) -> Note {
     }
 }
 
-fn not_finite(surface: &str, object: &str) -> SceneError {
+fn speck_note(surface: &str, count: usize, whole: bool) -> Note {
+    let of_it = if whole { "all of it was" } else { "they were" };
+    Note {
+        severity: if whole { Severity::Warning } else { Severity::Info },
+        code: "speck",
+        subject: surface.to_owned(),
+        count,
+        message: format!(
+            "{count} polygons are smaller than a millionth of the scene; {of_it} left out: scale it, or what is around it"
+        ),
+    }
+}
+
+fn no_place(surface: &str, object: &str, at: DVec3) -> SceneError {
+    let what = match at.is_finite() {
+        false => "a vertex has a coordinate that is not finite".to_owned(),
+        true => format!(
+            "a vertex is at ({:e}, {:e}, {:e}) m, further out than {COORDINATE_MAX_M:e} m",
+            at.x, at.y, at.z
+        ),
+    };
     SceneError::Geometry {
         subject: format!("surface `{surface}` of node `{object}`"),
-        what: "a vertex has a coordinate that is not finite".into(),
-        remedy: "repair the mesh and export it again".into(),
+        what,
+        remedy: "repair the mesh or the scales above it and export it again".into(),
     }
 }
 

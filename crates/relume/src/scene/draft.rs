@@ -17,6 +17,8 @@ pub(super) struct Draft {
     pub(super) lights: Vec<Light>,
     pub(super) cameras: Vec<Camera>,
     pub(super) animation: Option<String>,
+    /// No animation ends earlier than this, seconds, even if nothing moves any more.
+    pub(super) end_s: f64,
     pub(super) notes: Vec<Note>,
 }
 

@@ -26,6 +26,16 @@ pub enum SceneError {
         /// What to do.
         remedy: String,
     },
+    /// The file refers to what is not beside it or below.
+    #[error("`{file}`: {what}; {remedy}")]
+    Outside {
+        /// The file.
+        file: String,
+        /// What it refers to, and what for.
+        what: String,
+        /// What to do.
+        remedy: String,
+    },
     /// A line of a file of View3D says nothing that makes sense, or what is not supported.
     #[error("`{file}`{at}: {what}; {remedy}", at = at(*line))]
     View3d {

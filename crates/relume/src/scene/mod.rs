@@ -21,6 +21,7 @@ mod glow;
 mod import;
 mod inside;
 mod join;
+pub mod limits;
 mod merge;
 mod motion;
 mod names;

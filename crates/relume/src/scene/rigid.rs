@@ -3,37 +3,69 @@
 //!
 //! With residual L of the parent, a child of translation T, rotation R and scale S places a point
 //! at L (T + R S x) = L T + R (R^-1 L R S) x. So the child's rigid translation is L T, and its own
-//! residual R^-1 L R S, which must not depend on time: R may only move where L does not mind.
+//! residual R^-1 L R S, which must not depend on time. A rotation that moves is written D R0 with R0
+//! its first key: L D R0 S = (L D L^-1) R0 (R0^-1 L R0 S), which is rigid where L D L^-1 is a rotation:
+//! of any D if L is a similarity (a mirror among them), and of turns about one axis if L looks the same
+//! all around it.
 
 use glam::{DMat3, DQuat, DVec3};
 
 use super::draft::{Draft, DraftNode};
+use super::limits::{COORDINATE_MAX_M, is_place};
 use super::motion::unit;
 use super::{Interpolation, Node, NodeId, RotationTrack, SceneError, Track};
+
+/// Share of a scale by which it may be uneven and still count as uniform: what rigs in the wild have
+/// from rounding, a tenth of a millimetre of a metre.
+pub(super) const UNEVEN: f64 = 1e-4;
 
 /// The rigid nodes of a draft (names as given) and each node's residual matrix.
 pub(super) fn without_scales(draft: &Draft) -> Result<(Vec<Node>, Vec<DMat3>), SceneError> {
     let mut nodes = Vec::with_capacity(draft.nodes.len());
     let mut residuals: Vec<DMat3> = Vec::with_capacity(draft.nodes.len());
+    // For each node the one at or above it that shears what hangs below.
+    let mut sheared: Vec<Option<usize>> = Vec::with_capacity(draft.nodes.len());
     for (index, node) in draft.nodes.iter().enumerate() {
         assert!(node.parent.is_none_or(|p| p < index), "parents come before children");
         let above = node.parent.map_or(DMat3::IDENTITY, |p| residuals[p]);
-        let rigid = rigid_node(node, above)?;
-        residuals.push(residual(node, &rigid, above)?);
+        let mut rigid = rigid_node(node, above)?;
+        let shears = match residual(node, &mut rigid, above)? {
+            Some(residual) => {
+                residuals.push(residual);
+                None
+            }
+            None => {
+                residuals.push(above * node.shape);
+                Some(index)
+            }
+        };
+        sheared.push(node.parent.and_then(|p| sheared[p]).or(shears));
+        let shows = node.surfaces.iter().any(|s| !s.polygons.is_empty());
+        if let (Some(by), true) = (sheared[index], shows) {
+            return Err(shear(&draft.nodes[by]));
+        }
         nodes.push(rigid);
     }
     Ok((nodes, residuals))
 }
 
+fn shear(node: &DraftNode) -> SceneError {
+    SceneError::NotRigid {
+        node: node.name.clone(),
+        what: "it rotates below a parent of non-uniform scale, which would shear it in time".into(),
+        remedy: "apply the parent's scale to its mesh (in Blender: Object > Apply > Scale)".into(),
+    }
+}
+
 /// The node without its scale, below a parent of residual `above`; constant tracks are folded.
 fn rigid_node(node: &DraftNode, above: DMat3) -> Result<Node, SceneError> {
     let bend = |t: DVec3| if above == DMat3::IDENTITY { t } else { above * t };
-    let mut translation = bend(finite(node, "translation", node.translation)?);
+    let placed = |v: DVec3| finite(node, "translation", bend(finite(node, "translation", v)?));
+    let mut translation = placed(node.translation)?;
     let mut translation_track = None;
     if let Some(track) = &node.translation_track {
         check_track(&node.name, &track.times_s, track.values.len(), track.interpolation)?;
-        let values: Result<Vec<DVec3>, _> =
-            track.values.iter().map(|&v| Ok(bend(finite(node, "translation", v)?))).collect();
+        let values: Result<Vec<DVec3>, _> = track.values.iter().map(|&v| placed(v)).collect();
         let track = Track {
             times_s: track.times_s.clone(),
             values: values?,
@@ -64,44 +96,95 @@ fn rigid_node(node: &DraftNode, above: DMat3) -> Result<Node, SceneError> {
     })
 }
 
-/// The matrix that shapes what hangs on the node.
-fn residual(node: &DraftNode, rigid: &Node, above: DMat3) -> Result<DMat3, SceneError> {
+/// The matrix that shapes what hangs on the node, whose rotation is turned round where the scale above mirrors;
+/// `None` where no rigid motion does what the file says.
+fn residual(node: &DraftNode, rigid: &mut Node, above: DMat3) -> Result<Option<DMat3>, SceneError> {
     let scale = node.shape;
     for column in [scale.x_axis, scale.y_axis, scale.z_axis] {
         finite(node, "scale", column)?;
     }
     let isotropic = above == DMat3::from_diagonal(DVec3::splat(above.x_axis.x));
-    if isotropic {
-        return Ok(above * scale);
+    if isotropic && above.x_axis.x >= 0.0 {
+        return Ok(Some(above * scale));
     }
-    if let Some(track) = &rigid.rotation_track {
-        if !turns_within(track, above) {
-            return Err(SceneError::NotRigid {
-                node: node.name.clone(),
-                what:
-                    "it rotates below a parent of non-uniform scale, which would shear it in time"
-                        .into(),
-                remedy: "apply the parent's scale to its mesh (in Blender: Object > Apply > Scale)"
-                    .into(),
-            });
+    let Some(track) = &mut rigid.rotation_track else {
+        let rotation = DMat3::from_quat(rigid.rotation);
+        return Ok(Some(rotation.transpose() * above * rotation * scale));
+    };
+    if let Some(turn) = of_similarity(above) {
+        if turn != DMat3::IDENTITY {
+            track.values.iter_mut().for_each(|q| *q = turned(turn, *q));
         }
-        return Ok(above * scale);
+        return Ok(Some(above * scale));
     }
-    let rotation = DMat3::from_quat(rigid.rotation);
-    Ok(rotation.transpose() * above * rotation * scale)
+    let first = track.values[usize::from(track.interpolation == Interpolation::CubicSpline)];
+    let since: Vec<DQuat> = track.values.iter().map(|&q| q * first.conjugate()).collect();
+    let Some(turn) = about_one_axis(&since, above) else { return Ok(None) };
+    for (value, since) in track.values.iter_mut().zip(since) {
+        *value = turned(turn, since) * first;
+    }
+    let rotation = DMat3::from_quat(first);
+    Ok(Some(rotation.transpose() * above * rotation * scale))
 }
 
-/// Whether all rotations of the track turn about one axis and `shape` looks the same all around it.
-fn turns_within(track: &RotationTrack, shape: DMat3) -> bool {
-    let axes = || track.values.iter().map(|q| DVec3::new(q.x, q.y, q.z));
+/// The quaternion of L D L^-1, D being that of `q`: `turn` is what L makes of its axis.
+fn turned(turn: DMat3, q: DQuat) -> DQuat {
+    let v = turn * DVec3::new(q.x, q.y, q.z);
+    DQuat::from_xyzw(v.x, v.y, v.z, q.w)
+}
+
+/// What a matrix makes of the axes of rotations that it is conjugated with (det Q times Q, with Q its
+/// orthogonal part), if it is a similarity up to [`UNEVEN`].
+fn of_similarity(above: DMat3) -> Option<DMat3> {
+    let size = above.determinant().abs().cbrt();
+    let is_near = |q: DMat3| largest(above - q * size) <= UNEVEN * size;
+    if !(size > 0.0 && size.is_finite()) {
+        return None;
+    }
+    // Mirrors along axes are exact, whatever their rounding.
+    let signs = DVec3::new(above.x_axis.x, above.y_axis.y, above.z_axis.z).map(f64::signum);
+    let along_axes = DMat3::from_diagonal(signs);
+    let q = if is_near(along_axes) {
+        along_axes
+    } else {
+        let x = above.x_axis.normalize();
+        let y = (above.y_axis - x * above.y_axis.dot(x)).normalize();
+        DMat3::from_cols(x, y, x.cross(y) * above.determinant().signum())
+    };
+    is_near(q).then(|| q * q.determinant().round())
+}
+
+/// The same for rotations about one axis, if the matrix looks the same all around that.
+fn about_one_axis(turns: &[DQuat], above: DMat3) -> Option<DMat3> {
+    let axes = || turns.iter().map(|q| DVec3::new(q.x, q.y, q.z));
     let axis =
         axes().fold(DVec3::ZERO, |best, v| if v.length() > best.length() { v } else { best });
     let axis = axis.normalize_or_zero();
-    let one_axis = axes().all(|v| v.cross(axis).length() <= 1e-9);
-    let quarter = DMat3::from_quat(unit(DQuat::from_xyzw(axis.x, axis.y, axis.z, 1.0)));
-    let change = quarter * shape - shape * quarter;
-    let size = |m: DMat3| m.to_cols_array().iter().fold(0.0, |a: f64, x| a.max(x.abs()));
-    one_axis && size(change) <= 1e-9 * size(shape)
+    if axis == DVec3::ZERO {
+        return Some(DMat3::IDENTITY);
+    }
+    if axes().any(|v| v.cross(axis).length() > UNEVEN) {
+        return None;
+    }
+    // L [a]x L^-1 must be [b]x, b of unit length: then every turn about a becomes one about b.
+    let cross = |a: DVec3| {
+        DMat3::from_cols(
+            DVec3::new(0.0, a.z, -a.y),
+            DVec3::new(-a.z, 0.0, a.x),
+            DVec3::new(a.y, -a.x, 0.0),
+        )
+    };
+    let k = above * cross(axis) * above.inverse();
+    let b =
+        0.5 * DVec3::new(k.y_axis.z - k.z_axis.y, k.z_axis.x - k.x_axis.z, k.x_axis.y - k.y_axis.x);
+    let is_turn = largest(k - cross(b)) <= UNEVEN && (b.length() - 1.0).abs() <= UNEVEN;
+    let outer = |b: DVec3| DMat3::from_cols(b * axis.x, b * axis.y, b * axis.z);
+    is_turn.then(|| outer(b.normalize()))
+}
+
+/// The largest entry.
+fn largest(m: DMat3) -> f64 {
+    m.to_cols_array().iter().fold(0.0, |a: f64, x| a.max(x.abs()))
 }
 
 /// The one value of a track that never changes, if it is one: for cubic splines with tangents
@@ -184,14 +267,21 @@ pub(super) fn check_track(
     }
 }
 
-/// The vector, if all its components are finite.
+/// The vector, if its components are numbers to compute with.
 fn finite(node: &DraftNode, which: &str, v: DVec3) -> Result<DVec3, SceneError> {
-    if v.is_finite() {
+    if is_place(&v.to_array()) {
         return Ok(v);
     }
+    let what = match v.is_finite() {
+        false => format!("its {which} is not finite ({}, {}, {})", v.x, v.y, v.z),
+        true => format!(
+            "its {which} is ({:e}, {:e}, {:e}), more than {COORDINATE_MAX_M:e}",
+            v.x, v.y, v.z
+        ),
+    };
     Err(SceneError::Geometry {
         subject: format!("node `{}`", node.name),
-        what: format!("its {which} is not finite ({}, {}, {})", v.x, v.y, v.z),
+        what,
         remedy: "repair the transform or the keyframes and export again".into(),
     })
 }

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::gltf::Gltf;
-use super::{data, read, scene_of};
+use super::{data, read, scene_of, with_code};
+use relume::scene::{ImportOptions, import};
 
 /// What is said about the cube after a change to its JSON.
 fn refusal(change: impl FnOnce(&mut Value)) -> String {
@@ -140,7 +141,7 @@ fn numbers_that_are_no_place() {
     );
     let far =
         json!({"name": "crate", "mesh": 0, "translation": [1e308, 0, 0], "scale": [1e308, 1, 1]});
-    says(&refusal(|j| j["nodes"][0] = far), &["crate", "not finite"]);
+    says(&refusal(|j| j["nodes"][0] = far), &["crate", "1e308", "more than 1e12"]);
     says(
         &refusal(|j| j["materials"][0]["emissiveFactor"] = json!([-1, 0, 0])),
         &["material `grey`", "exitance"],
@@ -192,6 +193,125 @@ fn files_that_are_missing_empty_or_something_else() {
         &read(&g.write(folder.path(), "t")).unwrap_err().to_string(),
         &["buffer 0", "no binary chunk"],
     );
+}
+
+#[test]
+fn numbers_that_cannot_be_computed_with_are_refused_with_their_name() {
+    let node = |key: &str, value: Value| refusal(|j| j["nodes"][0][key] = value);
+    says(&node("translation", json!([1e39, 0, 0])), &["node `crate`", "1e39", "more than 1e12"]);
+    says(&node("translation", json!([0, 0, 1e155])), &["node `crate`", "1e155"]);
+    says(&node("scale", json!([1e20, 1e20, 1e20])), &["node `crate`", "scale", "1e20"]);
+    says(&node("scale", json!([1e-9, 1e-9, 1e-9])), &["`crate`", "1.7", "e-9 m large", "scale"]);
+    let far = refusal(|j| {
+        let links = json!({"scale": [1e9, 1e9, 1e9], "children": [1]});
+        let crate_ = json!({"name": "crate", "mesh": 0, "scale": [1e9, 1e9, 1e9]});
+        j["nodes"] = json!([links, crate_]);
+    });
+    says(&far, &["`crate`", "1e18", "further out"]);
+    let bright = |key: &str, value: Value| refusal(|j| j["materials"][0][key] = value);
+    says(&bright("emissiveFactor", json!([1e38, 0, 0])), &["material `grey`", "1e30"]);
+    let lamp = refusal(|j| {
+        j["extensions"] =
+            json!({"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 1e300}]}});
+        j["nodes"][0]["extensions"] = json!({"KHR_lights_punctual": {"light": 0}});
+    });
+    says(&lamp, &["light `crate`", "1e30"]);
+    let glow = |value: f32| {
+        let mut g = Gltf::cube();
+        let input = g.floats("SCALAR", &[0.0, 1.0]);
+        let output = g.floats("VEC3", &[1.0, 1.0, 1.0, value, 1.0, 1.0]);
+        let pointer = json!({"KHR_animation_pointer": {"pointer": "/materials/0/emissiveFactor"}});
+        let target = json!({"path": "pointer", "extensions": pointer});
+        let samplers = json!([{"input": input, "output": output}]);
+        let channels = json!([{"sampler": 0, "target": target}]);
+        g.push("animations", json!({"samplers": samplers, "channels": channels}));
+        scene_of(&g)
+    };
+    assert!(glow(1e20).is_ok());
+    says(&glow(1e37).unwrap_err().to_string(), &["grey", "1e30"]);
+}
+
+#[test]
+fn what_is_too_small_for_the_scene_is_left_out_by_name() {
+    let mut g = Gltf::cube();
+    g.node(
+        json!({"name": "speck", "mesh": 0, "scale": [1e-7, 1e-7, 1e-7], "translation": [2, 0, 0]}),
+    );
+    g.node(json!({"name": "wall", "mesh": 0, "translation": [0, 4, 0]}));
+    g.json["materials"][0]["doubleSided"] = json!(true);
+    let scene = scene_of(&g).unwrap();
+    assert_eq!((scene.bodies.len(), scene.surfaces.len(), scene.patches.len()), (2, 2, 24));
+    let notes = with_code(&scene.notes, "speck");
+    assert_eq!((notes[0].subject.as_str(), notes[0].count), ("speck", 12));
+    for (k, patch) in scene.patches.iter().enumerate() {
+        let body = &scene.bodies[patch.body.0 as usize];
+        assert!(body.patches.contains(&(k as u32)));
+        assert_eq!(scene.surfaces[patch.surface.0 as usize].name, body.name);
+        let twin = patch.twin.unwrap();
+        assert_eq!(scene.patches[twin.0 as usize].twin.unwrap().0, k as u32);
+    }
+}
+
+#[test]
+fn counts_without_data_are_refused_before_memory_is_asked_for() {
+    let many = |count: u64| {
+        refusal(|j| {
+            j["accessors"][0].as_object_mut().unwrap().remove("bufferView");
+            j["accessors"][0]["count"] = json!(count);
+        })
+    };
+    says(&many(1 << 27), &["mesh `Cube`", "134217728", "without data"]);
+    says(&many(u64::MAX), &["mesh `Cube`", "without data"]);
+    let mut g = Gltf::cube();
+    let attributes = json!({"TRANSLATION": g.push("accessors", json!({"componentType": 5126, "count": 1 << 20, "type": "VEC3"}))});
+    g.json["nodes"][0]["extensions"] =
+        json!({"EXT_mesh_gpu_instancing": {"attributes": attributes}});
+    says(&scene_of(&g).unwrap_err().to_string(), &["`crate/", "more than", "polygons"]);
+}
+
+#[test]
+fn what_lies_outside_the_scenes_folder_is_opened_only_if_asked_for() {
+    let parent = tempfile::tempdir().unwrap();
+    let folder = parent.path().join("scene");
+    std::fs::create_dir(&folder).unwrap();
+    let g = Gltf::cube();
+    std::fs::write(parent.path().join("cube.bin"), &g.bin).unwrap();
+    std::fs::write(folder.join("cube.bin"), &g.bin).unwrap();
+    let absolute = parent.path().join("cube.bin").display().to_string();
+    for uri in
+        ["../cube.bin", "%2e%2e/cube.bin", "%2E%2E%2Fcube.bin", "x/../../cube.bin", &absolute]
+    {
+        let file = g.write_json(&folder, "s", json!(uri));
+        says(&read(&file).unwrap_err().to_string(), &["buffer 0", "outside", "--allow-outside"]);
+    }
+    let anywhere = ImportOptions { allow_outside: true, ..ImportOptions::default() };
+    for uri in ["../cube.bin", &absolute] {
+        let file = g.write_json(&folder, "s", json!(uri));
+        assert_eq!(import(&file, &anywhere).unwrap().patches.len(), 6);
+    }
+    let file = g.write_json(&folder, "s", json!("../scene/cube.bin"));
+    assert!(read(&file).is_err());
+    let file = g.write_json(&folder, "s", json!("./x/../cube.bin"));
+    assert!(std::fs::create_dir(folder.join("x")).is_ok() && read(&file).is_ok());
+    // An image too.
+    let mut g = Gltf::cube();
+    g.json["images"] = json!([{"uri": "../wood.png"}]);
+    g.json["textures"] = json!([{"source": 0}]);
+    g.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
+    says(&scene_of(&g).unwrap_err().to_string(), &["image 0", "wood.png", "--allow-outside"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_are_not_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = std::process::Command::new("mkfifo").arg(folder.path().join("pipe")).status();
+    if !made.is_ok_and(|status| status.success()) {
+        println!("skipped: no mkfifo");
+        return;
+    }
+    let file = Gltf::cube().write_json(folder.path(), "s", json!("pipe"));
+    says(&read(&file).unwrap_err().to_string(), &["buffer 0", "device or a pipe"]);
 }
 
 #[test]

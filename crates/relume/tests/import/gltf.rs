@@ -60,6 +60,7 @@ impl Gltf {
         let components = match kind {
             "SCALAR" => 1,
             "VEC3" => 3,
+            "MAT4" => 16,
             _ => 4,
         };
         let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();

@@ -1,7 +1,7 @@
 //! Animations of a file as poses of bodies.
 
 use glam::DVec3;
-use relume::scene::{BodyId, ImportOptions, Scene, import};
+use relume::scene::{BodyId, ImportOptions, Scene, Severity, import};
 use serde_json::json;
 
 use super::gltf::Gltf;
@@ -44,7 +44,9 @@ fn all_animations_play_unless_one_is_chosen() {
     g.animate("again", 0, "translation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 0., 0., 5.]);
     let folder = tempfile::tempdir().unwrap();
     let file = g.write(folder.path(), "s");
-    let choose = |name: &str| import(&file, &ImportOptions { animation: Some(name.to_owned()) });
+    let choose = |name: &str| {
+        import(&file, &ImportOptions { animation: Some(name.to_owned()), ..Default::default() })
+    };
     let all = scene_of(&g).unwrap();
     assert_eq!((at(&all, 1.0), all.moves(BodyId(1)), all.motion.duration_s), (DVec3::X, true, 2.0));
     let conflict = with_code(&all.notes, "animation-conflict");
@@ -175,6 +177,273 @@ fn skins_and_morphs_are_named() {
     for code in ["skin", "morph"] {
         assert_eq!(with_code(&scene.notes, code)[0].subject, "crate");
     }
+}
+
+/// A file whose cube slides by these keys, one a frame.
+fn stepping(fps: f64, keys: u16) -> Gltf {
+    let mut g = Gltf::cube();
+    let times: Vec<f32> = (0..keys).map(|k| (f64::from(k) / fps) as f32).collect();
+    let values: Vec<f32> = (0..keys).flat_map(|k| [f32::from(k), 0.0, 0.0]).collect();
+    g.animate("a", 0, "translation", "STEP", &times, &values);
+    g
+}
+
+#[test]
+fn a_step_key_is_shown_in_its_own_frame_at_any_rate() {
+    let television = [24_000.0 / 1001.0, 30_000.0 / 1001.0, 23.976, 29.97];
+    for fps in [24.0, 72.0, 90.0, 37.3].into_iter().chain(television) {
+        let scene = scene_of(&stepping(fps, 400)).unwrap();
+        for k in 0..400 {
+            assert_eq!(at(&scene, f64::from(k) / fps).x, f64::from(k), "{fps}");
+        }
+    }
+}
+
+#[test]
+fn a_clip_lasts_to_its_last_key_whether_anything_changes_there_or_not() {
+    let mut g = Gltf::cube();
+    let other = g.node(json!({"name": "other", "mesh": 0}));
+    g.animate("slide", 0, "translation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 1., 0., 0.]);
+    g.animate("rest", other, "translation", "LINEAR", &[0.0, 2.0], &[0.; 6]);
+    assert_eq!(scene_of(&g).unwrap().motion.duration_s, 2.0);
+    g.animate(
+        "gone",
+        other,
+        "scale",
+        "STEP",
+        &[0.0, 0.5, 3.0],
+        &[1., 1., 1., 0., 0., 0., 0., 0., 0.],
+    );
+    assert_eq!(scene_of(&g).unwrap().motion.duration_s, 3.0);
+    g.animate("same", 0, "scale", "LINEAR", &[0.0, 4.0], &[1.; 6]);
+    assert_eq!(scene_of(&g).unwrap().motion.duration_s, 4.0);
+}
+
+fn pointer(g: &mut Gltf, pointer: &str, kind: &str, how: &str, values: &[f32]) {
+    let input = g.floats("SCALAR", &[0.0, 1.0]);
+    let output = g.floats(kind, values);
+    let target =
+        json!({"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}});
+    g.push(
+        "animations",
+        json!({
+            "channels": [{"sampler": 0, "target": target}],
+            "samplers": [{"input": input, "output": output, "interpolation": how}],
+        }),
+    );
+}
+
+#[test]
+fn pointers_to_a_nodes_placement_move_it_as_plain_channels_do() {
+    let mut g = Gltf::cube();
+    pointer(&mut g, "/nodes/0/translation", "VEC3", "LINEAR", &[0., 0., 0., 2., 0., 0.]);
+    pointer(&mut g, "/nodes/0/rotation", "VEC4", "LINEAR", &[0., 0., 0., 1., 0., 0., 1., 0.]);
+    pointer(&mut g, "/nodes/0/scale", "VEC3", "STEP", &[3., 3., 3., 0., 0., 0.]);
+    let scene = scene_of(&g).unwrap();
+    assert_eq!(scene.bounds(0.0).unwrap().1, DVec3::splat(3.0));
+    let pose = scene.pose(BodyId(0), 0.5).unwrap();
+    assert_eq!(pose.translation, DVec3::X);
+    assert!((pose.rotation * DVec3::X).distance(DVec3::Y) < 1e-12);
+    assert!(scene.pose(BodyId(0), 1.0).is_none());
+    assert_eq!(with_code(&scene.notes, "animation-pointer").len(), 0);
+}
+
+/// The cube with two morph targets that lift it, by 1 and by 10.
+fn morphing() -> Gltf {
+    let mut g = Gltf::cube();
+    let lift = |by: f32| [0.0, by, 0.0].repeat(24);
+    let (one, ten) = (g.floats("VEC3", &lift(1.0)), g.floats("VEC3", &lift(10.0)));
+    g.json["meshes"][0]["primitives"][0]["targets"] =
+        json!([{"POSITION": one}, {"NORMAL": 0, "POSITION": ten}]);
+    g
+}
+
+#[test]
+fn morph_weights_that_do_not_change_shape_the_mesh() {
+    let height = |g: &Gltf| scene_of(g).unwrap().bounds(0.0).unwrap().0.y;
+    let mut g = morphing();
+    assert_eq!(height(&g), 0.0);
+    g.json["meshes"][0]["weights"] = json!([1.0, 0.5]);
+    assert_eq!(height(&g), 6.0);
+    g.json["nodes"][0]["weights"] = json!([0.0, 2.0]);
+    assert_eq!(height(&g), 20.0);
+    // Another node with the same mesh keeps the mesh's own.
+    g.node(json!({"name": "other", "mesh": 0}));
+    let scene = scene_of(&g).unwrap();
+    assert_eq!(scene.bounds(0.0).unwrap().0.y, 6.0);
+    let mut keyed = morphing();
+    keyed.json["nodes"][0]["weights"] = json!([0.0, 2.0]);
+    pointer(&mut keyed, "/nodes/0/weights", "SCALAR", "LINEAR", &[0.0, 1.0, 0.0, 1.0]);
+    assert_eq!(height(&keyed), 10.0);
+    assert!(with_code(&scene_of(&keyed).unwrap().notes, "morph")[0].severity == Severity::Info);
+    // What does change is said, and the shape at rest is kept.
+    let mut moving = morphing();
+    moving.json["nodes"][0]["weights"] = json!([0.0, 2.0]);
+    pointer(&mut moving, "/nodes/0/weights", "SCALAR", "LINEAR", &[0.0, 1.0, 0.0, 2.0]);
+    assert_eq!(height(&moving), 20.0);
+    assert!(with_code(&scene_of(&moving).unwrap().notes, "morph")[0].severity == Severity::Warning);
+}
+
+/// A cube that turns about this axis by a quarter in a second, below a parent of this scale.
+fn turning_below(scale: [f64; 3], axis: usize) -> Gltf {
+    let mut g = Gltf::new();
+    let mesh = g.cube_mesh();
+    let child = g.push(
+        "nodes",
+        json!({"name": "child", "mesh": mesh, "translation": [3, 0, 0], "rotation": [0.5, 0.5, 0.5, 0.5]}),
+    );
+    g.node(json!({"name": "parent", "scale": scale, "children": [child]}));
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let mut turn = [0.0, 0.0, 0.0, half];
+    turn[axis] = half;
+    // The quarter after the child's own rotation.
+    let q = glam::Quat::from_array(turn) * glam::Quat::from_xyzw(0.5, 0.5, 0.5, 0.5);
+    let keys = [[0.5; 4], q.to_array()].concat();
+    g.animate("a", child, "rotation", "LINEAR", &[0.0, 1.0], &keys);
+    g
+}
+
+#[test]
+fn a_turning_child_of_a_mirrored_parent_goes_where_the_file_says() {
+    let uneven: [f64; 3] = [1.0, 1.000_03, 0.999_95];
+    let scales: [[f64; 3]; 6] =
+        [[-1., 1., 1.], [-2., -2., -2.], [2., 2., -2.], uneven, [2., -2., 5.], [2., 2., -3.]];
+    for scale in scales {
+        let axes = if scale[0].abs() == scale[2].abs() || scale == uneven { 0..3 } else { 2..3 };
+        for axis in axes {
+            let scene = scene_of(&turning_below(scale, axis)).unwrap();
+            for share in [0.0, 0.3, 1.0] {
+                // Brute force: the file's own matrices.
+                let angle = share * std::f64::consts::FRAC_PI_2;
+                let about = glam::DQuat::from_axis_angle(DVec3::AXES[axis], angle);
+                let local = about * glam::DQuat::from_xyzw(0.5, 0.5, 0.5, 0.5);
+                let world = |p: DVec3| DVec3::from(scale) * (DVec3::X * 3.0 + local * p);
+                let pose = scene.pose(BodyId(0), share).unwrap();
+                let found: Vec<DVec3> = scene
+                    .patches
+                    .iter()
+                    .flat_map(|p| p.corners_in_body())
+                    .map(|p| pose.point(p))
+                    .collect();
+                for bits in 0..8 {
+                    let corner = DVec3::from([0, 1, 2].map(|k| f64::from(bits >> k & 1)));
+                    let nearest =
+                        found.iter().map(|p| p.distance(world(corner))).fold(9.0, f64::min);
+                    assert!(nearest < 2e-4, "{scale:?}, axis {axis}, {share}: {nearest}");
+                }
+                let middle = pose.inverse_point(world(DVec3::splat(0.5)));
+                for p in &scene.patches {
+                    assert!(p.frame.normal.dot(p.frame.origin - middle) > 0.0);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_shear_matters_only_where_a_mesh_is_moved_by_it() {
+    let mut g = turning_below([1.0, 1.0, 2.0], 0);
+    let error = scene_of(&g).unwrap_err().to_string();
+    assert!(error.contains("`child`") && error.contains("shear"), "{error}");
+    g.json["nodes"][0].as_object_mut().unwrap().remove("mesh");
+    g.node(json!({"name": "box", "mesh": 0}));
+    assert_eq!(scene_of(&g).unwrap().bodies.len(), 1);
+    // Below the sheared node it counts again.
+    let below = g.push("nodes", json!({"name": "below", "mesh": 0}));
+    g.json["nodes"][0]["children"] = json!([below]);
+    assert!(scene_of(&g).unwrap_err().to_string().contains("`child`"));
+}
+
+#[test]
+fn scales_that_change_by_rounding_do_not_change() {
+    let mut g = Gltf::cube();
+    g.animate("a", 0, "scale", "LINEAR", &[0.0, 1.0], &[1., 1., 1., 1.000_05, 0.999_96, 1.]);
+    assert!(!scene_of(&g).unwrap().moves(BodyId(0)));
+}
+
+#[test]
+fn instances_are_objects_of_their_own() {
+    let mut g = Gltf::cube();
+    let at = g.floats("VEC3", &[0., 0., 0., 5., 0., 0., 0., 7., 0.]);
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let turn = g.floats("VEC4", &[0., 0., 0., 1., 0., 0., half, half, 0., 0., 0., 1.]);
+    let scale = g.floats("VEC3", &[1., 1., 1., 1., 1., 1., 2., 2., 2.]);
+    let attributes = json!({"TRANSLATION": at, "ROTATION": turn, "SCALE": scale});
+    g.json["nodes"][0]["extensions"] =
+        json!({"EXT_mesh_gpu_instancing": {"attributes": attributes}});
+    g.json["nodes"][0]["translation"] = json!([0, 0, 1]);
+    g.json["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
+    let scene = scene_of(&g).unwrap();
+    assert_eq!((scene.bodies.len(), scene.patches.len()), (3, 18));
+    let (low, high) = scene.bounds(0.0).unwrap();
+    assert!(low.distance(DVec3::new(0.0, 0.0, 1.0)) < 1e-6, "{low}");
+    assert!(high.distance(DVec3::new(5.0, 9.0, 3.0)) < 1e-6, "{high}");
+    // What moves carries its instances.
+    g.animate("a", 0, "translation", "LINEAR", &[0.0, 1.0], &[0., 0., 1., 0., 0., 2.]);
+    assert_eq!(scene_of(&g).unwrap().bodies.len(), 1);
+    let few = g.floats("VEC3", &[0.; 6]);
+    g.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["SCALE"] = json!(few);
+    let error = scene_of(&g).unwrap_err().to_string();
+    assert!(error.contains("`crate`") && error.contains("different lengths"), "{error}");
+}
+
+/// The cube skinned to two joints, its sides -x and +x to the second, with other parts beside it.
+fn skinned(whole: bool) -> Gltf {
+    let mut g = Gltf::new();
+    let mesh = g.cube_mesh();
+    let joint_of = |vertex: usize| f32::from(u8::from(!whole && vertex < 8));
+    let weights: Vec<f32> = [1.0, 0.0, 0.0, 0.0].repeat(24);
+    let view = g.view(&(0..24).flat_map(|v| [joint_of(v) as u8, 0, 0, 0]).collect::<Vec<u8>>());
+    let joints = g.push(
+        "accessors",
+        json!({"bufferView": view, "componentType": 5121, "count": 24, "type": "VEC4"}),
+    );
+    let weights = g.floats("VEC4", &weights);
+    let attributes = &mut g.json["meshes"][mesh]["primitives"][0]["attributes"];
+    attributes["JOINTS_0"] = json!(joints);
+    attributes["WEIGHTS_0"] = json!(weights);
+    // Bound where the joints stood at x = 1 and y = 2.
+    let bind = |x: f32, y: f32| [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., -x, -y, 0., 1.];
+    let binds = g.floats("MAT4", &[bind(1.0, 0.0), bind(0.0, 2.0)].concat());
+    let one = g.node(json!({"name": "one", "translation": [1, 0, 5]}));
+    let two = g.node(json!({"name": "two", "translation": [0, 2, 0]}));
+    g.json["skins"] = json!([{"joints": [one, two], "inverseBindMatrices": binds}]);
+    // The mesh's own node stands elsewhere, which does not count.
+    g.node(json!({"name": "robot", "mesh": mesh, "skin": 0, "translation": [70, 70, 70]}));
+    g.animate("a", one, "translation", "LINEAR", &[0.0, 1.0], &[1., 0., 5., 3., 0., 5.]);
+    g
+}
+
+#[test]
+fn a_skin_of_rigid_joints_moves_with_them() {
+    let scene = scene_of(&skinned(true)).unwrap();
+    assert_eq!((scene.bodies.len(), scene.patches.len()), (1, 6));
+    assert_eq!(scene.surfaces[0].name, "robot");
+    for t in [0.0, 0.5] {
+        let (low, high) = scene.bounds(t).unwrap();
+        assert_eq!((low, high), (DVec3::new(2.0 * t, 0., 5.), DVec3::new(2.0 * t + 1.0, 1., 6.)));
+    }
+    assert_eq!(with_code(&scene.notes, "skin").len(), 0);
+    let scene = scene_of(&skinned(false)).unwrap();
+    assert_eq!((scene.bodies.len(), scene.patches.len()), (2, 6));
+    let names: Vec<&str> = scene.surfaces.iter().map(|s| s.name.as_str()).collect();
+    assert_eq!(names, ["robot/one", "robot/two"]);
+    let ends = |t| scene.bounds(t).unwrap();
+    assert_eq!(ends(1.0), (DVec3::ZERO, DVec3::new(3.0, 1.0, 6.0)));
+}
+
+#[test]
+fn a_skin_that_bends_is_named_and_read_at_rest() {
+    let mut g = skinned(false);
+    // One vertex of a side belongs to the other joint.
+    let view = g.json["accessors"][2]["bufferView"].as_u64().unwrap() as usize;
+    let offset = g.json["bufferViews"][view]["byteOffset"].as_u64().unwrap() as usize;
+    g.bin[offset] = 0;
+    let scene = scene_of(&g).unwrap();
+    let notes = with_code(&scene.notes, "skin");
+    assert_eq!(notes[0].subject, "robot");
+    assert!(notes[0].message.contains("several joints"), "{}", notes[0].message);
+    assert_eq!(scene.bounds(0.0).unwrap().0, DVec3::splat(70.0));
 }
 
 #[test]

@@ -56,7 +56,7 @@ pub fn parse_svg(text: &str) -> Result<FlatScene, SvgError> {
         ));
     }
     let metres = metres(root).map_err(|fault| at(root, fault))?;
-    let mut reader = Reader { bodies: Vec::new(), loose: None, shapes: 0 };
+    let mut reader = Reader { bodies: Vec::new(), loose: None, shapes: 0, depth: 0 };
     let place = Place { world: metres, body: None, moves: false, ink: Ink::default() };
     reader.children(root, &place)?;
     reader.scene().map_err(|error| {
@@ -142,7 +142,12 @@ struct Reader {
     loose: Option<usize>,
     /// Shapes so far.
     shapes: usize,
+    /// Groups that are open.
+    depth: usize,
 }
+
+/// Groups within each other at most: far more than anybody draws, far fewer than fill the stack.
+const DEPTH_MAX: usize = 200;
 
 /// Elements that show nothing, or nothing that stands in the way of light.
 const NOTHING: [&str; 7] =
@@ -181,7 +186,15 @@ impl Reader {
         }
         let inner = self.enter(node, place).map_err(|fault| at(node, fault))?;
         if tag == "g" {
-            return self.children(node, &inner);
+            if self.depth == DEPTH_MAX {
+                let what = format!("it is in more than {DEPTH_MAX} groups, one in the other");
+                return fault(what, "take it out of groups that do nothing")
+                    .map_err(|f| at(node, f));
+            }
+            self.depth += 1;
+            self.children(node, &inner)?;
+            self.depth -= 1;
+            return Ok(());
         }
         self.shapes += 1;
         let animated = |tag: &str| tag.starts_with("animate") || tag == "set";

@@ -187,3 +187,16 @@ fn errors_name_the_element_its_line_and_what_helps() {
     let per_metre = parse_svg("<svg data-units-per-metre='0'><line x2='1'/></svg>").unwrap_err();
     assert!(per_metre.what.contains("`0`"), "{per_metre}");
 }
+
+#[test]
+fn groups_within_groups_without_end_are_refused() {
+    let nested = |depth: usize| {
+        let line = r#"<line x1="0" y1="0" x2="1" y2="0"/>"#;
+        read(&format!("{}{line}{}", "<g>".repeat(depth), "</g>".repeat(depth)))
+    };
+    assert!(nested(100).is_ok());
+    for depth in [300, 5_000] {
+        let error = nested(depth).unwrap_err();
+        assert!(error.to_string().contains("groups"), "{error}");
+    }
+}

@@ -6,9 +6,9 @@ use super::document::Document;
 use super::json::Accessor;
 use crate::scene::SceneError;
 
-/// Elements an accessor without data of its own may declare: above any scene this engine holds,
-/// low enough that a damaged count does not exhaust memory.
-const LARGEST_COUNT: usize = 1 << 27;
+/// Elements an accessor without data of its own may declare: they are all zero, but for those that a sparse
+/// one replaces. Above any mesh that can be solved; a damaged count costs some 30 MB.
+const LARGEST_COUNT: usize = 1 << 20;
 
 /// A component type of glTF.
 #[derive(Clone, Copy, PartialEq)]
@@ -70,6 +70,7 @@ impl Document {
         let wanted = match N {
             1 => "SCALAR",
             3 => "VEC3",
+            16 => "MAT4",
             _ => "VEC4",
         };
         if accessor.kind != wanted {
@@ -83,7 +84,7 @@ impl Document {
             None if accessor.count > LARGEST_COUNT => {
                 let count = accessor.count;
                 return Err(self.malformed(format!(
-                    "{owner}: accessor {index} declares {count} elements without data"
+                    "{owner}: accessor {index} declares {count} elements without data, more than {LARGEST_COUNT}"
                 )));
             }
             None => vec![[0.0; N]; accessor.count],

@@ -8,6 +8,7 @@
 
 use glam::{DQuat, DVec3};
 
+use super::clock::Keys;
 use super::document::Document;
 use super::{json, node_name, note};
 use crate::scene::{Glow, Interpolation, Note, RotationTrack, SceneError, Severity, Track};
@@ -16,8 +17,8 @@ use crate::scene::{Glow, Interpolation, Note, RotationTrack, SceneError, Severit
 /// Exporters that write a key for each frame turn a switch into a ramp of one frame.
 const SWITCH_S: f64 = 0.1;
 
-/// Relative difference of scales that counts as none: what 32-bit exporters leave behind.
-const SAME_SCALE: f64 = 1e-5;
+/// Relative difference of scales that counts as none: what exporters and rigs leave behind.
+const SAME_SCALE: f64 = 1e-4;
 
 /// Keyframes of one node of the file.
 #[derive(Default)]
@@ -28,6 +29,10 @@ pub(super) struct Moves {
     pub(super) scale: Option<DVec3>,
     /// How its scale changes, if it does: an error as soon as a mesh hangs below.
     pub(super) growth: Option<String>,
+    /// The weights of its mesh's morph targets, where keys say that they never change.
+    pub(super) weights: Option<Vec<f64>>,
+    /// Whether its mesh's morph targets are moved by weights that do change.
+    pub(super) morphs: bool,
     pub(super) presence: Vec<(f64, bool)>,
     pub(super) visibility: Vec<(f64, bool)>,
 }
@@ -64,6 +69,8 @@ pub(super) struct Played {
     pub(super) lights: Vec<GlowKeys>,
     /// The names of the animations that play.
     pub(super) names: Option<String>,
+    /// The time of the last key of whatever plays, whether it changes anything or not.
+    pub(super) end_s: f64,
 }
 
 /// What the animations of a file do, or the chosen one.
@@ -94,6 +101,7 @@ pub(super) fn played(
         materials: vec![GlowKeys::default(); document.root.materials.len()],
         lights: vec![GlowKeys::default(); lights],
         names: None,
+        end_s: 0.0,
     };
     let mut playing = Vec::new();
     for (animation, name) in document.root.animations.iter().zip(&names) {
@@ -132,21 +140,26 @@ impl Reader<'_> {
         if channel.target.path == "pointer" {
             return self.pointer(channel, played, notes);
         }
-        let moves = &mut played.moves;
         let Some(node) = channel.target.node else { return Ok(()) };
+        self.of_node(channel, (node, channel.target.path.as_str()), played, notes)
+    }
+
+    /// Reads what a channel does with a property of a node.
+    fn of_node(
+        &self,
+        channel: &json::Channel,
+        (node, path): (usize, &str),
+        played: &mut Played,
+        notes: &mut Vec<Note>,
+    ) -> Result<(), SceneError> {
         let name = node_name(self.document, node);
         let of_node =
-            moves.get_mut(node).ok_or_else(|| self.document.out_of_range("node", node))?;
-        let path = channel.target.path.as_str();
+            played.moves.get_mut(node).ok_or_else(|| self.document.out_of_range("node", node))?;
         let taken = match path {
             "translation" => of_node.translation.is_some(),
             "rotation" => of_node.rotation.is_some(),
             "scale" => of_node.scale.is_some() || of_node.growth.is_some(),
-            "weights" => {
-                let message = "its morph target animation is ignored: it stays in its base shape";
-                notes.push(note(Severity::Warning, "morph", &name, 1, message.to_owned()));
-                return Ok(());
-            }
+            "weights" => of_node.weights.is_some() || of_node.morphs,
             other => {
                 let what = format!("node `{name}` has an unknown animated property `{other}`");
                 return Err(self.malformed(&what));
@@ -156,30 +169,44 @@ impl Reader<'_> {
             notes.push(self.conflict(&name, path));
             return Ok(());
         }
-        self.property(channel, &name, of_node, notes)
+        let keys = self.keys(channel, &name)?;
+        played.end_s = played.end_s.max(keys.end_s());
+        self.property(self.sampler(channel)?.output, (path, &name, keys), of_node, notes)
     }
 
     /// Reads the keys of a translation, rotation or scale.
     fn property(
         &self,
-        channel: &json::Channel,
-        name: &str,
+        output: usize,
+        (path, name, keys): (&str, &str, Keys),
         of_node: &mut Moves,
         notes: &mut Vec<Note>,
     ) -> Result<(), SceneError> {
-        let (times_s, interpolation) = self.keys(channel)?;
-        let output = self.sampler(channel)?.output;
-        match channel.target.path.as_str() {
+        let interpolation = keys.interpolation;
+        match path {
             "translation" => {
                 let values = self.vectors(output, name)?;
+                let times_s = keys.into_times_s();
                 of_node.translation = Some(Track { times_s, values, interpolation });
             }
             "rotation" => {
                 let read = self.document.numbers::<4>(output, &self.owner(name))?;
                 let values = read.into_iter().map(DQuat::from_array).collect();
+                let times_s = keys.into_times_s();
                 of_node.rotation = Some(RotationTrack { times_s, values, interpolation });
             }
-            _ => match switches(&times_s, &self.vectors(output, name)?, interpolation) {
+            "weights" => {
+                let read = self.document.numbers::<1>(output, &self.owner(name))?;
+                let values: Vec<f64> = read.into_iter().map(|[v]| v).collect();
+                of_node.weights = constant_weights(&keys, &values);
+                of_node.morphs = of_node.weights.is_none();
+                if of_node.morphs {
+                    let message =
+                        "its morph target animation is ignored: it keeps its shape at rest";
+                    notes.push(note(Severity::Warning, "morph", name, 1, message.to_owned()));
+                }
+            }
+            _ => match switches(&keys, &self.vectors(output, name)?) {
                 Ok((scale, presence)) => {
                     of_node.scale = Some(scale);
                     if presence.iter().any(|k| !k.1) {
@@ -202,7 +229,8 @@ impl Reader<'_> {
         note(Severity::Warning, "animation-conflict", name, 1, message)
     }
 
-    /// KHR_animation_pointer: visibility of nodes and emission are read, anything else is noted.
+    /// KHR_animation_pointer: placement, weights and visibility of nodes and emission are read, anything
+    /// else is noted.
     fn pointer(
         &self,
         channel: &json::Channel,
@@ -213,12 +241,15 @@ impl Reader<'_> {
         if let Some((of, property)) = emission(pointer) {
             return self.emission(channel, (pointer, of, property), played, notes);
         }
-        let moves = &mut played.moves;
-        let node = pointer
+        let of_node = pointer
             .strip_prefix("/nodes/")
-            .and_then(|rest| rest.strip_suffix("/extensions/KHR_node_visibility/visible"))
-            .and_then(|index| index.parse::<usize>().ok());
-        let Some(node) = node else {
+            .and_then(|rest| rest.split_once('/'))
+            .and_then(|(index, rest)| Some((index.parse::<usize>().ok()?, rest)));
+        if let Some((node, path @ ("translation" | "rotation" | "scale" | "weights"))) = of_node {
+            return self.of_node(channel, (node, path), played, notes);
+        }
+        let moves = &mut played.moves;
+        let Some((node, "extensions/KHR_node_visibility/visible")) = of_node else {
             let message =
                 format!("animation `{}` changes this over time, which is ignored", self.name);
             notes.push(note(Severity::Warning, "animation-pointer", pointer, 1, message));
@@ -228,11 +259,12 @@ impl Reader<'_> {
         let of_node =
             moves.get_mut(node).ok_or_else(|| self.document.out_of_range("node", node))?;
         if of_node.visibility.is_empty() {
-            let (times_s, _) = self.keys(channel)?;
+            let keys = self.keys(channel, &name)?;
             let shown =
                 self.document.numbers::<1>(self.sampler(channel)?.output, &self.owner(&name))?;
             of_node.visibility =
-                times_s.into_iter().zip(shown.into_iter().map(|[v]| v != 0.0)).collect();
+                keys.onsets_s().into_iter().zip(shown.into_iter().map(|[v]| v != 0.0)).collect();
+            played.end_s = played.end_s.max(keys.end_s());
         }
         Ok(())
     }
@@ -252,7 +284,7 @@ impl Reader<'_> {
             }
             Emitter::Light(k) => played.lights.get_mut(k).ok_or_else(|| missing("light", k)),
         }?;
-        let (times_s, interpolation) = self.keys(channel)?;
+        let when = self.keys(channel, pointer)?;
         let output = self.sampler(channel)?.output;
         let owner = format!("animation `{}` of {pointer}", self.name);
         let (values, place) = match property {
@@ -267,7 +299,11 @@ impl Reader<'_> {
         };
         match place {
             Some(_) => notes.push(self.conflict(pointer, "emission")),
-            None => *place = Some(Track { times_s, values, interpolation }),
+            None => {
+                played.end_s = played.end_s.max(when.end_s());
+                let interpolation = when.interpolation;
+                *place = Some(Track { times_s: when.into_times_s(), values, interpolation });
+            }
         }
         Ok(())
     }
@@ -278,10 +314,9 @@ impl Reader<'_> {
             .ok_or_else(|| self.malformed(&format!("sampler {} does not exist", channel.sampler)))
     }
 
-    fn keys(&self, channel: &json::Channel) -> Result<(Vec<f64>, Interpolation), SceneError> {
+    fn keys(&self, channel: &json::Channel, of: &str) -> Result<Keys, SceneError> {
         let sampler = self.sampler(channel)?;
-        let times =
-            self.document.numbers::<1>(sampler.input, &format!("animation `{}`", self.name))?;
+        let times = self.document.numbers::<1>(sampler.input, &self.owner(of))?;
         let interpolation = match sampler.interpolation.as_deref() {
             None | Some("LINEAR") => Interpolation::Linear,
             Some("STEP") => Interpolation::Step,
@@ -290,7 +325,7 @@ impl Reader<'_> {
                 return Err(self.malformed(&format!("the interpolation `{other}` does not exist")));
             }
         };
-        Ok((times.into_iter().map(|[t]| frame_time_s(t)).collect(), interpolation))
+        Keys::new(of, times.into_iter().map(|[t]| t).collect(), interpolation)
     }
 
     fn vectors(&self, accessor: usize, node: &str) -> Result<Vec<DVec3>, SceneError> {
@@ -298,8 +333,8 @@ impl Reader<'_> {
         Ok(read.into_iter().map(DVec3::from_array).collect())
     }
 
-    fn owner(&self, node: &str) -> String {
-        format!("animation `{}` of node `{node}`", self.name)
+    fn owner(&self, of: &str) -> String {
+        format!("animation `{}` of `{of}`", self.name)
     }
 
     fn malformed(&self, what: &str) -> SceneError {
@@ -344,22 +379,32 @@ fn emission(pointer: &str) -> Option<(Emitter, Property)> {
     Some((Emitter::Light(index), property))
 }
 
-/// The time of a frame as a 64-bit number, where the 32-bit `time_s` is a rounded one.
-///
-/// Files hold 1/24 as the nearest 32-bit number; a clip rendered at 24 frames a second asks for
-/// the nearest 64-bit one, a little earlier or later, and would miss a switch by a whole frame.
-fn frame_time_s(time_s: f64) -> f64 {
-    let as_frame = |fps: f64| (time_s * fps).round() / fps;
-    let rates = [1.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 1000.0];
-    rates.into_iter().map(as_frame).find(|&t| t as f32 == time_s as f32).unwrap_or(time_s)
+/// The one set of weights of all keys, if it is one.
+fn constant_weights(when: &Keys, values: &[f64]) -> Option<Vec<f64>> {
+    let keys = when.times_s.len();
+    let per_key = values.len() / keys.max(1);
+    if values.is_empty() || !values.len().is_multiple_of(keys) {
+        return None;
+    }
+    let mut sets = values.chunks(per_key);
+    match when.interpolation {
+        Interpolation::CubicSpline => {
+            // In-tangents, values and out-tangents, each of all targets.
+            let third = per_key / 3;
+            let first = &values[third..2 * third];
+            let still = |k: &[f64]| {
+                k[third..2 * third] == *first
+                    && k[..third].iter().chain(&k[2 * third..]).all(|&tangent| tangent == 0.0)
+            };
+            (per_key.is_multiple_of(3) && sets.all(still)).then(|| first.to_vec())
+        }
+        _ => sets.all(|k| *k == values[..per_key]).then(|| values[..per_key].to_vec()),
+    }
 }
 
 /// The one size among scale keys, and when the node has it; or how the size changes otherwise.
-fn switches(
-    times_s: &[f64],
-    values: &[DVec3],
-    interpolation: Interpolation,
-) -> Result<(DVec3, Vec<(f64, bool)>), String> {
+fn switches(when: &Keys, values: &[DVec3]) -> Result<(DVec3, Vec<(f64, bool)>), String> {
+    let (times_s, interpolation) = (&when.times_s, when.interpolation);
     let per_key = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
     if values.len() != times_s.len() * per_key {
         return Err(format!(
@@ -385,8 +430,9 @@ fn switches(
         return Err(format!("it grows or shrinks between {} s and {} s", w[0].0, w[1].0));
     }
     let changes = |i: usize| i == 0 || presence[i].1 != presence[i - 1].1;
-    let presence = (0..presence.len()).filter(|&i| changes(i)).map(|i| presence[i]).collect();
-    Ok((full, presence))
+    let onsets_s = when.onsets_s();
+    let switched = (0..presence.len()).filter(|&i| changes(i));
+    Ok((full, switched.map(|i| (onsets_s[i], presence[i].1)).collect()))
 }
 
 #[cfg(test)]
@@ -394,29 +440,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frame_times_are_found_again() {
-        for frame in 0..5000 {
-            for fps in [24.0, 25.0, 30.0, 60.0] {
-                let exact = f64::from(frame) / fps;
-                assert_eq!(frame_time_s(f64::from(exact as f32)), exact);
-            }
-        }
-        let odd = f64::from(0.123_456_79_f32);
-        assert_eq!(frame_time_s(odd), odd);
-        assert!(frame_time_s(f64::NAN).is_nan());
-    }
-
-    #[test]
     fn scale_switches_are_presence_and_growth_is_refused() {
         let (o, s) = (DVec3::ZERO, DVec3::splat(2.0));
         let step = |keys: &[(f64, DVec3)], interpolation| {
             let times: Vec<f64> = keys.iter().map(|k| k.0).collect();
             let values: Vec<DVec3> = keys.iter().map(|k| k.1).collect();
-            switches(&times, &values, interpolation)
+            switches(&Keys::new("a", times, interpolation).unwrap(), &values)
         };
         let blink = [(0.0, s), (1.0, o), (2.0, o), (3.0, s)];
         let (scale, presence) = step(&blink, Interpolation::Step).unwrap();
-        assert_eq!((scale, presence), (s, vec![(0.0, true), (1.0, false), (3.0, true)]));
+        assert_eq!(scale, s);
+        for (found, meant) in presence.iter().zip([(0.0, true), (1.0, false), (3.0, true)]) {
+            assert!(found.1 == meant.1 && (found.0 - meant.0).abs() <= 1e-6 * meant.0);
+        }
+        assert_eq!(presence.len(), 3);
         let message = step(&blink, Interpolation::Linear).unwrap_err();
         assert!(message.contains("between 0 s and 1 s"), "{message}");
         assert!(step(&[(0.0, s), (1.0, s), (1.04, o)], Interpolation::Linear).is_ok());

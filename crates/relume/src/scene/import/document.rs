@@ -3,6 +3,7 @@
 //! Must not know what is in the JSON beyond buffers, views and required extensions.
 
 use std::cell::OnceCell;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::base64;
@@ -41,6 +42,7 @@ pub(super) struct Document {
     /// As the user named it.
     pub(super) file: String,
     directory: PathBuf,
+    allow_outside: bool,
     pub(super) root: json::Root,
     binary: Option<Vec<u8>>,
     buffers: Vec<OnceCell<Vec<u8>>>,
@@ -48,7 +50,7 @@ pub(super) struct Document {
 
 impl Document {
     /// Reads the file and checks that it is glTF 2.0 and needs nothing that is not supported.
-    pub(super) fn open(path: &Path) -> Result<Document, SceneError> {
+    pub(super) fn open(path: &Path, allow_outside: bool) -> Result<Document, SceneError> {
         let file = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
             file: file.clone(),
@@ -59,7 +61,7 @@ impl Document {
         let root = parse(&file, &text)?;
         let buffers = root.buffers.iter().map(|_| OnceCell::new()).collect();
         let directory = path.parent().unwrap_or(Path::new("")).to_owned();
-        let document = Document { file, directory, root, binary, buffers };
+        let document = Document { file, directory, allow_outside, root, binary, buffers };
         document.check_version()?;
         document.check_extensions()?;
         Ok(document)
@@ -114,7 +116,7 @@ impl Document {
         let cell = &self.buffers[index];
         if cell.get().is_none() {
             let bytes = match &declared.uri {
-                Some(uri) => self.uri(uri, &format!("buffer {index}"))?,
+                Some(uri) => self.uri(uri, &format!("buffer {index}"), declared.byte_length)?,
                 None => self.binary.clone().filter(|_| index == 0).ok_or_else(|| {
                     self.malformed(format!(
                         "buffer {index} names no file, and there is no binary chunk for it"
@@ -163,7 +165,13 @@ impl Document {
     }
 
     /// The bytes that a URI names: embedded in it, or in a file beside the document.
-    pub(super) fn uri(&self, uri: &str, owner: &str) -> Result<Vec<u8>, SceneError> {
+    /// No more than `at_most` bytes.
+    pub(super) fn uri(
+        &self,
+        uri: &str,
+        owner: &str,
+        at_most: usize,
+    ) -> Result<Vec<u8>, SceneError> {
         if let Some(data) = uri.strip_prefix("data:") {
             let encoded = data.split_once(";base64,").map(|(_, e)| e);
             let bytes = encoded.and_then(base64::decode);
@@ -171,6 +179,26 @@ impl Document {
                 self.malformed(format!("the data embedded in {owner} is not valid base64"))
             });
         }
+        let name = self.inside(uri, owner)?;
+        let path = self.directory.join(&name);
+        let failed = |source| SceneError::Read {
+            file: name.clone(),
+            source,
+            remedy: format!("it is {owner} of `{}`: put it beside that file", self.file),
+        };
+        // Before it is opened: opening a pipe waits for whoever writes to it.
+        let kind = std::fs::metadata(&path).map_err(failed)?.file_type();
+        if !(kind.is_file() || kind.is_dir() || self.allow_outside) {
+            return Err(self.outside(format!("{owner} is a device or a pipe ({name})")));
+        }
+        let mut bytes = Vec::new();
+        let file = std::fs::File::open(&path).map_err(failed)?;
+        file.take(at_most as u64).read_to_end(&mut bytes).map_err(failed)?;
+        Ok(bytes)
+    }
+
+    /// The path that a URI names, if it may be opened.
+    pub(super) fn inside(&self, uri: &str, owner: &str) -> Result<String, SceneError> {
         if uri.contains("://") {
             return Err(format_error(
                 &self.file,
@@ -179,12 +207,36 @@ impl Document {
             ));
         }
         let name = percent_decoded(uri);
-        std::fs::read(self.directory.join(&name)).map_err(|source| SceneError::Read {
-            file: name.clone(),
-            source,
-            remedy: format!("it is {owner} of `{}`: put it beside that file", self.file),
-        })
+        if leaves_folder(&name) && !self.allow_outside {
+            let what = format!("{owner} is outside the folder of the file ({name})");
+            return Err(self.outside(what));
+        }
+        Ok(name)
     }
+
+    fn outside(&self, what: String) -> SceneError {
+        SceneError::Outside {
+            file: self.file.clone(),
+            what,
+            remedy: "put it beside the scene file, or read it all the same with --allow-outside"
+                .into(),
+        }
+    }
+}
+
+/// Whether a path leads out of the folder that it starts from: on any system, whichever this one is.
+fn leaves_folder(name: &str) -> bool {
+    let drive = name.as_bytes().get(1) == Some(&b':');
+    let mut depth = 0_i64;
+    let escapes = name.split(['/', '\\']).any(|part| {
+        depth += match part {
+            ".." => -1,
+            "" | "." => 0,
+            _ => 1,
+        };
+        depth < 0
+    });
+    drive || escapes || name.starts_with(['/', '\\'])
 }
 
 fn format_error(file: &str, what: String, remedy: &str) -> SceneError {
@@ -308,6 +360,19 @@ fn percent_decoded(uri: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ways_out_of_a_folder_are_known_in_every_spelling() {
+        for out in
+            ["../a", "b/../../a", "/etc/passwd", "\\\\host\\a", "c:\\a", "C:a", "..\\a", ".."]
+        {
+            assert!(leaves_folder(out), "{out}");
+        }
+        for inside in ["a.bin", "b/../a.bin", "./a", "b//a", "..a", "a..b/c", "b/c/../../a"] {
+            assert!(!leaves_folder(inside), "{inside}");
+        }
+        assert!(leaves_folder(&percent_decoded("%2e%2e%2Fa")));
+    }
 
     #[test]
     fn percent_signs_are_undone_where_they_mean_something() {

@@ -17,6 +17,7 @@ pub(super) struct Root {
     pub(super) scenes: Vec<SceneList>,
     pub(super) nodes: Vec<Node>,
     pub(super) meshes: Vec<Mesh>,
+    pub(super) skins: Vec<Skin>,
     pub(super) materials: Vec<Material>,
     pub(super) textures: Vec<Texture>,
     pub(super) images: Vec<Image>,
@@ -57,6 +58,7 @@ pub(super) struct Node {
     pub(super) children: Vec<usize>,
     pub(super) mesh: Option<usize>,
     pub(super) skin: Option<usize>,
+    pub(super) weights: Option<Vec<f64>>,
     pub(super) camera: Option<usize>,
     pub(super) matrix: Option<[f64; 16]>,
     pub(super) translation: Option<[f64; 3]>,
@@ -73,7 +75,20 @@ pub(super) struct NodeExtensions {
     #[serde(rename = "KHR_node_visibility")]
     pub(super) visibility: Option<Visibility>,
     #[serde(rename = "EXT_mesh_gpu_instancing")]
-    pub(super) instancing: Option<Value>,
+    pub(super) instancing: Option<Instancing>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct Instancing {
+    pub(super) attributes: std::collections::BTreeMap<String, usize>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct Skin {
+    pub(super) joints: Vec<usize>,
+    pub(super) inverse_bind_matrices: Option<usize>,
 }
 
 #[derive(Deserialize)]
@@ -119,6 +134,7 @@ pub(super) struct Spot {
 pub(super) struct Mesh {
     pub(super) name: Option<String>,
     pub(super) primitives: Vec<Primitive>,
+    pub(super) weights: Vec<f64>,
 }
 
 #[derive(Deserialize, Default)]
@@ -128,7 +144,7 @@ pub(super) struct Primitive {
     pub(super) indices: Option<usize>,
     pub(super) material: Option<usize>,
     pub(super) mode: Option<u32>,
-    pub(super) targets: Vec<Value>,
+    pub(super) targets: Vec<std::collections::BTreeMap<String, usize>>,
     pub(super) extensions: Extensions,
 }
 

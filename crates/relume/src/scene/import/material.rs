@@ -15,6 +15,9 @@ use crate::scene::{Material, Note, SceneError, Severity};
 /// balance has no solution; no real paint reaches 0.98.
 pub(super) const REFLECTANCE_MAX: f64 = 0.98;
 
+/// Bytes of the largest image file that is read.
+const IMAGE_MAX: usize = 1 << 28;
+
 /// All materials of the file, and one more behind them for primitives without one.
 pub(super) fn materials(
     document: &Document,
@@ -148,6 +151,12 @@ impl Means<'_> {
                 if image >= self.of_image.len() {
                     return Err(self.document.out_of_range("image", image));
                 }
+                if let Some(uri) = &self.document.root.images[image].uri
+                    && !uri.starts_with("data:")
+                    && !uri.contains("://")
+                {
+                    self.document.inside(uri, &format!("image {image}"))?;
+                }
                 let read = || mean_of_image(self.document, image);
                 self.of_image[image].get_or_insert_with(read).clone()
             }
@@ -178,7 +187,7 @@ fn mean_of_image(document: &Document, index: usize) -> Result<[f64; 3], String> 
     let image = &document.root.images[index];
     let bytes = match (&image.uri, image.buffer_view) {
         (Some(uri), _) => {
-            document.uri(uri, &format!("image {index}")).map_err(|e| e.to_string())?
+            document.uri(uri, &format!("image {index}"), IMAGE_MAX).map_err(|e| e.to_string())?
         }
         (None, Some(view)) => document.view(view).map_err(|e| e.to_string())?.0.to_vec(),
         (None, None) => {

@@ -2,6 +2,8 @@
 //!
 //! Must not know where meshes are placed or what they are made of.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 
 use super::document::Document;
@@ -10,38 +12,120 @@ use crate::scene::merge::merge;
 use crate::scene::{Note, SceneError, Severity};
 
 /// A primitive: its polygons, counter-clockwise from the front, and the material's index.
+#[derive(Clone)]
 pub(super) struct Polygons {
     pub(super) material: Option<usize>,
     pub(super) loops: Vec<Vec<DVec3>>,
 }
 
-/// All primitives of a mesh that have triangles.
+/// A primitive before its triangles are merged.
+struct Soup<'a> {
+    primitive: &'a json::Primitive,
+    points: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+    owner: String,
+}
+
+/// All primitives of a mesh that have triangles, in the shape of these weights of its morph targets.
 pub(super) fn polygons(
     document: &Document,
     index: usize,
+    weights: &[f64],
     notes: &mut Vec<Note>,
 ) -> Result<Vec<Polygons>, SceneError> {
+    let (name, soups) = soups(document, index, weights, notes)?;
+    Ok(soups.iter().map(|soup| soup.merged(&soup.triangles, &name, notes)).collect())
+}
+
+/// The polygons of each joint of a skin, ascending; or how many triangles hang on several.
+pub(super) type Jointed = Result<Vec<(usize, Vec<Polygons>)>, usize>;
+
+/// The polygons of each joint of a skin where every triangle hangs on one joint alone.
+pub(super) fn by_joint(
+    document: &Document,
+    index: usize,
+    weights: &[f64],
+    notes: &mut Vec<Note>,
+) -> Result<Jointed, SceneError> {
+    let (name, soups) = soups(document, index, weights, notes)?;
+    let mut parts: BTreeMap<usize, Vec<Polygons>> = BTreeMap::new();
+    let mut bent = 0;
+    for soup in &soups {
+        let joints = joints(document, soup)?;
+        let mut groups: BTreeMap<usize, Vec<[u32; 3]>> = BTreeMap::new();
+        for &triangle in &soup.triangles {
+            match triangle.map(|corner| joints[corner as usize]) {
+                [Some(a), Some(b), Some(c)] if a == b && b == c => {
+                    groups.entry(a).or_default().push(triangle);
+                }
+                _ => bent += 1,
+            }
+        }
+        if bent == 0 {
+            for (joint, triangles) in groups {
+                parts.entry(joint).or_default().push(soup.merged(&triangles, &name, notes));
+            }
+        }
+    }
+    Ok(if bent > 0 { Err(bent) } else { Ok(parts.into_iter().collect()) })
+}
+
+/// Share of a vertex's weight that other joints may have: what 8-bit weights leave.
+const STRAY_WEIGHT: f64 = 4e-3;
+
+/// The one joint that each vertex hangs on, if it is one.
+fn joints(document: &Document, soup: &Soup<'_>) -> Result<Vec<Option<usize>>, SceneError> {
+    let mut weights: Vec<Vec<(usize, f64)>> = vec![Vec::new(); soup.points.len()];
+    for set in 0.. {
+        let attribute = |name: &str| soup.primitive.attributes.get(&format!("{name}_{set}"));
+        let (Some(&which), Some(&share)) = (attribute("JOINTS"), attribute("WEIGHTS")) else {
+            break;
+        };
+        let which = document.numbers::<4>(which, &soup.owner)?;
+        let share = document.numbers::<4>(share, &soup.owner)?;
+        for (vertex, (which, share)) in weights.iter_mut().zip(which.iter().zip(&share)) {
+            for (&joint, &weight) in which.iter().zip(share) {
+                let joint = joint as usize;
+                match vertex.iter_mut().find(|w| w.0 == joint) {
+                    Some(known) => known.1 += weight,
+                    None => vertex.push((joint, weight)),
+                }
+            }
+        }
+    }
+    let only = |vertex: &Vec<(usize, f64)>| {
+        let all: f64 = vertex.iter().map(|w| w.1.abs()).sum();
+        vertex.iter().find(|w| w.1 > 0.0 && w.1 >= (1.0 - STRAY_WEIGHT) * all).map(|w| w.0)
+    };
+    Ok(weights.iter().map(only).collect())
+}
+
+/// The mesh's name and its primitives that have triangles.
+fn soups<'a>(
+    document: &'a Document,
+    index: usize,
+    weights: &[f64],
+    notes: &mut Vec<Note>,
+) -> Result<(String, Vec<Soup<'a>>), SceneError> {
     let mesh =
         document.root.meshes.get(index).ok_or_else(|| document.out_of_range("mesh", index))?;
     let name =
         mesh.name.clone().filter(|n| !n.is_empty()).unwrap_or_else(|| format!("mesh {index}"));
-    let mut primitives = Vec::new();
+    let mut soups = Vec::new();
     for (number, primitive) in mesh.primitives.iter().enumerate() {
         let owner = format!("mesh `{name}`, primitive {number}");
-        if let Some(p) = one(document, primitive, &name, &owner, notes)? {
-            primitives.push(p);
-        }
+        soups.extend(soup(document, primitive, weights, (&name, owner), notes)?);
     }
-    Ok(primitives)
+    Ok((name, soups))
 }
 
-fn one(
+fn soup<'a>(
     document: &Document,
-    primitive: &json::Primitive,
-    mesh: &str,
-    owner: &str,
+    primitive: &'a json::Primitive,
+    weights: &[f64],
+    (mesh, owner): (&str, String),
     notes: &mut Vec<Note>,
-) -> Result<Option<Polygons>, SceneError> {
+) -> Result<Option<Soup<'a>>, SceneError> {
     let mode = primitive.mode.unwrap_or(4);
     if mode < 4 {
         let what = if mode == 0 { "points" } else { "lines" };
@@ -55,9 +139,9 @@ fn one(
         return Ok(None);
     };
     check_compression(document, primitive, position)?;
-    let points = positions(document, position, mesh, owner)?;
+    let points = morphed(document, primitive, position, weights, (mesh, &owner))?;
     let corners = match primitive.indices {
-        Some(accessor) => document.indices(accessor, owner)?,
+        Some(accessor) => document.indices(accessor, &owner)?,
         None => (0..points.len() as u32).collect(),
     };
     if let Some(bad) = corners.iter().find(|&&c| c as usize >= points.len()) {
@@ -75,16 +159,48 @@ fn one(
         );
         notes.push(note(Severity::Warning, "not-triangles", mesh, corners.len() % 3, message));
     }
-    let merged = merge(&points, &triangles);
-    if merged.degenerate > 0 {
-        let message = format!(
-            "{} of {} triangles have no area and were left out",
-            merged.degenerate,
-            triangles.len()
-        );
-        notes.push(note(Severity::Info, "degenerate", mesh, merged.degenerate, message));
+    Ok(Some(Soup { primitive, points, triangles, owner }))
+}
+
+impl Soup<'_> {
+    /// These triangles as polygons.
+    fn merged(&self, triangles: &[[u32; 3]], mesh: &str, notes: &mut Vec<Note>) -> Polygons {
+        let merged = merge(&self.points, triangles);
+        if merged.degenerate > 0 {
+            let message = format!(
+                "{} of {} triangles have no area and were left out",
+                merged.degenerate,
+                triangles.len()
+            );
+            notes.push(note(Severity::Info, "degenerate", mesh, merged.degenerate, message));
+        }
+        Polygons { material: self.primitive.material, loops: merged.polygons }
     }
-    Ok(Some(Polygons { material: primitive.material, loops: merged.polygons }))
+}
+
+/// The corners in the shape of these weights (glTF 2.0, section 3.7.2.2): what every target adds, times its weight.
+fn morphed(
+    document: &Document,
+    primitive: &json::Primitive,
+    position: usize,
+    weights: &[f64],
+    (mesh, owner): (&str, &str),
+) -> Result<Vec<DVec3>, SceneError> {
+    let mut points = positions(document, position, (mesh, owner))?;
+    let count = points.len();
+    for (target, &weight) in primitive.targets.iter().zip(weights) {
+        let (Some(&accessor), true) = (target.get("POSITION"), weight != 0.0) else { continue };
+        let shifts = positions(document, accessor, (mesh, owner))?;
+        if shifts.len() != count {
+            let what =
+                format!("{owner}: a morph target shifts {} of {count} vertices", shifts.len());
+            return Err(document.malformed(what));
+        }
+        for (point, shift) in points.iter_mut().zip(shifts) {
+            *point += shift * weight;
+        }
+    }
+    Ok(points)
 }
 
 /// A compressed primitive can be read only if its plain numbers are there too.
@@ -104,8 +220,7 @@ fn check_compression(
 fn positions(
     document: &Document,
     accessor: usize,
-    mesh: &str,
-    owner: &str,
+    (mesh, owner): (&str, &str),
 ) -> Result<Vec<DVec3>, SceneError> {
     let points: Vec<DVec3> =
         document.numbers::<3>(accessor, owner)?.into_iter().map(DVec3::from_array).collect();

@@ -9,6 +9,7 @@ use std::path::Path;
 mod accessor;
 mod animation;
 mod base64;
+mod clock;
 mod document;
 mod json;
 mod light;
@@ -27,6 +28,8 @@ pub struct ImportOptions {
     /// Name of the one animation to play; `None` plays all together, as exporters that write one
     /// for each object mean it.
     pub animation: Option<String>,
+    /// Whether buffers and images may be anywhere: outside the file's folder, and devices or pipes.
+    pub allow_outside: bool,
 }
 
 /// Reads a scene from a .glb or .gltf file (glTF 2.0; external and embedded buffers), or a .vs3 file
@@ -39,8 +42,10 @@ pub struct ImportOptions {
 /// Units are metres, seconds and W: emissive factors are radiances in W/m2/sr, punctual lights are
 /// converted ([`super::Light::conversion`]). Emissions and visibility may be animated
 /// (KHR_animation_pointer). Extensions without effect on diffuse light are
-/// ignored; what is read otherwise than the file says is in [`Scene::notes`]. Skinned and morphed
-/// meshes are read in their rest shape, with a warning that names the node.
+/// ignored; what is read otherwise than the file says is in [`Scene::notes`]. Skins whose triangles hang on one
+/// joint each move with their joints; other skins and moving morph targets are read in their rest shape,
+/// with a warning that names the node. Only files in the scene's own folder and below are opened,
+/// unless [`ImportOptions::allow_outside`] says otherwise.
 ///
 /// # Errors
 /// A file that is missing, damaged or needs what is not supported, a motion that is not rigid, a
@@ -56,7 +61,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError>
             }),
         };
     }
-    let document = Document::open(path)?;
+    let document = Document::open(path, options.allow_outside)?;
     let mut draft = tree::draft(&document, options)?;
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned());
     draft.name = stem.unwrap_or_else(|| document.file.clone());

@@ -1,10 +1,12 @@
 //! The node tree of the file: placements, and what hangs on each node.
 
+use std::collections::BTreeMap;
+
 use glam::{DMat3, DQuat, DVec3};
 
 use super::animation::{GlowKeys, Moves, played};
 use super::document::Document;
-use super::mesh::{Polygons, polygons};
+use super::mesh::{Polygons, by_joint, polygons};
 use super::{ImportOptions, json, light, material, node_name, note};
 use crate::scene::draft::{Draft, DraftNode, DraftSurface};
 use crate::scene::{Camera, MaterialId, NodeId, Note, SceneError, Severity};
@@ -22,13 +24,22 @@ pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draf
         document,
         moves: played.moves,
         lights: played.lights,
-        meshes: document.root.meshes.iter().map(|_| None).collect(),
+        meshes: BTreeMap::new(),
+        places: document.root.nodes.iter().map(|_| None).collect(),
+        skinned: Vec::new(),
+        polygons: 0,
         without_material: 0,
         growing: Vec::new(),
-        draft: Draft { materials, animation: played.names, ..Draft::default() },
+        draft: Draft {
+            materials,
+            animation: played.names,
+            end_s: played.end_s,
+            ..Draft::default()
+        },
     };
     tree.draft.notes = notes;
     tree.walk(&roots)?;
+    tree.skins()?;
     Ok(tree.finish())
 }
 
@@ -73,12 +84,33 @@ struct Tree<'a> {
     moves: Vec<Moves>,
     /// How the lights of the file change.
     lights: Vec<GlowKeys>,
-    /// Polygons of the meshes read so far.
-    meshes: Vec<Option<Vec<Polygons>>>,
+    /// Polygons of the meshes read so far, by mesh and weights of its morph targets (as bits).
+    meshes: BTreeMap<(usize, Vec<u64>), Vec<Polygons>>,
+    /// Where each node of the file is in the draft.
+    places: Vec<Option<usize>>,
+    /// Nodes with a skin, which wait for their joints.
+    skinned: Vec<Skinned>,
+    /// Polygons in the draft so far.
+    polygons: usize,
     without_material: usize,
     /// For each node of the draft: the nearest one at or above it whose scale changes, and how.
     growing: Vec<Option<(usize, String)>>,
     draft: Draft,
+}
+
+/// Polygons of a draft at most: above any scene that can be solved, and a small file can ask for many by
+/// instances.
+const POLYGONS_MAX: usize = 1 << 22;
+
+/// A node of the file with a skinned mesh.
+struct Skinned {
+    /// In the file.
+    index: usize,
+    /// In the draft.
+    me: usize,
+    mesh: usize,
+    skin: usize,
+    weights: Vec<f64>,
 }
 
 impl Tree<'_> {
@@ -132,13 +164,22 @@ impl Tree<'_> {
             (_, true) => moves.presence,
         };
         let me = self.draft.nodes.len();
+        self.places[index] = Some(me);
         let above = parent.and_then(|p| self.growing[p].clone());
         self.growing.push(moves.growth.map(|what| (index, what)).or(above));
-        if let Some(mesh) = node.mesh {
-            placed.surfaces = self.surfaces(mesh, index, node)?;
-            self.check_growth(me)?;
-        }
         self.draft.nodes.push(placed);
+        if let Some(mesh) = node.mesh {
+            let weights = self.weights(mesh, index, moves.weights.as_deref(), moves.morphs)?;
+            match (node.skin, &node.extensions.instancing) {
+                (Some(skin), _) => {
+                    self.skinned.push(Skinned { index, me, mesh, skin, weights });
+                }
+                (None, Some(instancing)) => {
+                    self.instances((me, index), mesh, &weights, instancing)?;
+                }
+                (None, None) => self.show(me, mesh, &weights)?,
+            }
+        }
         let id = NodeId(me as u32);
         if let Some(l) = &node.extensions.light {
             let keys = self.lights.get(l.light).cloned().unwrap_or_default();
@@ -165,39 +206,44 @@ impl Tree<'_> {
         })
     }
 
-    /// The surfaces of a mesh on a node, and notes about what is not rigid in it.
-    fn surfaces(
+    /// The weights of a mesh's morph targets on a node, with a note where they count.
+    fn weights(
         &mut self,
         mesh: usize,
         index: usize,
-        node: &json::Node,
-    ) -> Result<Vec<DraftSurface>, SceneError> {
-        if node.skin.is_some() {
-            let message = "its skin is ignored: the mesh is read in its rest shape and moves only with the node; \
-                           bake the pose into the mesh, or split the mesh into rigid parts";
-            self.note(Severity::Warning, "skin", index, message.to_owned());
+        keyed: Option<&[f64]>,
+        moving: bool,
+    ) -> Result<Vec<f64>, SceneError> {
+        let root = &self.document.root;
+        let of_mesh =
+            root.meshes.get(mesh).ok_or_else(|| self.document.out_of_range("mesh", mesh))?;
+        let targets = of_mesh.primitives.iter().map(|p| p.targets.len()).max().unwrap_or(0);
+        let of_node = root.nodes[index].weights.as_deref();
+        let mut weights = keyed.or(of_node).unwrap_or(&of_mesh.weights).to_vec();
+        weights.resize(targets, 0.0);
+        if targets > 0 && !moving {
+            let message = format!("its morph targets count with the weights {weights:?}");
+            self.note(Severity::Info, "morph", index, message);
         }
-        if node.extensions.instancing.is_some() {
-            let message = "its instances (EXT_mesh_gpu_instancing) are not read, only one object is; \
-                           export them as nodes of their own";
-            self.note(Severity::Warning, "instancing", index, message.to_owned());
-        }
-        let morphed = |m: &json::Mesh| m.primitives.iter().any(|p| !p.targets.is_empty());
-        let name = node_name(self.document, index);
-        let noted = self.draft.notes.iter().any(|n| n.code == "morph" && n.subject == name);
-        if self.document.root.meshes.get(mesh).is_some_and(morphed) && !noted {
-            let message =
-                "its morph targets are ignored: the mesh is read in its base shape".to_owned();
-            self.note(Severity::Warning, "morph", index, message);
-        }
-        if mesh >= self.meshes.len() {
-            return Err(self.document.out_of_range("mesh", mesh));
-        }
-        if self.meshes[mesh].is_none() {
-            self.meshes[mesh] = Some(polygons(self.document, mesh, &mut self.draft.notes)?);
-        }
-        let primitives = self.meshes[mesh].as_deref().unwrap_or_default();
-        let mut surfaces = Vec::with_capacity(primitives.len());
+        Ok(weights)
+    }
+
+    /// Shows a mesh on a node of the draft.
+    fn show(&mut self, me: usize, mesh: usize, weights: &[f64]) -> Result<(), SceneError> {
+        let key = (mesh, weights.iter().map(|w| w.to_bits()).collect::<Vec<u64>>());
+        let primitives = match self.meshes.get(&key) {
+            Some(read) => read.clone(),
+            None => {
+                let read = polygons(self.document, mesh, weights, &mut self.draft.notes)?;
+                self.meshes.entry(key).or_insert(read).clone()
+            }
+        };
+        self.put(me, primitives)
+    }
+
+    /// Hangs polygons on a node of the draft.
+    fn put(&mut self, me: usize, primitives: Vec<Polygons>) -> Result<(), SceneError> {
+        self.check_growth(me)?;
         for primitive in primitives {
             let none = self.draft.materials.len() - 1;
             let material = primitive.material.unwrap_or(none);
@@ -205,14 +251,139 @@ impl Tree<'_> {
                 return Err(self.document.out_of_range("material", material));
             }
             self.without_material += usize::from(primitive.material.is_none());
-            let polygons = primitive.loops.clone();
-            surfaces.push(DraftSurface {
-                name: None,
-                material: MaterialId(material as u32),
-                polygons,
-            });
+            self.polygons += primitive.loops.len();
+            if self.polygons > POLYGONS_MAX {
+                return Err(SceneError::Geometry {
+                    subject: format!("node `{}`", self.draft.nodes[me].name),
+                    what: format!("with it the scene has more than {POLYGONS_MAX} polygons"),
+                    remedy: "leave out objects or instances, or simplify their meshes".into(),
+                });
+            }
+            let polygons = primitive.loops;
+            let material = MaterialId(material as u32);
+            self.draft.nodes[me].surfaces.push(DraftSurface { name: None, material, polygons });
         }
-        Ok(surfaces)
+        Ok(())
+    }
+
+    /// Adds a node that does not move by itself.
+    fn below(&mut self, parent: usize, node: DraftNode) -> usize {
+        self.growing.push(self.growing[parent].clone());
+        self.draft.nodes.push(node);
+        self.draft.nodes.len() - 1
+    }
+
+    /// Adds the instances of a mesh (EXT_mesh_gpu_instancing), each a node of its own below the one that
+    /// says where they are.
+    fn instances(
+        &mut self,
+        (me, index): (usize, usize),
+        mesh: usize,
+        weights: &[f64],
+        instancing: &json::Instancing,
+    ) -> Result<(), SceneError> {
+        let owner = format!("the instances of node `{}`", node_name(self.document, index));
+        let get = |name: &str| instancing.attributes.get(name);
+        let (document, owned) = (self.document, owner.as_str());
+        let vectors = |name| get(name).map(|&a| document.numbers::<3>(a, owned)).transpose();
+        let (at, scale) = (vectors("TRANSLATION")?, vectors("SCALE")?);
+        let turn = get("ROTATION").map(|&a| document.numbers::<4>(a, owned)).transpose()?;
+        let counts = [at.as_ref().map(Vec::len), turn.as_ref().map(Vec::len)];
+        let mut counts = counts.into_iter().chain([scale.as_ref().map(Vec::len)]).flatten();
+        let Some(count) = counts.next() else { return self.show(me, mesh, weights) };
+        if counts.any(|other| other != count) {
+            return Err(document.malformed(format!("{owner} have attributes of different lengths")));
+        }
+        for k in 0..count {
+            let node = json::Node {
+                translation: at.as_ref().map(|at| at[k]),
+                rotation: turn.as_ref().map(|turn| turn[k]),
+                scale: scale.as_ref().map(|scale| scale[k]),
+                ..json::Node::default()
+            };
+            let name = format!("{}/{k}", self.draft.nodes[me].name);
+            let instance = self.below(me, placed(&node, &name, Some(me)));
+            self.show(instance, mesh, weights)?;
+        }
+        Ok(())
+    }
+
+    /// Hangs what is skinned rigidly on its joints, and reads what bends in its shape at rest.
+    fn skins(&mut self) -> Result<(), SceneError> {
+        for skinned in std::mem::take(&mut self.skinned) {
+            if let Err(why) = self.skin(&skinned)? {
+                let message = format!(
+                    "its skin is ignored ({why}): the mesh is read in its rest shape and moves only with the node; \
+                     bake the pose into the mesh, or split the mesh into rigid parts"
+                );
+                self.note(Severity::Warning, "skin", skinned.index, message);
+                self.show(skinned.me, skinned.mesh, &skinned.weights)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Hangs a skinned mesh on its joints (glTF 2.0, section 3.7.3.3: its own node's placement does not count), or
+    /// says why it cannot move rigidly with them.
+    fn skin(&mut self, skinned: &Skinned) -> Result<Result<(), String>, SceneError> {
+        let document = self.document;
+        let Some(skin) = document.root.skins.get(skinned.skin) else {
+            return Ok(Err(format!("skin {} does not exist", skinned.skin)));
+        };
+        let notes = &mut self.draft.notes;
+        let parts = match by_joint(document, skinned.mesh, &skinned.weights, notes)? {
+            Ok(parts) => parts,
+            Err(bent) => return Ok(Err(format!("triangles that hang on several joints: {bent}"))),
+        };
+        let name = self.draft.nodes[skinned.me].name.clone();
+        let owner = format!("the skin of node `{name}`");
+        let binds = match skin.inverse_bind_matrices {
+            Some(accessor) => Some(document.numbers::<16>(accessor, &owner)?),
+            None => None,
+        };
+        let mut carriers = Vec::new();
+        for (joint, primitives) in parts {
+            let node = skin.joints.get(joint).copied();
+            let place = node.and_then(|n| self.places.get(n).copied().flatten());
+            let (Some(node), Some(parent)) = (node, place) else {
+                return Ok(Err(format!("its joint {joint} is not in the scene")));
+            };
+            let bind = match &binds {
+                Some(binds) => match binds.get(joint) {
+                    Some(bind) => Some(*bind),
+                    None => {
+                        return Ok(Err(format!("its joint {joint} has no inverse bind matrix")));
+                    }
+                },
+                None => None,
+            };
+            carriers.push((node, parent, bind, primitives));
+        }
+        // The name stays with what is seen.
+        self.draft.nodes[skinned.me].name = format!("{name} (node)");
+        let presence = self.presence_of(skinned.me);
+        let one = carriers.len() == 1;
+        for (node, parent, matrix, primitives) in carriers {
+            let of_joint = || format!("{name}/{}", node_name(document, node));
+            let part = if one { name.clone() } else { of_joint() };
+            let bound = json::Node { matrix, ..json::Node::default() };
+            let mut bound = placed(&bound, &part, Some(parent));
+            bound.presence = presence.clone();
+            let part = self.below(parent, bound);
+            self.put(part, primitives)?;
+        }
+        Ok(Ok(()))
+    }
+
+    /// When a node of the draft and all above it are present.
+    fn presence_of(&self, node: usize) -> Vec<(f64, bool)> {
+        let nodes = &self.draft.nodes;
+        let upward = std::iter::successors(Some(node), |&n| nodes[n].parent);
+        let keyed = upward.map(|n| &nodes[n].presence).filter(|keys| !keys.is_empty());
+        keyed.fold(Vec::new(), |all, keys| match all.is_empty() {
+            true => keys.clone(),
+            false => both(&all, keys),
+        })
     }
 
     fn note(&mut self, severity: Severity, code: &'static str, node: usize, message: String) {

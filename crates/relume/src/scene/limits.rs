@@ -1,0 +1,22 @@
+//! What numbers the engine can compute with: one place for scenes of space, sensors and the plane.
+//!
+//! Boxes are held in 32 bits, and so are areas and radiosities; distances are squared twice. Within these
+//! bounds nothing overflows and nothing vanishes. Must not know where the numbers come from.
+
+/// Largest coordinate, metres: several times the distance to the sun.
+pub const COORDINATE_MAX_M: f64 = 1e12;
+
+/// Smallest extent of a whole scene, metres.
+pub const EXTENT_MIN_M: f64 = 1e-6;
+
+/// Largest exitance (W/m2) or intensity of a light (W/sr, W/m2).
+pub const EMISSION_MAX: f64 = 1e30;
+
+/// Extent of the smallest polygon that is solved, as a share of the scene's: the rounding of 32-bit coordinates
+/// moves such a polygon by a tenth of its size.
+pub const SPECK: f64 = 1e-6;
+
+/// Whether a point is one to compute with: finite, and no coordinate beyond [`COORDINATE_MAX_M`].
+pub fn is_place(coordinates: &[f64]) -> bool {
+    coordinates.iter().all(|c| c.abs() <= COORDINATE_MAX_M)
+}

@@ -50,6 +50,7 @@ fn count_of(notes: &[Note], severity: Severity) -> usize {
 /// The findings as text, a line each, and the count of them.
 fn text(name: &str, notes: &[Note]) -> String {
     let mut text: String = notes.iter().map(|note| scene_file::line(note) + "\n").collect();
+    let name = output::name(name);
     let (errors, warnings) = (count_of(notes, Severity::Error), count_of(notes, Severity::Warning));
     text += &match (errors, warnings) {
         (0, 0) => format!("{name}: nothing wrong found\n"),

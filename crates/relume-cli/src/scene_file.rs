@@ -60,7 +60,10 @@ pub(crate) fn line(note: &Note) -> String {
         Severity::Error => "error",
     };
     let count = if note.count > 1 { format!(" ({} x)", note.count) } else { String::new() };
-    let subject =
-        if note.subject.is_empty() { String::new() } else { format!("{}: ", note.subject) };
-    format!("{severity}[{}]: {subject}{}{count}", note.code, note.message)
+    let subject = if note.subject.is_empty() {
+        String::new()
+    } else {
+        format!("{}: ", output::name(&note.subject))
+    };
+    output::one_line(&format!("{severity}[{}]: {subject}{}{count}", note.code, note.message))
 }

@@ -104,6 +104,15 @@ impl Sink {
         }
     }
 
+    /// The rows so far are of use by themselves: a file holds them also if the run is ended.
+    pub(crate) fn keep_so_far(&mut self) -> Result<(), Failure> {
+        let kept = match self {
+            Sink::File(file, _) => file.keep_so_far(),
+            Sink::Stdout(_) => Ok(()),
+        };
+        kept.map_err(|error| self.failure(&error))
+    }
+
     /// Puts the file into its place, or prints.
     pub(crate) fn finish(self) -> Result<(), Failure> {
         let _guard = interrupt::writing();

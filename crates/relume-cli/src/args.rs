@@ -429,6 +429,9 @@ pub(crate) struct CheckArgs {
     pub(crate) scene: PathBuf,
     #[command(flatten)]
     pub(crate) animation: AnimationFlag,
+    /// Print every finding, also where many are of one kind.
+    #[arg(long)]
+    pub(crate) verbose: bool,
 }
 
 /// Which animation plays, and what a scene may be read from.

@@ -1,6 +1,7 @@
 //! `relume check`: what is wrong with a scene, and what to do about it.
 
 use std::cmp::Reverse;
+use std::collections::BTreeMap;
 
 use relume::scene::{self, Note, Scene, Severity};
 
@@ -17,7 +18,7 @@ pub(crate) fn check(args: &CheckArgs) -> Result<(), Failure> {
         // Files of View3D have no light; they are there for their form factors.
         notes.retain(|note| note.code != "nothing-emits");
     }
-    output::print(&text(&scene.name, &notes))?;
+    output::print(&text(&scene.name, &notes, args.verbose))?;
     let errors = count_of(&notes, Severity::Error);
     if errors > 0 {
         return Err(Failure::new(format_args!(
@@ -47,9 +48,26 @@ fn count_of(notes: &[Note], severity: Severity) -> usize {
     notes.iter().filter(|note| note.severity == severity).count()
 }
 
+/// Findings of one kind that are printed one by one.
+const SHOWN: usize = 5;
+
 /// The findings as text, a line each, and the count of them.
-fn text(name: &str, notes: &[Note]) -> String {
-    let mut text: String = notes.iter().map(|note| scene_file::line(note) + "\n").collect();
+///
+/// Of more than [`SHOWN`] of one kind the rest is one line, unless all are asked for.
+fn text(name: &str, notes: &[Note], verbose: bool) -> String {
+    let mut text = String::new();
+    let mut kinds: BTreeMap<(Reverse<Severity>, &str), Vec<&Note>> = BTreeMap::new();
+    for note in notes {
+        kinds.entry((Reverse(note.severity), note.code)).or_default().push(note);
+    }
+    for ((_, code), alike) in kinds {
+        let shown = if verbose || alike.len() <= SHOWN { alike.len() } else { SHOWN - 1 };
+        alike[..shown].iter().for_each(|note| text += &(scene_file::line(note) + "\n"));
+        if shown < alike.len() {
+            text += &format!("  and {} more [{code}] (--verbose lists all)\n", alike.len() - shown);
+        }
+    }
+    let name = output::name(name);
     let (errors, warnings) = (count_of(notes, Severity::Error), count_of(notes, Severity::Warning));
     text += &match (errors, warnings) {
         (0, 0) => format!("{name}: nothing wrong found\n"),
@@ -69,9 +87,9 @@ mod tests {
 
     #[test]
     fn notes_alone_are_nothing_wrong() {
-        assert_eq!(text("room", &[]), "room: nothing wrong found\n");
+        assert_eq!(text("room", &[], false), "room: nothing wrong found\n");
         assert_eq!(
-            text("room", &[note(Severity::Info, 1)]),
+            text("room", &[note(Severity::Info, 1)], false),
             "note[open]: wall: it is open\nroom: nothing wrong found\n"
         );
     }
@@ -80,9 +98,18 @@ mod tests {
     fn findings_are_counted() {
         let notes = [note(Severity::Error, 1), note(Severity::Warning, 3)];
         assert_eq!(
-            text("room", &notes),
+            text("room", &notes, false),
             "error[open]: wall: it is open\nwarning[open]: wall: it is open (3 x)\n\
              room: 1 error, 1 warning\n"
         );
+    }
+
+    #[test]
+    fn many_findings_of_one_kind_are_one_line() {
+        let notes = vec![note(Severity::Warning, 1); 100];
+        let folded = text("room", &notes, false);
+        assert_eq!(folded.lines().count(), 6, "{folded}");
+        assert!(folded.contains("and 96 more [open]"), "{folded}");
+        assert_eq!(text("room", &notes, true).lines().count(), 101);
     }
 }

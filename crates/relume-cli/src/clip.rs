@@ -16,6 +16,7 @@ use crate::args::{
 use crate::demo;
 use crate::failure::Failure;
 use crate::frames;
+use crate::memory;
 use crate::output::{self, count, counted};
 use crate::scene_file;
 
@@ -89,6 +90,9 @@ impl Clip {
     ) -> Result<Clip, Failure> {
         let frames = frames::resolve(flags.frames.as_ref(), scene.motion.duration_s, flags.fps)
             .map_err(|error| Failure::new(error).help("`relume info` lists the frames"))?;
+        if let Some(memory) = flags.max_memory {
+            memory::keep_below(memory.bytes);
+        }
         Ok(Clip {
             scene: Arc::new(scene),
             frames,

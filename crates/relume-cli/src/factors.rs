@@ -219,8 +219,9 @@ fn frames(
     let mut out: Vec<Frame> = Vec::new();
     for (done, &frame) in clip.frames.iter().enumerate() {
         if interrupt::requested() {
-            return Err(Failure::interrupted(format_args!(
-                "stopped: {done} of {} done, nothing was written",
+            // Keeps the rows of CSV; an archive is whole or not there.
+            interrupt::end(&Failure::interrupted(format_args!(
+                "stopped: {done} of {} done",
                 counted(clip.frames.len(), "frame")
             )));
         }
@@ -343,7 +344,9 @@ impl Table {
         match self {
             Table::Csv(sink) => {
                 let rows = csv_rows(sink, report.frame, factors, before, things);
-                rows.map_err(|error| sink.failure(&error))
+                let rows = rows.map_err(|error| sink.failure(&error))?;
+                sink.keep_so_far()?;
+                Ok(rows)
             }
             Table::Dense(npz, rest) => {
                 rest.add(report, factors);

@@ -4,6 +4,8 @@ use std::fmt;
 use std::io;
 use std::path::Path;
 
+use crate::output;
+
 /// An error as the user sees it.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Failure {
@@ -69,13 +71,14 @@ fn describe(error: &io::Error) -> String {
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let message = output::one_line(&self.message);
         if self.exit_code == 130 {
-            write!(f, "{}", self.message)?;
+            write!(f, "{message}")?;
         } else {
-            write!(f, "error: {}", self.message)?;
+            write!(f, "error: {message}")?;
         }
         match &self.help {
-            Some(help) => write!(f, "\n  help: {help}"),
+            Some(help) => write!(f, "\n  help: {}", output::one_line(help)),
             None => Ok(()),
         }
     }

@@ -36,7 +36,7 @@ fn describe(scene: &Scene, fps: f64) -> Result<String, Failure> {
 }
 
 fn overview(out: &mut String, scene: &Scene) -> fmt::Result {
-    writeln!(out, "scene      {}", scene.name)?;
+    writeln!(out, "scene      {}", output::name(&scene.name))?;
     writeln!(
         out,
         "content    {}, {}, {}, {} m2",
@@ -64,7 +64,7 @@ fn animation(out: &mut String, scene: &Scene, count: u32, fps: f64) -> fmt::Resu
     writeln!(
         out,
         "animation  {}: {} s, frames 0-{} at {fps} fps ({count} in all), {} of {} moving",
-        scene.motion.animation.as_deref().unwrap_or("unnamed"),
+        output::name(scene.motion.animation.as_deref().unwrap_or("unnamed")),
         number(scene.motion.duration_s),
         count - 1,
         moving,
@@ -79,10 +79,15 @@ fn bodies(out: &mut String, scene: &Scene) -> fmt::Result {
         let area: f64 = scene.patches_of(id).map(|(_, patch)| patch.area_m2()).sum();
         let patches = counted(body.patches.len(), "patch");
         let state = if scene.moves(id) { "moves" } else { "still" };
-        writeln!(out, "  {:<24} {state}  {patches}, {} m2", body.name, number(area))?;
+        writeln!(
+            out,
+            "  {:<24} {state}  {patches}, {} m2",
+            output::name(&body.name),
+            number(area)
+        )?;
         for surface in scene.surfaces.iter().filter(|s| s.body == id) {
-            let material = &scene.materials[surface.material.0 as usize].name;
-            writeln!(out, "    {:<22} material {material}", surface.name)?;
+            let material = output::name(&scene.materials[surface.material.0 as usize].name);
+            writeln!(out, "    {:<22} material {material}", output::name(&surface.name))?;
         }
     }
     Ok(())
@@ -92,7 +97,7 @@ fn materials(out: &mut String, scene: &Scene) -> fmt::Result {
     writeln!(out, "\nmaterials (reflectance; exitance in W/m2; linear RGB)")?;
     for material in &scene.materials {
         let Material { name, reflectance, exitance, glow, double_sided } = material;
-        write!(out, "  {name:<24} {}", triple(*reflectance))?;
+        write!(out, "  {:<24} {}", output::name(name), triple(*reflectance))?;
         if material.emits() {
             write!(out, "  emits {}", triple(*exitance))?;
         }
@@ -126,7 +131,7 @@ fn emitters(out: &mut String, scene: &Scene) -> fmt::Result {
         writeln!(
             out,
             "  {:<24} {}  sum {sum}{most}, from {} m2",
-            surface.name,
+            output::name(&surface.name),
             triple(flux),
             number(area)
         )?;
@@ -151,7 +156,12 @@ fn lights(out: &mut String, scene: &Scene) -> fmt::Result {
             ),
             LightKind::Directional => ("directional".to_owned(), "W/m2"),
         };
-        writeln!(out, "  {name:<24} {kind}, {} {unit}; {conversion}", triple(*intensity))?;
+        writeln!(
+            out,
+            "  {:<24} {kind}, {} {unit}; {conversion}",
+            output::name(name),
+            triple(*intensity)
+        )?;
     }
     Ok(())
 }
@@ -170,7 +180,7 @@ fn cameras(out: &mut String, scene: &Scene) -> fmt::Result {
             }
         };
         let state = if scene.motion.moves(camera.node) { "moves" } else { "still" };
-        writeln!(out, "  {:<24} {state}  {lens}", camera.name)?;
+        writeln!(out, "  {:<24} {state}  {lens}", output::name(&camera.name))?;
     }
     if scene.cameras.is_empty() {
         writeln!(out, "  none: pictures show an overview")?;

@@ -1,27 +1,61 @@
-//! Ctrl-C: the first asks the run to stop after the present frame, the second stops at once.
+//! Ctrl-C and SIGTERM: the run ends at once, and what is finished is kept.
 //!
-//! SIGTERM counts as well, so a scheduler that takes a job down leaves finished frames too.
+//! A run looks between its frames whether it should stop. One in the middle of a long frame cannot
+//! look; it is ended from here, once what it has finished is in its place.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use relume_picture::export::settle_unfinished;
 
 use crate::failure::Failure;
+use crate::output;
+use crate::progress;
+
+/// How long a run may take to notice by itself.
+const GRACE: Duration = Duration::from_millis(600);
+
+/// Puts what a run has finished into its place.
+type Keep = Box<dyn Fn() -> Result<(), Failure> + Send>;
 
 static REQUESTED: AtomicBool = AtomicBool::new(false);
 static WRITING: Mutex<()> = Mutex::new(());
+static KEEP: Mutex<Option<Keep>> = Mutex::new(None);
 
 /// Starts to listen.
 pub(crate) fn listen() -> Result<(), Failure> {
     ctrlc::set_handler(|| {
-        if REQUESTED.swap(true, Ordering::SeqCst) {
-            // Not in the middle of a file.
-            let _guard = writing();
-            std::process::exit(130);
-        }
-        let hint = "\nstopping after this frame (Ctrl-C again to stop at once)\n";
-        let _ = std::io::Write::write_all(&mut std::io::stderr(), hint.as_bytes());
+        REQUESTED.store(true, Ordering::SeqCst);
+        std::thread::sleep(GRACE);
+        let (done, wanted) = progress::finished();
+        end(&Failure::interrupted(format_args!(
+            "stopped: {} of {} finished, the one under way is left out",
+            output::count(done),
+            output::counted(wanted as usize, "frame")
+        )));
     })
     .map_err(|error| Failure::new(format_args!("cannot listen for Ctrl-C: {error}")))
+}
+
+/// Ends the process with a message, from any thread and in the middle of anything but a file, once
+/// what is finished is kept.
+pub(crate) fn end(why: &Failure) -> ! {
+    if let Some(keep) = &*locked(&KEEP)
+        && let Err(failure) = keep()
+    {
+        output::complain(&failure.to_string());
+    }
+    // Not in the middle of a file.
+    let _guard = writing();
+    settle_unfinished();
+    output::complain(&format!("\n{why}"));
+    std::process::exit(i32::from(why.exit_code()));
+}
+
+/// Says how what is finished is kept when the run is ended in the middle of a frame.
+pub(crate) fn keep_with(keep: impl Fn() -> Result<(), Failure> + Send + 'static) {
+    *locked(&KEEP) = Some(Box::new(keep));
 }
 
 /// Whether the run should stop.
@@ -29,7 +63,12 @@ pub(crate) fn requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
 }
 
-/// While this is held, a second Ctrl-C waits.
+/// While this is held, the process is not ended.
 pub(crate) fn writing() -> MutexGuard<'static, ()> {
-    WRITING.lock().unwrap_or_else(PoisonError::into_inner)
+    locked(&WRITING)
+}
+
+/// What a lock guards, also after a panic elsewhere.
+pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -13,6 +13,8 @@ mod flat;
 mod frames;
 mod info;
 mod interrupt;
+mod lock;
+mod memory;
 mod output;
 mod paper;
 mod probe;

@@ -32,8 +32,14 @@ pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
     let progress = Progress::new(clip.frames.len(), 0, args.clip.quiet);
     let outcome = frames(&clip, &mut session, &riders, args, &progress, &mut sink);
     progress.clear();
-    outcome?;
+    let done = outcome?;
     sink.finish()?;
+    if done < clip.frames.len() {
+        return Err(Failure::interrupted(format_args!(
+            "stopped: the rows of {done} of {} are written",
+            counted(clip.frames.len(), "frame")
+        )));
+    }
     if !args.clip.quiet {
         output::complain(&format!(
             "{} at {}, {:.1} s{}",
@@ -153,6 +159,7 @@ fn inside(clip: &Clip, riders: &[Rider<'_>], path: &Path) -> Result<Vec<String>,
     Ok(said)
 }
 
+/// Solves frame after frame and adds their rows; how many were finished.
 fn frames(
     clip: &Clip,
     session: &mut Session,
@@ -160,17 +167,14 @@ fn frames(
     args: &ProbeArgs,
     progress: &Progress,
     sink: &mut Sink,
-) -> Result<(), Failure> {
+) -> Result<usize, Failure> {
     let mut table = csv::Writer::from_writer(Vec::new());
     let heading = ["frame", "sensor", "x", "y", "z", "nx", "ny", "nz", "E_r", "E_g", "E_b"];
     table.write_record(heading).map_err(Failure::new)?;
     let mut links = 0;
     for (done, &frame) in clip.frames.iter().enumerate() {
         if interrupt::requested() {
-            return Err(Failure::interrupted(format_args!(
-                "stopped: {done} of {} done, nothing was written",
-                counted(clip.frames.len(), "frame")
-            )));
+            return Ok(done);
         }
         progress.start(frame, links, session.memory_bytes());
         let time_s = clip.time_of(frame);
@@ -188,9 +192,10 @@ fn frames(
         let bytes = std::mem::replace(&mut table, csv::Writer::from_writer(Vec::new()));
         let bytes = bytes.into_inner().map_err(|error| Failure::new(error.error()))?;
         sink.write_all(&bytes).map_err(|error| sink.failure(&error))?;
+        sink.keep_so_far()?;
         progress.finish_frame();
     }
-    Ok(())
+    Ok(clip.frames.len())
 }
 
 fn irradiances(

@@ -1,22 +1,52 @@
 //! The progress bar: on stderr, and only where that is a terminal.
 
 use std::io::IsTerminal;
-use std::time::Duration;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
-use indicatif::{HumanBytes, HumanCount, ProgressBar, ProgressStyle};
+use indicatif::{HumanBytes, HumanCount, HumanDuration, ProgressBar, ProgressStyle};
+
+use crate::clip::now;
+
+static DONE: AtomicU64 = AtomicU64::new(0);
+static WANTED: AtomicU64 = AtomicU64::new(0);
+
+/// Frames finished, and wanted, whether or not anybody watches.
+pub(crate) fn finished() -> (u64, u64) {
+    (DONE.load(Ordering::SeqCst), WANTED.load(Ordering::SeqCst))
+}
+
+/// What is known of the time left once `done` frames of this run took `elapsed` and `left` remain;
+/// nothing before the first is finished.
+fn time_left(done: u64, left: u64, elapsed: Duration) -> String {
+    match (u32::try_from(done), u32::try_from(left)) {
+        (Ok(done), Ok(left)) if done > 0 && left > 0 => {
+            format!(", about {} left", HumanDuration((elapsed / done * left).max(SECOND)))
+        }
+        _ => String::new(),
+    }
+}
+
+const SECOND: Duration = Duration::from_secs(1);
 
 /// A bar over frames; does nothing where nobody watches.
 pub(crate) struct Progress {
     bar: ProgressBar,
+    started: Instant,
+    /// Frames finished before this run.
+    before: u64,
 }
 
 impl Progress {
     /// A bar over `frames` frames, of which `done` are finished already.
     pub(crate) fn new(frames: usize, done: usize, quiet: bool) -> Progress {
+        DONE.store(done as u64, Ordering::SeqCst);
+        WANTED.store(frames as u64, Ordering::SeqCst);
+        let (started, before) = (now(), done as u64);
         if quiet || !std::io::stderr().is_terminal() {
-            return Progress { bar: ProgressBar::hidden() };
+            return Progress { bar: ProgressBar::hidden(), started, before };
         }
-        let style = "{bar:24} {pos}/{len} {msg}, {elapsed} gone, {eta} left";
+        let style = "{bar:24} {pos}/{len} {msg}, {elapsed} gone{prefix}";
         let bar = ProgressBar::new(frames as u64)
             .with_style(ProgressStyle::with_template(style).unwrap_or_else(|_| {
                 // The template is a constant; a bar of another look is no reason to fail.
@@ -24,10 +54,8 @@ impl Progress {
             }))
             .with_position(done as u64)
             .with_message("starting");
-        // The time left is that of the frames still to do.
-        bar.reset_eta();
         bar.enable_steady_tick(Duration::from_millis(200));
-        Progress { bar }
+        Progress { bar, started, before }
     }
 
     /// A frame is being computed.
@@ -44,7 +72,10 @@ impl Progress {
 
     /// A frame is finished.
     pub(crate) fn finish_frame(&self) {
+        let done = DONE.fetch_add(1, Ordering::SeqCst) + 1;
         self.bar.inc(1);
+        let left = WANTED.load(Ordering::SeqCst).saturating_sub(done);
+        self.bar.set_prefix(time_left(done - self.before, left, self.started.elapsed()));
     }
 
     /// Does something, such as printing a line, with the bar out of the way.
@@ -55,5 +86,19 @@ impl Progress {
     /// Takes the bar away.
     pub(crate) fn clear(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_said_of_the_time_left_before_a_frame_is_finished() {
+        let minutes = Duration::from_secs(300);
+        assert_eq!(time_left(0, 9, minutes), "");
+        assert_eq!(time_left(2, 4, minutes), ", about 10 minutes left");
+        assert_eq!(time_left(9, 1, Duration::from_millis(9)), ", about 1 second left");
+        assert_eq!(time_left(9, 0, minutes), "");
     }
 }

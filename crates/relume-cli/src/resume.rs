@@ -109,9 +109,23 @@ pub(crate) fn content_hash(scene: &Path) -> Result<String, Failure> {
     Ok(format!("{:016x}", hash.0))
 }
 
-/// Files that a `.gltf` names by `uri`, in the order of the document; none for other files.
+/// The JSON of a `.glb`, its first chunk; the bytes themselves of other files.
+fn document_of(bytes: &[u8]) -> &[u8] {
+    const JSON_AT: usize = 20;
+    let length = bytes.get(12..16).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
+    match length {
+        Some(length) if bytes.starts_with(b"glTF") => {
+            bytes.get(JSON_AT..JSON_AT.saturating_add(length as usize)).unwrap_or_default()
+        }
+        _ => bytes,
+    }
+}
+
+/// Files that a `.gltf` or `.glb` names by `uri`, in the order of the document; none for other files.
 fn referred_files(scene: &Path, bytes: &[u8]) -> Vec<PathBuf> {
-    let Ok(document) = serde_json::from_slice::<Value>(bytes) else { return Vec::new() };
+    let Ok(document) = serde_json::from_slice::<Value>(document_of(bytes)) else {
+        return Vec::new();
+    };
     let directory = scene.parent().unwrap_or(Path::new(""));
     ["buffers", "images"]
         .iter()
@@ -252,6 +266,23 @@ mod tests {
         fs::write(&buffer, "two").unwrap();
         assert_ne!(content_hash(&scene).unwrap(), first);
         assert!(content_hash(&dir.path().join("missing.glb")).is_err());
+    }
+
+    #[test]
+    fn a_file_beside_a_glb_that_changed_is_noticed() {
+        let dir = tempfile::tempdir().unwrap();
+        let (scene, image) = (dir.path().join("room.glb"), dir.path().join("wall.png"));
+        let json = br#"{"images": [{"uri": "wall.png"}] }"#;
+        let mut glb = b"glTF\x02\0\0\0".to_vec();
+        glb.extend((20 + json.len() as u32).to_le_bytes());
+        glb.extend((json.len() as u32).to_le_bytes());
+        glb.extend(b"JSON");
+        glb.extend(json);
+        fs::write(&scene, glb).unwrap();
+        fs::write(&image, "red").unwrap();
+        let first = content_hash(&scene).unwrap();
+        fs::write(&image, "tan").unwrap();
+        assert_ne!(content_hash(&scene).unwrap(), first);
     }
 
     #[test]

@@ -4,14 +4,14 @@
 //! in one step each. Whatever ends a run, the directory holds finished frames and a report of
 //! exactly those.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use relume::scene::{BodyId, Light, MaterialId, Scene};
-use relume::session::{Options, Session, SessionError, Snapshot};
+use relume::session::{Energy, Options, Session, SessionError, Snapshot};
 use relume_picture::export::{probe, write_atomically, write_glb};
 use relume_picture::picture::{self, Exposure, Viewpoint};
 
@@ -24,6 +24,7 @@ use crate::events::EventTable;
 use crate::failure::Failure;
 use crate::frames;
 use crate::interrupt;
+use crate::lock::Lock;
 use crate::output::{self, count, counted};
 use crate::progress::Progress;
 use crate::report::{PictureOptions, Report, RunOptions, SceneSummary, peak_memory_bytes};
@@ -111,6 +112,7 @@ impl Job {
         if let Some(dir) = &self.dir {
             make_directory(dir)?;
         }
+        let _lock = self.dir.as_deref().map(Lock::take).transpose()?;
         let report = self.open_report(&clip)?;
         let wanted = &clip.frames;
         let pending: Vec<u32> =
@@ -123,18 +125,25 @@ impl Job {
         let options = clip.options(self.solve.update, true)?;
         let session = clip.session_with(Options { events: events.is_some(), ..options })?;
         let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.quiet());
-        let mut run = Run { job: &self, session, camera, report, progress, events, links: 0 };
+        let paths = (self.report_paths(), self.solve.events.clone());
+        let finished = Arc::new(Mutex::new(Finished { report, events, paths }));
+        let keep = Arc::clone(&finished);
+        interrupt::keep_with(move || interrupt::locked(&keep).write());
+        let mut run =
+            Run { job: &self, session, camera, finished, progress, links: 0, energy: None };
         let outcome = run.frames(wanted, &pending);
         run.progress.clear();
         // Also where a frame failed: what was finished stays.
-        if !run.report.frames.is_empty() {
-            run.write_report()?;
-            run.write_events()?;
+        let there = run.finished().report.frames.keys().copied().collect::<BTreeSet<u32>>();
+        if !there.is_empty() {
+            run.finished().write()?;
         }
-        let finished = wanted.iter().filter(|f| run.report.frames.contains_key(f)).count();
         match outcome? {
-            Outcome::Interrupted => Err(self.interrupted(finished, wanted.len())),
-            Outcome::Done => self.summary(wanted, &pending, run.links, started.elapsed()),
+            Outcome::Interrupted => {
+                let finished = wanted.iter().filter(|f| there.contains(f)).count();
+                Err(self.interrupted(finished, wanted.len()))
+            }
+            Outcome::Done => self.summary(wanted, &pending, &run, started.elapsed()),
         }
     }
 
@@ -198,12 +207,10 @@ impl Job {
         Some(self.dir.as_ref()?.join(format!("frame-{frame:04}.png")))
     }
 
-    /// Whether a frame's picture is there and is a PNG from its first bytes to its last.
+    /// Whether a frame's picture is there and undamaged.
     fn picture_is_whole(&self, frame: u32) -> bool {
-        let whole = |bytes: Vec<u8>| {
-            bytes.starts_with(b"\x89PNG\r\n\x1a\n") && bytes.ends_with(b"IEND\xaeB`\x82")
-        };
-        self.picture_path(frame).is_none_or(|path| fs::read(path).is_ok_and(whole))
+        let whole = |path| fs::read(path).is_ok_and(|bytes| picture::is_whole_png(&bytes));
+        self.picture_path(frame).is_none_or(whole)
     }
 
     /// Events that will not come.
@@ -256,7 +263,7 @@ impl Job {
         &self,
         wanted: &[u32],
         pending: &[u32],
-        links: u64,
+        run: &Run<'_>,
         elapsed: Duration,
     ) -> Result<(), Failure> {
         if self.quiet() {
@@ -268,14 +275,57 @@ impl Job {
             line += &format!(" ({} finished before)", count(kept as u64));
         }
         if !pending.is_empty() {
-            line += &format!(", {} links, {:.1} s", count(links), elapsed.as_secs_f64());
+            line += &format!(", {} links, {:.1} s", count(run.links), elapsed.as_secs_f64());
         }
         match (&self.dir, &self.picture) {
             (Some(dir), Some(_)) => line += &format!(", pictures in {}", dir.display()),
             (Some(dir), None) => line += &format!(", report in {}", dir.display()),
             (None, _) => {}
         }
+        if let Some(energy) = &run.energy {
+            line += &balance(energy);
+        }
         output::print(&(line + "\n"))
+    }
+}
+
+/// A line about the energy balance of the last frame.
+fn balance(energy: &Energy) -> String {
+    let Energy { emitted_w, absorbed_w, escaped_w } = *energy;
+    let off = (emitted_w - absorbed_w - escaped_w).abs();
+    let share = if emitted_w > 0.0 { 100.0 * off / emitted_w } else { 0.0 };
+    format!(
+        "\nlast frame: {emitted_w:.4} W emitted, {absorbed_w:.4} W absorbed, {escaped_w:.4} W escaped, \
+         {share:.2} % unbalanced"
+    )
+}
+
+/// What a run has finished. Whatever ends the run, this is written.
+struct Finished {
+    report: Report,
+    /// What is written to `--events`.
+    events: Option<EventTable>,
+    /// Where reports go, and events.
+    paths: (Vec<PathBuf>, Option<PathBuf>),
+}
+
+impl Finished {
+    /// Writes the report and the events, unless nothing is finished.
+    fn write(&mut self) -> Result<(), Failure> {
+        if self.report.frames.is_empty() {
+            return Ok(());
+        }
+        self.write_report()?;
+        let (Some(path), Some(table)) = (&self.paths.1, &self.events) else { return Ok(()) };
+        let _guard = interrupt::writing();
+        write_atomically(path, table.text().as_bytes())
+            .map_err(|error| Failure::write(path, &error))
+    }
+
+    fn write_report(&mut self) -> Result<(), Failure> {
+        let peak = peak_memory_bytes().unwrap_or(0);
+        self.report.peak_memory_bytes = self.report.peak_memory_bytes.max(peak);
+        self.paths.0.iter().try_for_each(|path| self.report.write(path))
     }
 }
 
@@ -290,15 +340,20 @@ struct Run<'a> {
     job: &'a Job,
     session: Session,
     camera: Option<Viewpoint>,
-    report: Report,
+    /// Locked for as long as an entry takes, since whatever ends the run writes it.
+    finished: Arc<Mutex<Finished>>,
     progress: Progress,
-    /// What is written to `--events`.
-    events: Option<EventTable>,
     /// Links of the last frame.
     links: u64,
+    /// Energy balance of the last frame.
+    energy: Option<Energy>,
 }
 
 impl Run<'_> {
+    fn finished(&self) -> MutexGuard<'_, Finished> {
+        interrupt::locked(&self.finished)
+    }
+
     /// Solves and draws the frames that are not finished yet, in order.
     fn frames(&mut self, wanted: &[u32], pending: &[u32]) -> Result<Outcome, Failure> {
         // The first finished frame is written down at once: an older report ends there.
@@ -317,7 +372,7 @@ impl Run<'_> {
             self.progress.finish_frame();
             if written.is_none_or(|at| at.elapsed() >= interval) {
                 let before = now();
-                self.write_report()?;
+                self.finished().write_report()?;
                 written = Some(now());
                 interval = REPORT_INTERVAL.max(before.elapsed() * REPORT_SHARE);
             }
@@ -332,13 +387,16 @@ impl Run<'_> {
             .step(frame, frames::time_of(frame, self.job.solve.clip.fps))
             .map_err(|error| self.session_failure(error))?;
         self.links = entry.links;
-        if let Some(table) = &mut self.events {
-            table.add(frame, &self.session.events());
-        }
+        self.energy = entry.energy;
         if let Some(path) = self.job.picture_path(frame) {
             self.draw(frame, &path)?;
         }
-        self.report.add(&entry)
+        let mut finished = self.finished();
+        finished.report.add(&entry)?;
+        if let Some(table) = &mut finished.events {
+            table.add(frame, &self.session.events());
+        }
+        Ok(())
     }
 
     fn draw(&mut self, frame: u32, path: &Path) -> Result<(), Failure> {
@@ -362,8 +420,9 @@ impl Run<'_> {
     fn view(
         &self,
         frame: u32,
-    ) -> Result<Option<(picture::View, &PictureOptions, &PictureFlags)>, Failure> {
-        let parts = (&self.camera, &self.report.options.picture, &self.job.picture);
+    ) -> Result<Option<(picture::View, PictureOptions, &PictureFlags)>, Failure> {
+        let options = self.finished().report.options.picture.clone();
+        let parts = (&self.camera, options, &self.job.picture);
         let (Some(camera), Some(options), Some((_, flags))) = parts else { return Ok(None) };
         let time_s = frames::time_of(frame, self.job.solve.clip.fps);
         let view = camera.at(self.session.scene(), time_s).map_err(Failure::new)?;
@@ -399,14 +458,15 @@ impl Run<'_> {
     }
 
     fn exposure_is_open(&self) -> bool {
-        self.report.options.picture.as_ref().is_some_and(|options| options.exposure_ev.is_none())
+        let picture = &self.finished().report.options.picture;
+        picture.as_ref().is_some_and(|options| options.exposure_ev.is_none())
     }
 
     fn choose_exposure(&mut self, frame: u32, snapshot: &Snapshot) -> Result<(), Failure> {
         let Some((view, ..)) = self.view(frame)? else { return Ok(()) };
         let exposure = Exposure::automatic(snapshot, &view);
         if let (Exposure::Fixed(scale), Some(options)) =
-            (exposure, &mut self.report.options.picture)
+            (exposure, &mut self.finished().report.options.picture)
         {
             options.exposure_ev = Some(stops(scale));
         }
@@ -414,24 +474,9 @@ impl Run<'_> {
     }
 
     fn session_failure(&self, error: SessionError) -> Failure {
-        let kept = !self.report.frames.is_empty() && !self.job.report_paths().is_empty();
+        let kept = !self.finished().report.frames.is_empty() && !self.job.report_paths().is_empty();
         let kept = if kept { "the frames before it are finished and stay" } else { "" };
         clip::step_failure(error, kept)
-    }
-
-    fn write_events(&self) -> Result<(), Failure> {
-        let (Some(path), Some(table)) = (&self.job.solve.events, &self.events) else {
-            return Ok(());
-        };
-        let _guard = interrupt::writing();
-        write_atomically(path, table.text().as_bytes())
-            .map_err(|error| Failure::write(path, &error))
-    }
-
-    fn write_report(&mut self) -> Result<(), Failure> {
-        let peak = peak_memory_bytes().unwrap_or_else(|| self.session.memory_bytes());
-        self.report.peak_memory_bytes = self.report.peak_memory_bytes.max(peak);
-        self.job.report_paths().iter().try_for_each(|path| self.report.write(path))
     }
 }
 

@@ -39,7 +39,7 @@ pub(crate) fn failure(error: SceneError) -> Failure {
 }
 
 /// Says on stderr, before a scene is solved, what was noticed while reading, unless it is merely
-/// worth knowing, and what `relume check` would call an error.
+/// worth knowing, and what `relume check` would call an error or an overlap.
 pub(crate) fn warn(scene: &Scene) {
     warn_but_for(scene, &[]);
 }
@@ -47,7 +47,9 @@ pub(crate) fn warn(scene: &Scene) {
 /// The same but for some codes that do not matter for what is to be done.
 pub(crate) fn warn_but_for(scene: &Scene, codes: &[&str]) {
     let read = scene.notes.iter().filter(|note| note.severity > Severity::Info).cloned();
-    let found = check(scene).into_iter().filter(|note| note.severity == Severity::Error);
+    let found = check(scene)
+        .into_iter()
+        .filter(|note| note.severity == Severity::Error || note.code == "overlap");
     for note in read.chain(found).filter(|note| !codes.contains(&note.code)) {
         // The run goes on, so it is no more than a warning here.
         output::complain(&line(&Note { severity: Severity::Warning, ..note }));
@@ -62,7 +64,10 @@ pub(crate) fn line(note: &Note) -> String {
         Severity::Error => "error",
     };
     let count = if note.count > 1 { format!(" ({} x)", note.count) } else { String::new() };
-    let subject =
-        if note.subject.is_empty() { String::new() } else { format!("{}: ", note.subject) };
-    format!("{severity}[{}]: {subject}{}{count}", note.code, note.message)
+    let subject = if note.subject.is_empty() {
+        String::new()
+    } else {
+        format!("{}: ", output::name(&note.subject))
+    };
+    output::one_line(&format!("{severity}[{}]: {subject}{}{count}", note.code, note.message))
 }

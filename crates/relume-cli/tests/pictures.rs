@@ -193,7 +193,6 @@ fn an_interrupted_run_can_be_resumed() {
     let ran = child.wait_with_output().unwrap();
     let message = String::from_utf8(ran.stderr).unwrap();
     assert_eq!(ran.status.code(), Some(130), "{message}");
-    assert!(message.contains("stopping after this frame"), "{message}");
     assert!(message.contains(" of 19,001 frames finished"), "{message}");
     assert!(message.contains("the same command with --resume"), "{message}");
     let finished = frames_of(&report(dir.path()));
@@ -206,4 +205,31 @@ fn an_interrupted_run_can_be_resumed() {
     let text = succeeded(&relume(&[&demo[..], &["--resume", "--frames", &last]].concat()));
     assert!(text.starts_with("1 frame, "), "{text}");
     assert_eq!(frames_of(&report(dir.path())).len(), finished.len() + 1);
+}
+
+/// One signal is enough, also in the middle of a frame that takes minutes.
+#[cfg(unix)]
+#[test]
+fn one_sigterm_ends_a_long_frame_within_seconds() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().to_str().unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_relume"))
+        .args(["demo", "corridor", "-o", out, "--tolerance", "0.0001", "--threads", "1"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(700));
+    assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+    let asked = Instant::now();
+    assert!(Command::new("kill").arg(child.id().to_string()).status().unwrap().success());
+    let ran = child.wait_with_output().unwrap();
+    let message = String::from_utf8(ran.stderr).unwrap();
+    assert!(asked.elapsed() < Duration::from_secs(5), "{message}");
+    assert_eq!(ran.status.code(), Some(130), "{message}");
+    assert!(message.contains("stopped: 0 of 109 frames finished"), "{message}");
+    // The file of the lock may stay: it locks nothing any more.
+    let left: Vec<String> =
+        names_in(dir.path()).into_iter().filter(|name| name != ".relume.lock").collect();
+    assert_eq!(left, ["corridor.glb"]);
 }

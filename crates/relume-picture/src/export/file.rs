@@ -1,9 +1,11 @@
 //! Files that appear whole or not at all.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Writes `bytes` to `path`: to a temporary file in the same directory first, which then takes the
 /// place of `path` in one step.
@@ -15,6 +17,29 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = WholeFile::create(path)?;
     file.write_all(bytes)?;
     file.finish()
+}
+
+/// Temporary files that are not in their places yet: where that is, and how many of their bytes are
+/// to appear there should the process end before they are finished.
+static UNFINISHED: Mutex<BTreeMap<PathBuf, (PathBuf, Option<u64>)>> = Mutex::new(BTreeMap::new());
+
+fn unfinished() -> MutexGuard<'static, BTreeMap<PathBuf, (PathBuf, Option<u64>)>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Before a process ends in the middle of its work: puts what [`WholeFile::keep_so_far`] has kept into
+/// its place and takes other temporary files away. Files written afterwards are lost.
+pub fn settle_unfinished() {
+    for (temporary, (path, kept)) in std::mem::take(&mut *unfinished()) {
+        let keep = |length: u64| {
+            fs::OpenOptions::new().write(true).open(&temporary)?.set_len(length)?;
+            fs::rename(&temporary, &path)
+        };
+        // Best effort: nobody is left to be told.
+        if !kept.is_some_and(|length| keep(length).is_ok()) {
+            let _ = fs::remove_file(&temporary);
+        }
+    }
 }
 
 /// A file that is written piece by piece and appears when it is finished, as
@@ -37,14 +62,31 @@ impl WholeFile {
         }
         let temporary = temporary_beside(path)?;
         let file = BufWriter::new(fs::File::create_new(&temporary)?);
+        unfinished().insert(temporary.clone(), (path.to_owned(), None));
         Ok(WholeFile { file, places: Some((temporary, path.to_owned())) })
+    }
+
+    /// What is written so far is of use by itself: it appears also if the process ends before the file
+    /// is finished, by way of [`settle_unfinished`].
+    pub fn keep_so_far(&mut self) -> io::Result<()> {
+        self.file.flush()?;
+        let length = self.file.stream_position()?;
+        if let Some((temporary, _)) = &self.places
+            && let Some((_, kept)) = unfinished().get_mut(temporary)
+        {
+            *kept = Some(length);
+        }
+        Ok(())
     }
 
     /// Puts the file into its place.
     pub fn finish(mut self) -> io::Result<()> {
         self.file.flush()?;
         if let Some((temporary, path)) = &self.places {
+            let mut unfinished = unfinished();
             fs::rename(temporary, path)?;
+            unfinished.remove(temporary);
+            drop(unfinished);
             self.places = None;
         }
         Ok(())
@@ -71,7 +113,10 @@ impl Drop for WholeFile {
     fn drop(&mut self) {
         if let Some((temporary, _)) = &self.places {
             // Best effort: the error that matters is the one that kept it from being finished.
-            let _ = fs::remove_file(temporary);
+            let mut unfinished = unfinished();
+            if unfinished.remove(temporary).is_some() {
+                let _ = fs::remove_file(temporary);
+            }
         }
     }
 }

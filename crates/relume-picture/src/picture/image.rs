@@ -76,3 +76,16 @@ impl Image {
         Ok(bytes)
     }
 }
+
+/// Whether `bytes` are a PNG file that can be decoded to its last pixel, with the checksums of all its
+/// parts right.
+pub fn is_whole_png(bytes: &[u8]) -> bool {
+    if !bytes.ends_with(b"IEND\xaeB`\x82") {
+        return false;
+    }
+    let Ok(mut reader) = png::Decoder::new(std::io::Cursor::new(bytes)).read_info() else {
+        return false;
+    };
+    let Some(size) = reader.output_buffer_size() else { return false };
+    reader.next_frame(&mut vec![0; size]).is_ok() && reader.finish().is_ok()
+}

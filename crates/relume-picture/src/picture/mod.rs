@@ -32,7 +32,7 @@ mod tone;
 
 pub use camera::{View, ViewError, Viewpoint};
 pub use exposure::Exposure;
-pub use image::{Image, WriteError};
+pub use image::{Image, WriteError, is_whole_png};
 pub use outline::Outlines;
 pub use render::{Settings, Shading, render};
 pub use tone::Tone;

@@ -27,8 +27,10 @@ const SUN_HIGH: f64 = 1.4e4;
 /// | `nothing-emits` | error | no emitting surface and no light |
 /// | `open-enclosure` | warning, info | gaps in what encloses the scene; nothing encloses it |
 /// | `open-object` | info | an object within it that is not closed |
-/// | `flipped-normals` | warning | neighbours that face opposite ways; closed objects inside out |
+/// | `flipped-normals` | warning | neighbours that face opposite ways; an object that faces against all around it; closed objects inside out |
 /// | `duplicate` | warning | polygons that coincide |
+/// | `overlap` | warning | polygons that face the same way and overlap in one plane |
+/// | `touching` | info | double-sided polygons back to back |
 /// | `non-planar` | info | triangles that are nearly, but not quite, in one plane |
 /// | `reflectance` | warning | a reflectance of 0.95 or more |
 /// | `units` | warning | a size or a brightness that suggests a mistaken unit |

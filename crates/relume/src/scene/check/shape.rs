@@ -4,7 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::topology::Topology;
 use super::{listed, note};
@@ -16,7 +16,9 @@ pub(super) fn shape(scene: &Scene, notes: &mut Vec<Note>) {
     let parts = parts(&topology);
     open(scene, &topology, &parts, notes);
     turned(scene, &topology, notes);
+    against_all(scene, &topology, notes);
     inside_out(scene, &topology, &parts, notes);
+    overlaps(scene, &topology, notes);
     duplicates(scene, &topology, notes);
     bent(scene, &topology, notes);
 }
@@ -189,6 +191,131 @@ fn turned(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
     }
 }
 
+/// What one object has to do with its neighbours along sides.
+#[derive(Default)]
+struct Neighbours<'a> {
+    free: usize,
+    shared: usize,
+    odd: usize,
+    of: BTreeSet<&'a str>,
+    area_m2: f64,
+    polygons: usize,
+}
+
+/// Objects that face the other way from every object around them: a wall of a room of separate
+/// objects that faces outwards. Of two that face against each other the smaller.
+fn against_all(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
+    let mut objects: BTreeMap<&str, Neighbours<'_>> = BTreeMap::new();
+    for (number, polygon) in topology.polygons.iter().enumerate() {
+        let entry = objects.entry(object(scene, topology, number as u32)).or_default();
+        entry.area_m2 += scene.patches[polygon.patch.0 as usize].area_m2();
+        entry.polygons += 1;
+    }
+    for group in &topology.sides {
+        let names: BTreeSet<&str> =
+            group.iter().map(|side| object(scene, topology, side.polygon)).collect();
+        let two_sided = group.iter().any(|s| topology.polygons[s.polygon as usize].two_sided);
+        let odd = group.len() == 2 && group[0].start == group[1].start && !two_sided;
+        for &name in &names {
+            let entry = objects.entry(name).or_default();
+            entry.free += usize::from(group.len() == 1);
+            if names.len() > 1 {
+                entry.shared += 1;
+                entry.odd += usize::from(odd);
+                entry.of.extend(names.iter().filter(|&&other| other != name));
+            }
+        }
+    }
+    let mut against: Vec<(&str, &Neighbours<'_>)> = objects
+        .iter()
+        .filter(|(_, n)| n.free == 0 && n.shared >= 3 && n.odd == n.shared)
+        .map(|(&name, n)| (name, n))
+        .collect();
+    against.sort_by(|a, b| a.1.area_m2.total_cmp(&b.1.area_m2));
+    let mut said: BTreeSet<&str> = BTreeSet::new();
+    for (name, neighbours) in against {
+        if !neighbours.of.is_disjoint(&said) {
+            continue;
+        }
+        said.insert(name);
+        let message = format!(
+            "it faces away from where all that joins it faces ({}), so it is black on their side; flip its \
+             normals (in Blender: Mesh > Normals > Flip) or make the material double-sided",
+            listed(&neighbours.of)
+        );
+        notes.push(note(Severity::Warning, "flipped-normals", name, neighbours.polygons, message));
+    }
+}
+
+/// Share of the scene's diagonal within which polygons are in one plane, and by which they overlap at
+/// least.
+const ONE_PLANE: f64 = 1e-6;
+
+/// Polygons that face the same way in one plane and overlap, but for those with the same corners.
+fn overlaps(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
+    let Some((min, max)) = scene.bounds(0.0) else { return };
+    let tolerance = ONE_PLANE * min.distance(max);
+    let mut planes: BTreeMap<[i64; 4], Vec<usize>> = BTreeMap::new();
+    let mut normals = Vec::new();
+    for (number, polygon) in topology.polygons.iter().enumerate() {
+        let p = &scene.patches[polygon.patch.0 as usize];
+        let normal = scene.pose(p.body, 0.0).map_or(DVec3::ZERO, |b| b.direction(p.frame.normal));
+        normals.push(normal);
+        let Some(&corner) = polygon.corners.first() else { continue };
+        let offset = (topology.points[corner as usize] - min).dot(normal) / (10.0 * tolerance);
+        let [x, y, z] = (normal * 1e4).to_array().map(|c| c.round() as i64);
+        planes.entry([x, y, z, offset.round() as i64]).or_default().push(number);
+    }
+    let mut found: BTreeMap<&str, (usize, BTreeSet<&str>)> = BTreeMap::new();
+    for members in planes.values().filter(|m| m.len() > 1) {
+        let normal = normals[members[0]];
+        let u = normal.any_orthonormal_vector();
+        let v = normal.cross(u);
+        let flat = |number: &usize| -> Vec<DVec2> {
+            let corners = topology.polygons[*number].corners.iter();
+            let points = corners.map(|&c| topology.points[c as usize]);
+            points.map(|p| DVec2::new(p.dot(u), p.dot(v))).collect()
+        };
+        let lowest = |polygon: &[DVec2]| polygon.iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
+        let mut flats: Vec<(usize, Vec<DVec2>)> = members.iter().map(|n| (*n, flat(n))).collect();
+        flats.sort_by(|a, b| lowest(&a.1).total_cmp(&lowest(&b.1)));
+        for (k, (one, a)) in flats.iter().enumerate() {
+            let end = a.iter().map(|p| p.x).fold(f64::NEG_INFINITY, f64::max) - tolerance;
+            for (two, b) in flats[k + 1..].iter().take_while(|(_, b)| lowest(b) < end) {
+                let corners = |n: usize| {
+                    topology.polygons[n].corners.iter().copied().collect::<BTreeSet<u32>>()
+                };
+                if !parted(a, b, tolerance)
+                    && !parted(b, a, tolerance)
+                    && corners(*one) != corners(*two)
+                {
+                    let (one, two) = (one.max(two), one.min(two));
+                    let entry = found.entry(object(scene, topology, *one as u32)).or_default();
+                    entry.0 += 1;
+                    entry.1.insert(object(scene, topology, *two as u32));
+                }
+            }
+        }
+    }
+    for (name, (count, with)) in found {
+        let message = format!(
+            "{count} polygons overlap polygons of {} in one plane (they are coplanar), so light counts twice \
+             where both are; raise one by a millimetre, or cut the other out beneath it",
+            listed(&with)
+        );
+        notes.push(note(Severity::Warning, "overlap", name, count, message));
+    }
+}
+
+/// Whether a side of the convex polygon `a` parts it from `b`, up to a tolerance.
+fn parted(a: &[DVec2], b: &[DVec2], tolerance: f64) -> bool {
+    (0..a.len()).any(|k| {
+        let (from, to) = (a[k], a[(k + 1) % a.len()]);
+        let outwards = -(to - from).perp().normalize_or_zero();
+        b.iter().all(|p| (*p - from).dot(outwards) > -tolerance)
+    })
+}
+
 /// Closed, evenly turned parts that face the wrong way: inward around nothing, or outward around
 /// everything else.
 fn inside_out(scene: &Scene, topology: &Topology, parts: &[Part], notes: &mut Vec<Note>) {
@@ -247,6 +374,7 @@ fn duplicates(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
         seen.entry(key).or_default().push(number);
     }
     let mut doubled: BTreeMap<&str, (usize, BTreeSet<&str>)> = BTreeMap::new();
+    let mut touching: BTreeMap<&str, (usize, BTreeSet<&str>)> = BTreeMap::new();
     for same in seen.values().filter(|s| s.len() > 1) {
         for (k, &later) in same.iter().enumerate().skip(1) {
             let earlier = same[..k].iter().find(|&&e| coincide(topology, e, later));
@@ -254,8 +382,20 @@ fn duplicates(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
                 let entry = doubled.entry(object(scene, topology, later as u32)).or_default();
                 entry.0 += 1;
                 entry.1.insert(object(scene, topology, earlier as u32));
+            } else if let Some(&earlier) = same[..k].iter().find(|&&e| touch(topology, e, later)) {
+                let entry = touching.entry(object(scene, topology, later as u32)).or_default();
+                entry.0 += 1;
+                entry.1.insert(object(scene, topology, earlier as u32));
             }
         }
+    }
+    for (object, (count, with)) in touching {
+        let message = format!(
+            "{count} double-sided polygons touch polygons of {} back to back, as blocks do that stand on each \
+             other; no light gets between them, so both may be deleted to have fewer",
+            listed(&with)
+        );
+        notes.push(note(Severity::Info, "touching", object, count, message));
     }
     for (object, (count, with)) in doubled {
         let message = format!(
@@ -266,14 +406,20 @@ fn duplicates(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
     }
 }
 
-/// Whether two polygons of the same corners show the same side; two-sided ones always do.
+/// Whether the fronts of two polygons of the same corners face the same way.
 fn coincide(topology: &Topology, a: usize, b: usize) -> bool {
     let (a, b) = (&topology.polygons[a], &topology.polygons[b]);
     let after = |c: &[u32]| {
         let at = c.iter().position(|&v| v == a.corners[0]).unwrap_or(0);
         c[(at + 1) % c.len()]
     };
-    a.two_sided || b.two_sided || after(&a.corners) == after(&b.corners)
+    after(&a.corners) == after(&b.corners)
+}
+
+/// Whether two polygons of the same corners show opposite sides, and both sides are to be seen.
+fn touch(topology: &Topology, a: usize, b: usize) -> bool {
+    let two_sided = |n: usize| topology.polygons[n].two_sided;
+    !coincide(topology, a, b) && (two_sided(a) || two_sided(b))
 }
 
 fn object<'a>(scene: &'a Scene, topology: &Topology, polygon: u32) -> &'a str {

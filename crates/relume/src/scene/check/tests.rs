@@ -198,3 +198,47 @@ fn numbers_out_of_the_usual_are_reported() {
     let subjects: Vec<String> = found(&odd, "units").into_iter().map(|f| f.1).collect();
     assert_eq!(subjects, ["s", "laser", "sun"]);
 }
+
+#[test]
+fn a_wall_that_faces_outwards_in_a_room_of_separate_objects_is_named() {
+    let room = |flipped: &str| {
+        let mut b = SceneBuilder::new("s");
+        let grey = b.material("grey", [0.5; 3], [1.0; 3]);
+        let at = |k: [u8; 3]| DVec3::from_array(k.map(f64::from));
+        let walls: [(&str, [[u8; 3]; 4]); 6] = [
+            ("floor", [[0, 0, 0], [0, 0, 1], [1, 0, 1], [1, 0, 0]]),
+            ("ceiling", [[0, 1, 0], [1, 1, 0], [1, 1, 1], [0, 1, 1]]),
+            ("west", [[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1]]),
+            ("east", [[1, 0, 0], [1, 0, 1], [1, 1, 1], [1, 1, 0]]),
+            ("north", [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]),
+            ("south", [[0, 0, 1], [0, 1, 1], [1, 1, 1], [1, 0, 1]]),
+        ];
+        for (name, corners) in walls {
+            let node = b.node(name, None, O, DQuat::IDENTITY);
+            let mut corners = corners.map(at);
+            if flipped == name {
+                corners.reverse();
+            }
+            b.polygon(node, name, grey, &corners);
+        }
+        check(&b.build().unwrap())
+    };
+    let named = |notes: &[Note]| {
+        found(notes, "flipped-normals").into_iter().map(|n| n.1).collect::<Vec<_>>()
+    };
+    assert_eq!(named(&room("floor")), ["floor"]);
+    assert_eq!(named(&room("")), [""; 0]);
+}
+
+#[test]
+fn a_rug_in_the_plane_of_the_floor_overlaps_it_and_one_above_does_not() {
+    let rug = |height: f64| {
+        notes(|b, _, grey| {
+            let node = b.node("rug", None, DVec3::new(0.5, height, 0.5), DQuat::IDENTITY);
+            let at = |x: f64, z: f64| DVec3::new(x * 0.3, 0.0, z * 0.3);
+            b.polygon(node, "rug", grey, &[at(0., 0.), at(0., 1.), at(1., 1.), at(1., 0.)]);
+        })
+    };
+    assert_eq!(found(&rug(0.0), "overlap").len(), 1);
+    assert_eq!(found(&rug(0.001), "overlap"), []);
+}

@@ -1,0 +1,94 @@
+//! One run at a time in a folder.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+
+use crate::failure::Failure;
+
+/// Held while a run writes into a folder. The system lets go of it when the process ends, however it
+/// does; the file that is left behind then locks nothing.
+pub(crate) struct Lock {
+    _file: File,
+    path: PathBuf,
+}
+
+impl Lock {
+    /// Takes the lock of a folder, or says who has it.
+    pub(crate) fn take(dir: &Path) -> Result<Lock, Failure> {
+        let path = dir.join(".relume.lock");
+        loop {
+            let mut options = OpenOptions::new();
+            options.read(true).write(true).create(true).truncate(false);
+            let mut file = options.open(&path).map_err(|error| Failure::write(&path, &error))?;
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => return Err(taken(dir, &mut file)),
+                // A file system without locks: nothing can be promised there.
+                Err(TryLockError::Error(_)) => return Ok(Lock { _file: file, path }),
+            }
+            // The run before may have taken the file away since it was opened.
+            if !is_at(&file, &path) {
+                continue;
+            }
+            let number = std::process::id().to_string();
+            let written = file.set_len(0).and_then(|()| file.write_all(number.as_bytes()));
+            written.map_err(|error| Failure::write(&path, &error))?;
+            return Ok(Lock { _file: file, path });
+        }
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // While it is locked still, so that nobody can have locked it in the meantime.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+fn taken(dir: &Path, file: &mut File) -> Failure {
+    let mut number = String::new();
+    let who = match file.read_to_string(&mut number) {
+        Ok(1..) => format!("process {}", number.trim()),
+        _ => "another process".to_owned(),
+    };
+    Failure::new(format_args!("{who} is writing to {}", dir.display()))
+        .help("wait for it to end, or choose another directory with -o")
+}
+
+/// Whether an open file is the one at a path.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let inode = |m: fs::Metadata| (m.dev(), m.ino());
+    file.metadata().map(inode).ok() == fs::metadata(path).map(inode).ok()
+}
+
+/// Elsewhere an open file cannot be taken away.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_second_run_in_a_folder_is_told_the_number_of_the_first() {
+        let dir = tempfile::tempdir().unwrap();
+        let first = Lock::take(dir.path()).unwrap();
+        let message = Lock::take(dir.path()).err().unwrap().to_string();
+        assert!(message.contains(&format!("process {}", std::process::id())), "{message}");
+        drop(first);
+        drop(Lock::take(dir.path()).unwrap());
+        assert!(!dir.path().join(".relume.lock").exists());
+    }
+
+    #[test]
+    fn a_dead_run_leaves_no_lock_behind() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join(".relume.lock"), "12").unwrap();
+        assert!(Lock::take(dir.path()).is_ok());
+    }
+}

@@ -36,7 +36,7 @@ pub fn settle_unfinished() {
             fs::rename(&temporary, &path)
         };
         // Best effort: nobody is left to be told.
-        if !kept.is_some_and(|length| keep(length).is_ok()) {
+        if kept.is_none_or(|length| keep(length).is_err()) {
             let _ = fs::remove_file(&temporary);
         }
     }

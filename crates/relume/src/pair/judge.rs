@@ -408,11 +408,12 @@ impl Placed<'_> {
         let end = |id, area| End { area, light: brightness.of(self.forest, id) };
         let ends = (end(a, place_a.area), end(b, place_b.area));
         let shone = shaft.shone_on(&blockers);
-        let e = estimate(&x, &v, (&ends.0, &ends.1), shone, brightness.reference_area_m2());
+        let scale = (brightness.reference_area_m2(), threshold);
+        let e = estimate(&x, &v, (&ends.0, &ends.1), shone, scale);
         let stake = factor / threshold.max(FINEST);
         let both_ways = way != Margin::ENDLESS;
         let (better, ahead) = e.side(&ends.0, &ends.1);
-        let wish = self.splittable((a, b), better);
+        let wish = self.splittable((a, b), (place_a.area, place_b.area), better);
         if let Some((side, firm)) = wish
             && e.error() > threshold
         {
@@ -488,13 +489,19 @@ impl Placed<'_> {
         })
     }
 
-    /// The side to refine: the one wished for if it can be, else the other; and whether there was no
-    /// choice.
-    fn splittable(&self, (a, b): (ElementId, ElementId), wish: Side) -> Option<(Side, bool)> {
+    /// The side to refine: the one wished for if it can be, else the other unless it is the smaller; and whether
+    /// there was no choice.
+    fn splittable(
+        &self,
+        (a, b): (ElementId, ElementId),
+        (area_a, area_b): (f64, f64),
+        wish: Side,
+    ) -> Option<(Side, bool)> {
         match (self.forest.can_split(a), self.forest.can_split(b)) {
             (true, true) => Some((wish, false)),
-            (true, false) => Some((Side::A, true)),
-            (false, true) => Some((Side::B, true)),
+            // Smaller sources do not mend what a receiver is too large for.
+            (true, false) => no_smaller(area_a, area_b).then_some((Side::A, true)),
+            (false, true) => no_smaller(area_b, area_a).then_some((Side::B, true)),
             (false, false) => None,
         }
     }
@@ -541,8 +548,8 @@ impl Placed<'_> {
                     End { area: 0.0, light: brightness.of(self.forest, light) },
                 );
                 let ends = (&ends.0, &ends.1);
-                let reference = brightness.reference_area_m2();
-                let est = estimate(&x, &v, ends, (f64::INFINITY, f64::INFINITY), reference);
+                let scale = (brightness.reference_area_m2(), threshold);
+                let est = estimate(&x, &v, ends, (f64::INFINITY, f64::INFINITY), scale);
                 let (error, may_split) = (est.on[0], self.forest.can_split(element));
                 let wanted = error > threshold;
                 if may_split && wanted {

@@ -120,7 +120,7 @@ pub(super) fn estimate(
     v: &Visibility,
     (a, b): (&End, &End),
     (lamp_a_m, lamp_b_m): (f64, f64),
-    reference_area: f64,
+    (reference_area, threshold): (f64, f64),
 ) -> Estimate {
     // Fewer than a bundle: clipped, without noise.
     let noise = if v.segments < SEGMENTS as u32 {
@@ -148,7 +148,7 @@ pub(super) fn estimate(
     };
     let over_a = over(&x.over_a, v.spread_a.max(least), hidden(v.spread_a, a, lamp_a_m));
     let over_b = over(&x.over_b, v.spread_b.max(least), hidden(v.spread_b, b, lamp_b_m));
-    let link = LinkSize { exchange: x.area_m2, noise, reference_area };
+    let link = LinkSize { exchange: x.area_m2, noise, reference_area, threshold };
     let (on_a, by_a, by_b) = one_way(&link, (a, &over_a), (b, &over_b));
     let (on_b, cy_b, cy_a) = one_way(&link, (b, &over_b), (a, &over_a));
     Estimate { on: [on_a, on_b], mends: (by_a + cy_a, by_b + cy_b) }
@@ -164,6 +164,7 @@ struct LinkSize {
     exchange: f64,
     noise: f64,
     reference_area: f64,
+    threshold: f64,
 }
 
 /// Standard deviations over one end of what crosses a link, relative to the mean without occlusion.
@@ -188,7 +189,8 @@ fn one_way(
     if receiver.area <= 0.0 {
         return (0.0, 0.0, 0.0);
     }
-    let weight = (receiver.area / link.reference_area).sqrt() / receiver.light.irradiance;
+    let by_area = (receiver.area / link.reference_area).sqrt();
+    let weight = by_area / receiver.light.irradiance;
     let per_radiosity = link.exchange / receiver.area * weight;
     let Light { radiosity, reflected, .. } = source.light;
     let varies = SOURCE_VARIATION * (source.area / link.reference_area).min(4.0);
@@ -202,6 +204,12 @@ fn one_way(
     let sends = (varies * over_source.sends).max(over_source.hidden * whole.sqrt());
     let by_source = per_radiosity * reflected * sends;
     let by_noise = per_radiosity * radiosity * link.noise;
-    let error = (by_receiver.powi(2) + by_source.powi(2) + by_noise.powi(2)).sqrt();
+    // Relative to what the link itself brings, which no light changes: close to a lamp that is the most of what arrives.
+    let alone = length(over_receiver.bend, EDGE_REFLECTED * over_receiver.edge);
+    let alone = by_area * length(length(alone, sends), link.noise);
+    let error = match alone <= link.threshold {
+        true => 0.0,
+        false => (by_receiver.powi(2) + by_source.powi(2) + by_noise.powi(2)).sqrt(),
+    };
     (error, by_receiver, by_source)
 }

@@ -409,7 +409,7 @@ impl Placed<'_> {
         let ends = (end(a, place_a.area), end(b, place_b.area));
         let shone = shaft.shone_on(&blockers);
         let scale = (brightness.reference_area_m2(), threshold);
-        let e = estimate(&x, &v, (&ends.0, &ends.1), shone, scale);
+        let e = estimate(&x, &v, (&ends.0, &ends.1), shone, shaft.least_m2(&blockers), scale);
         let stake = factor / threshold.max(FINEST);
         let both_ways = way != Margin::ENDLESS;
         let (better, ahead) = e.side(&ends.0, &ends.1);
@@ -549,7 +549,7 @@ impl Placed<'_> {
                 );
                 let ends = (&ends.0, &ends.1);
                 let scale = (brightness.reference_area_m2(), threshold);
-                let est = estimate(&x, &v, ends, (f64::INFINITY, f64::INFINITY), scale);
+                let est = estimate(&x, &v, ends, (f64::INFINITY, f64::INFINITY), f64::INFINITY, scale);
                 let (error, may_split) = (est.on[0], self.forest.can_split(element));
                 let wanted = error > threshold;
                 if may_split && wanted {

@@ -104,6 +104,10 @@ const STEEP: f64 = 0.3;
 /// V from which the end is seen, and not a sliver that rounding leaves between what covers it and its plane.
 const SEEN: f64 = 1e-4;
 
+/// Elements of this many times the area of the smallest thing that stands between weigh 1 where its shadow's edge
+/// is concerned.
+const SMALL: f64 = 10.0;
+
 /// Weight of the sampling error of V: it is independent from link to link and averages out.
 const NOISE: f64 = 0.2;
 
@@ -120,6 +124,7 @@ pub(super) fn estimate(
     v: &Visibility,
     (a, b): (&End, &End),
     (lamp_a_m, lamp_b_m): (f64, f64),
+    least_blocker: f64,
     (reference_area, threshold): (f64, f64),
 ) -> Estimate {
     // Fewer than a bundle: clipped, without noise.
@@ -148,7 +153,9 @@ pub(super) fn estimate(
     };
     let over_a = over(&x.over_a, v.spread_a.max(least), hidden(v.spread_a, a, lamp_a_m));
     let over_b = over(&x.over_b, v.spread_b.max(least), hidden(v.spread_b, b, lamp_b_m));
-    let link = LinkSize { exchange: x.area_m2, noise, reference_area, threshold };
+    let scale = reference_area.min(SMALL * least_blocker).max(f64::MIN_POSITIVE);
+    let finer = (reference_area / scale).sqrt();
+    let link = LinkSize { exchange: x.area_m2, noise, finer, reference_area, threshold };
     let (on_a, by_a, by_b) = one_way(&link, (a, &over_a), (b, &over_b));
     let (on_b, cy_b, cy_a) = one_way(&link, (b, &over_b), (a, &over_a));
     Estimate { on: [on_a, on_b], mends: (by_a + cy_a, by_b + cy_b) }
@@ -163,6 +170,8 @@ fn length(x: f64, y: f64) -> f64 {
 struct LinkSize {
     exchange: f64,
     noise: f64,
+    /// How much more the edges of shadows weigh than the rest: those of small things by their own size.
+    finer: f64,
     reference_area: f64,
     threshold: f64,
 }
@@ -198,14 +207,14 @@ fn one_way(
     // source does not mend it, so it counts as if the source were as large as the receiver.
     let whole = if source.area > 0.0 { (receiver.area / source.area).max(1.0) } else { 1.0 };
     let edge = EDGE_EMITTED * (radiosity - reflected) + EDGE_REFLECTED * reflected;
-    let uneven = length(radiosity * over_receiver.bend, edge * over_receiver.edge);
+    let uneven = length(radiosity * over_receiver.bend, edge * over_receiver.edge * link.finer);
     let by_receiver = per_radiosity * uneven * whole;
     // The edges of what is hidden run through as many sources as it is long: all err in the same sense.
     let sends = (varies * over_source.sends).max(over_source.hidden * whole.sqrt());
     let by_source = per_radiosity * reflected * sends;
     let by_noise = per_radiosity * radiosity * link.noise;
     // Relative to what the link itself brings, which no light changes: close to a lamp that is the most of what arrives.
-    let alone = length(over_receiver.bend, EDGE_REFLECTED * over_receiver.edge);
+    let alone = length(over_receiver.bend, EDGE_REFLECTED * over_receiver.edge * link.finer);
     let alone = by_area * length(length(alone, sends), link.noise);
     let error = match alone <= link.threshold {
         true => 0.0,

@@ -177,6 +177,12 @@ impl<'a> Shaft<'a> {
         widths
     }
 
+    /// Area of the smallest of some blockers, m2; infinite if there is none.
+    pub fn least_m2(&self, blockers: &[PatchId]) -> f64 {
+        let area = |&patch: &PatchId| self.forest.area_m2(self.forest.patch_root(patch));
+        blockers.iter().map(area).fold(f64::INFINITY, f64::min)
+    }
+
     /// Whether both ends lie in one plane and touch.
     pub fn is_contact(&self) -> bool {
         let (a, b) = self.own.map_or((self.a, self.b), |(_, a, b)| (a, b));

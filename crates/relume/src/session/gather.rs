@@ -52,7 +52,7 @@ impl Session {
     /// Before the first [`Session::step`].
     pub fn irradiances_at(&self, sensors: &[Sensor]) -> Vec<[f64; 3]> {
         let solved = self.solved.as_ref().expect("a step comes before a query");
-        let one = |sensor: &Sensor| Look::new(solved, sensor).gather(self);
+        let one = |sensor: &Sensor| Look::new((self, solved), sensor, true).gather();
         sensors.par_chunks(SENSORS_AT_ONCE).flat_map_iter(|some| some.iter().map(one)).collect()
     }
 }
@@ -68,11 +68,15 @@ const LIFT: f64 = 8.0;
 /// radiosity: what is brighter in them than the rest then weighs at most this much too much.
 const FAR: f64 = 1.0 / 32.0;
 
+/// Form factor to a part of a leaf below which it is taken to send what the leaf's line says.
+const LITTLE: f64 = 0.01;
+
 /// Halvings of a leaf that falls into too many pieces; then its middle decides.
 const SPLITS: u32 = 6;
 
 /// A sensor looking at a solved scene.
 struct Look<'a> {
+    session: &'a Session,
     solved: &'a Solved,
     forest: &'a Forest,
     point: DVec3,
@@ -80,22 +84,31 @@ struct Look<'a> {
     /// Where the sensor's front begins.
     tangent: Plane,
     slack_m: f64,
+    /// Whether what leaves surfaces close by is gathered anew where they are looked at.
+    looks_again: bool,
 }
 
 impl<'a> Look<'a> {
-    fn new(solved: &'a Solved, sensor: &Sensor) -> Look<'a> {
+    fn new(
+        (session, solved): (&'a Session, &'a Solved),
+        sensor: &Sensor,
+        looks_again: bool,
+    ) -> Look<'a> {
         let slack_m = SENSOR_ROUNDING * solved.view.fixed_box(Forest::ROOT).diagonal();
         Look {
+            session,
             solved,
             forest: &solved.forest,
             point: sensor.at,
             normal: sensor.normal,
             tangent: Plane::through(sensor.at, sensor.normal),
             slack_m,
+            looks_again,
         }
     }
 
-    fn gather(&self, session: &Session) -> [f64; 3] {
+    fn gather(&self) -> [f64; 3] {
+        let session = self.session;
         let mut sum = [0.0; 3];
         for patch in 0..session.scene.patches.len() as u32 {
             self.add_patch(PatchId(patch), &mut sum);
@@ -218,6 +231,9 @@ impl<'a> Look<'a> {
             children.for_each(|child| self.add_element(ElementId(child), &in_the_way, sum));
             return;
         }
+        if self.looks_again && e.radius > e.bounds.distance(&Aabb::of([self.point])) {
+            return self.add_near(&e, id, seen, (&in_the_way, SPLITS), sum);
+        }
         let (factor, b) = if in_the_way.is_empty() {
             (
                 form_factor_from_point(self.point, self.normal, seen),
@@ -234,6 +250,51 @@ impl<'a> Look<'a> {
         if factor > 0.0 {
             (0..3).for_each(|c| sum[c] += factor * f64::from(b[c]));
         }
+    }
+
+    /// Adds what a part of a leaf sends that is large against its distance: the leaf knows its radiosity as a line
+    /// only, and beside it may be the shadow of what the sensor is close to. What leaves it is gathered where it is
+    /// looked at, in parts as large as they are far.
+    fn add_near(
+        &self,
+        e: &WorldElement,
+        id: ElementId,
+        part: &[DVec3],
+        (occluders, splits): (&[&Occluder], u32),
+        sum: &mut [f64; 3],
+    ) {
+        let middle = part.iter().sum::<DVec3>() / part.len() as f64;
+        let radius = part.iter().map(|c| c.distance(middle)).fold(0.0, f64::max);
+        if splits > 0 && radius > (middle - self.point).length() {
+            for k in 0..part.len() {
+                let part = towards(part, k, middle);
+                let pyramid = pyramid(self.point, &part);
+                let hides = |o: &&&Occluder| o.hides(&part, &pyramid) != Hides::Nothing;
+                let rest: Vec<&Occluder> = occluders.iter().filter(hides).copied().collect();
+                self.add_near(e, id, &part, (&rest, splits - 1), sum);
+            }
+            return;
+        }
+        let (factor, moment) = self.factor_past(part, occluders, SPLITS);
+        if factor <= 0.0 {
+            return;
+        }
+        let at = moment / factor;
+        let b = if factor > LITTLE {
+            let patch = self.forest.patch(id).expect("an element has a patch");
+            let material = self.session.scene.patches[patch.0 as usize].material;
+            let material = &self.session.scene.materials[material.0 as usize];
+            let sensor = Sensor { at, normal: e.plane.normal };
+            let h = Look::new((self.session, self.solved), &sensor, false).gather();
+            let m = material.exitance_at(self.solved.time_s);
+            [0, 1, 2].map(|c| m[c] + material.reflectance[c] * h[c])
+        } else {
+            let place = place_of(self.forest, id);
+            let b = self.solved.radiosity.linear(id.0, &place, SQUARE_MOMENT);
+            let at = e.offset(at) / e.radius;
+            b.at(at.x as f32, at.y as f32).map(|b| f64::from(b.max(0.0)))
+        };
+        (0..3).for_each(|c| sum[c] += factor * b[c]);
     }
 
     /// The form factor to what is seen of a polygon past occluders, and that times the middle of it.
@@ -253,8 +314,7 @@ impl<'a> Look<'a> {
         // Towards the corners: each part is a quadrilateral.
         let n = seen.len();
         let part = |k: usize| {
-            let (before, after) = (seen[(k + n - 1) % n], seen[(k + 1) % n]);
-            let part = [seen[k], (seen[k] + after) * 0.5, middle, (seen[k] + before) * 0.5];
+            let part = towards(seen, k, middle);
             let pyramid = pyramid(self.point, &part);
             let hides = |o: &&&Occluder| o.hides(&part, &pyramid) != Hides::Nothing;
             let rest: Vec<&Occluder> = occluders.iter().filter(hides).copied().collect();
@@ -262,6 +322,13 @@ impl<'a> Look<'a> {
         };
         (0..n).map(part).fold((0.0, DVec3::ZERO), |sum, part| (sum.0 + part.0, sum.1 + part.1))
     }
+}
+
+/// The part of a polygon towards its corner `k`: a quadrilateral with a corner in the middle.
+fn towards(polygon: &[DVec3], k: usize, middle: DVec3) -> [DVec3; 4] {
+    let n = polygon.len();
+    let (before, after) = (polygon[(k + n - 1) % n], polygon[(k + 1) % n]);
+    [polygon[k], (polygon[k] + after) * 0.5, middle, (polygon[k] + before) * 0.5]
 }
 
 /// A polygon between the point and a patch.

@@ -129,8 +129,16 @@ impl Job {
         let finished = Arc::new(Mutex::new(Finished { report, events, paths }));
         let keep = Arc::clone(&finished);
         interrupt::keep_with(move || interrupt::locked(&keep).write());
-        let mut run =
-            Run { job: &self, session, camera, finished, progress, links: 0, energy: None };
+        let mut run = Run {
+            job: &self,
+            session,
+            camera,
+            finished,
+            progress,
+            links: 0,
+            energy: None,
+            suspects: Vec::new(),
+        };
         let outcome = run.frames(wanted, &pending);
         run.progress.clear();
         // Also where a frame failed: what was finished stays.
@@ -283,21 +291,29 @@ impl Job {
             (None, _) => {}
         }
         if let Some(energy) = &run.energy {
-            line += &balance(energy);
+            line += &balance(energy, &run.suspects);
         }
         output::print(&(line + "\n"))
     }
 }
 
 /// A line about the energy balance of the last frame.
-fn balance(energy: &Energy) -> String {
+fn balance(energy: &Energy, suspects: &[String]) -> String {
     let Energy { emitted_w, absorbed_w, escaped_w } = *energy;
-    let off = (emitted_w - absorbed_w - escaped_w).abs();
-    let share = if emitted_w > 0.0 { 100.0 * off / emitted_w } else { 0.0 };
-    format!(
+    let share = 100.0 * energy.unbalanced();
+    let mut line = format!(
         "\nlast frame: {emitted_w:.4} W emitted, {absorbed_w:.4} W absorbed, {escaped_w:.4} W escaped, \
          {share:.2} % unbalanced"
-    )
+    );
+    if !suspects.is_empty() {
+        let names: Vec<String> =
+            suspects.iter().map(|s| format!("`{}`", output::name(s))).collect();
+        line += &format!(
+            "\nwarning: more light arrives at {} than can: they pierce each other or lie very close",
+            names.join(" and ")
+        );
+    }
+    line
 }
 
 /// What a run has finished. Whatever ends the run, this is written.
@@ -347,6 +363,8 @@ struct Run<'a> {
     links: u64,
     /// Energy balance of the last frame.
     energy: Option<Energy>,
+    /// Surfaces that receive more than they can.
+    suspects: Vec<String>,
 }
 
 impl Run<'_> {
@@ -388,6 +406,7 @@ impl Run<'_> {
             .map_err(|error| self.session_failure(error))?;
         self.links = entry.links;
         self.energy = entry.energy;
+        self.suspects = entry.suspects.clone();
         if let Some(path) = self.job.picture_path(frame) {
             self.draw(frame, &path)?;
         }

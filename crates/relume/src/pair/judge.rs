@@ -549,7 +549,8 @@ impl Placed<'_> {
                 );
                 let ends = (&ends.0, &ends.1);
                 let scale = (brightness.reference_area_m2(), threshold);
-                let est = estimate(&x, &v, ends, (f64::INFINITY, f64::INFINITY), f64::INFINITY, scale);
+                let est =
+                    estimate(&x, &v, ends, (f64::INFINITY, f64::INFINITY), f64::INFINITY, scale);
                 let (error, may_split) = (est.on[0], self.forest.can_split(element));
                 let wanted = error > threshold;
                 if may_split && wanted {

@@ -94,10 +94,6 @@ const EDGE_REFLECTED: f64 = 3.0;
 /// when the solution is read.
 const BENT: f64 = 0.5;
 
-/// Share of a source's reflected radiosity that comes from what a lamp hides of it and lights, over the standard
-/// deviation of visibility over the source.
-const SHONE_ON: f64 = 1.0;
-
 /// Standard deviation of visibility over both ends, at least, where a pair is partly hidden and its kernel is steep.
 const STEEP: f64 = 0.3;
 
@@ -134,11 +130,13 @@ pub(super) fn estimate(
         ((v.value * (1.0 - v.value) + 0.02) / f64::from(v.segments)).sqrt() * NOISE
     };
     let sends = |over: &Variation, spread: f64| length(v.value * (over.slope + over.bend), spread);
-    // What a narrow lamp lights, it lights the more.
+    // What a narrow lamp lights, it lights the more: where as much light as comes of it leaves what is hidden, the mean
+    // of the product of radiosity and visibility is off by the one's excess times the other's variance.
     let hidden = |edge: f64, end: &End, width_m: f64| {
-        let coarse_m = reference_area.sqrt();
-        let brighter = (coarse_m / width_m).max(1.0).min((reference_area / end.area).max(1.0));
-        if width_m.is_finite() { brighter * (SHONE_ON * edge).min(1.0) } else { 0.0 }
+        let brighter = (reference_area.sqrt() / width_m).max(1.0);
+        let most = (reference_area / end.area).max(1.0).min(brighter);
+        let off = (brighter * edge * edge).max(most * edge).min(most);
+        if width_m.is_finite() { off } else { 0.0 }
     };
     let over = |over: &Variation, edge: f64, hidden: f64| Uneven {
         bend: BENT * v.value * over.bend,

@@ -133,6 +133,11 @@ impl Session {
         tally::fill(&mut report, &solved);
         if self.options.balance {
             tally::fill_balance(&mut report, &self.scene, &solved);
+            let share = report.energy.map_or(0.0, |energy| energy.unbalanced());
+            if solved.is_settled() && (share > UNBALANCED_MAX || share.is_nan()) {
+                let surfaces = tally::suspects(&self.scene, &solved);
+                return Err(SessionError::Unbalanced { frame, share, surfaces });
+            }
         }
         if cold {
             report.dynamic_links = from.map_or(0, |from| self.dynamic_links(&solved, from));
@@ -340,6 +345,9 @@ impl Session {
         }
     }
 }
+
+/// Share of what is emitted that may be unaccounted for in a result.
+const UNBALANCED_MAX: f64 = 0.1;
 
 /// Links by receiver, for each pair of the tree, bytes.
 const PAIR_LINKS_BYTES: u64 = 20;

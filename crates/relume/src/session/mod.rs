@@ -79,6 +79,18 @@ pub enum SessionError {
         /// Names of the surfaces whose rows exceed 1 by most.
         surfaces: Vec<String>,
     },
+    /// What is absorbed and escapes is not what is emitted.
+    #[error(
+        "frame {frame}: {:.0} % of the light that is emitted is unaccounted for; most of it between {}: they pierce each other, or lie so close that form factors between them sum to more than 1; move them apart, make their materials reflect less, or use a finer tolerance", 100.0 * share, names(surfaces)
+    )]
+    Unbalanced {
+        /// The frame being computed.
+        frame: u32,
+        /// Share of what is emitted.
+        share: f64,
+        /// Names of the surfaces whose rows exceed 1 by most.
+        surfaces: Vec<String>,
+    },
     /// An option is out of its range.
     #[error("{0}")]
     Option(String),

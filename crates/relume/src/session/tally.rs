@@ -80,10 +80,11 @@ pub(crate) fn balance_of(
     let mut energy = Energy::default();
     let mut area = 0.0;
     let mut sums = Vec::new();
+    let linear = !radiosity.is_bounded();
     for facet in facets {
         let lit = surfaces.lit(facet.0);
         sums.clear();
-        row_sums(surfaces, links, is_surface, facet.0, &mut |_, sum| sums.push(sum));
+        row_sums(surfaces, (links, linear), is_surface, facet.0, &mut |_, sum| sums.push(sum));
         let mut next = sums.iter();
         radiosity.irradiances(surfaces, facet.0, &mut |id, h| {
             let a = surfaces.area_m2(id);
@@ -163,7 +164,8 @@ pub(super) fn row_sums_of(scene: &Scene, solved: &Solved) -> Vec<(ElementId, f64
     let is_surface = |id: u32| forest.kind(ElementId(id)) == Kind::Element;
     let mut out = Vec::with_capacity(forest.counts().leaves as usize);
     for facet in forest.facets() {
-        row_sums(&surfaces, &solved.links, &is_surface, facet.0, &mut |id, sum| {
+        let links = (&solved.links, !solved.radiosity.is_bounded());
+        row_sums(&surfaces, links, &is_surface, facet.0, &mut |id, sum| {
             out.push((ElementId(id), f64::from(sum)));
         });
     }

@@ -12,7 +12,7 @@ pub(super) fn gather_some<S: Simd>(
     simd: S,
     (radiosity, links): (&Field, &Links),
     surfaces: &impl Surfaces,
-    receivers: &[u32],
+    (receivers, linear): (&[u32], bool),
     out: &mut [Linear],
 ) {
     for (&id, h) in receivers.iter().zip(out) {
@@ -20,10 +20,23 @@ pub(super) fn gather_some<S: Simd>(
             [] => Linear::default(),
             list => {
                 let scales = (1.0 / surfaces.place(id).radius, surfaces.source_moment());
-                gather_one(simd, radiosity, list, scales)
+                match linear {
+                    true => gather_one(simd, radiosity, list, scales),
+                    false => gather_means(radiosity, list),
+                }
             }
         };
     }
+}
+
+/// Everything one receiver gathers where elements are taken to be constant.
+fn gather_means(radiosity: &Field, list: &[Link]) -> Linear {
+    let mut mean = [0.0; 3];
+    for link in list {
+        let b = radiosity.get(link.source).mean;
+        (0..3).for_each(|c| mean[c] += b[c] * link.coupling);
+    }
+    Linear { mean, ..Linear::default() }
 }
 
 /// Everything one receiver gathers.

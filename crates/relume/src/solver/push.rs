@@ -5,10 +5,10 @@ use super::links::Links;
 use super::surfaces::{Place, Surfaces};
 
 /// Calls `visit` with the sum of the form factors from each leaf of a facet, over its and its
-/// ancestors' links.
+/// ancestors' links: as lines, or as means alone unless `linear`.
 pub fn row_sums(
     surfaces: &impl Surfaces,
-    links: &Links,
+    (links, linear): (&Links, bool),
     counts: &dyn Fn(u32) -> bool,
     facet: u32,
     visit: &mut dyn FnMut(u32, f32),
@@ -18,6 +18,9 @@ pub fn row_sums(
         let list = links.of(id);
         for link in list.iter().filter(|l| counts(l.source)) {
             sum.mean[0] += link.coupling;
+            if !linear {
+                continue;
+            }
             let [u, v] = link.receiver_gradient();
             sum.gradient[0][0] += u * link.coupling;
             sum.gradient[1][0] += v * link.coupling;

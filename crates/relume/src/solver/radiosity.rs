@@ -48,8 +48,10 @@ pub struct Radiosity {
     owed: Vec<f32>,
     /// Kept instead.
     trend: Trend,
+    /// Elements are taken to be constant, as the solution would grow without end if lines were handed down.
+    constant: bool,
     /// For each leaf what its irradiance is divided by: its row sum where that is above 1. Empty unless the solution
-    /// would grow without end.
+    /// would grow even so.
     limits: Vec<f32>,
     /// Sweeps made by the last solve.
     pub sweeps: u32,
@@ -105,7 +107,8 @@ impl Radiosity {
         self.radiosity.renumber(to);
         self.gathered.renumber(to);
         self.trend.renumber(to);
-        let kept = [&mut self.pending, &mut self.owed].into_iter().filter(|v| !v.is_empty());
+        let numbers = [&mut self.pending, &mut self.owed, &mut self.limits];
+        let kept = numbers.into_iter().filter(|v| !v.is_empty());
         for values in kept {
             *values = to.old_of().iter().map(|&old| values[old as usize]).collect();
         }
@@ -150,8 +153,9 @@ impl Radiosity {
     }
 
     /// [`solve`](Radiosity::solve) to a residual, relative to the mean radiosity, whatever the links: where light would
-    /// grow without end, or not settle, because rows of leaves sum to more than 1, these rows are bounded by 1 and the
-    /// solution is found anew from nothing. `most_mean_w_m2` is what the mean radiosity cannot reach.
+    /// grow without end, or not settle, because rows of leaves sum to more than 1, it is found anew from nothing with
+    /// constant elements, whose rows lines do not raise; and if that grows too, with these rows bounded by 1.
+    /// `most_mean_w_m2` is what the mean radiosity cannot reach.
     pub fn solve_bounded(
         &mut self,
         surfaces: &impl Surfaces,
@@ -160,21 +164,27 @@ impl Radiosity {
         (residual, most_mean_w_m2): (f64, f64),
     ) {
         let stop = Stop::Bounded { residual, mean_w_m2: most_mean_w_m2 };
-        if self.limits.is_empty() {
+        if !self.is_bounded() {
             self.solve(surfaces, links, dirty, stop);
         } else {
             // As a cold build would: it may do without this time.
-            self.limits = Vec::new();
+            (self.constant, self.limits) = (false, Vec::new());
             self.start_anew(surfaces);
             self.solve(surfaces, links, Dirty::All, stop);
         }
         if self.has_settled() {
             return;
         }
+        self.constant = true;
+        self.start_anew(surfaces);
+        self.solve(surfaces, links, Dirty::All, stop);
+        if self.has_settled() {
+            return;
+        }
         self.limits = vec![1.0; surfaces.len()];
         let is_surface = |id: u32| surfaces.is_surface(id);
         for facet in surfaces.facets() {
-            row_sums(surfaces, links, &is_surface, facet.0, &mut |leaf, sum| {
+            row_sums(surfaces, (links, false), &is_surface, facet.0, &mut |leaf, sum| {
                 self.limits[leaf as usize] = sum.max(1.0);
             });
         }
@@ -187,9 +197,9 @@ impl Radiosity {
         self.residual.is_finite() && self.sweeps < SWEEPS_MAX
     }
 
-    /// Whether rows of leaves were bounded so that the solution does not grow without end.
+    /// Whether elements were taken to be constant, or rows of leaves bounded, so that the solution does not grow.
     pub fn is_bounded(&self) -> bool {
-        !self.limits.is_empty()
+        self.constant
     }
 
     /// Exitances alone; punctual lights stay as they are.
@@ -366,11 +376,12 @@ impl Radiosity {
         let receivers = &mut batch.receivers;
         self.gathers += receivers.len() as u64;
         receivers.iter().for_each(|&id| self.pending[id as usize] = 0.0);
-        let Radiosity { radiosity, gathered, owed, .. } = self;
+        let Radiosity { radiosity, gathered, owed, constant, .. } = self;
+        let linear = !*constant;
         found.resize(found.len().max(receivers.len()), Linear::default());
         let level = transport::Simd::detect().level();
         let gather = |ids: &[u32], out: &mut [Linear]| {
-            dispatch!(level, simd => gather_some(simd, (radiosity, links), surfaces, ids, out));
+            dispatch!(level, simd => gather_some(simd, (radiosity, links), surfaces, (ids, linear), out));
         };
         if receivers.len() <= CHUNK {
             gather(receivers, found);

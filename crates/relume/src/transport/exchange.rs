@@ -554,9 +554,7 @@ mod tests {
     fn slender_and_close_elements_have_their_closed_forms() {
         // A strip 4 mm high on a floor: all but its ends see half of it.
         let floor = rectangle(DVec3::ZERO, DVec3::X * 4.0, DVec3::Y * 3.0);
-        let strip = |z: f64| {
-            rectangle(DVec3::new(1.0, 1.5, z), DVec3::X * 1.6, DVec3::Z * 4e-3)
-        };
+        let strip = |z: f64| rectangle(DVec3::new(1.0, 1.5, z), DVec3::X * 1.6, DVec3::Z * 4e-3);
         assert!((form_factor(&strip(0.0), &floor) - 0.499_357).abs() < 2e-4);
         // Over a piece of the floor far narrower than the spacing of points on the strip.
         let piece = rectangle(DVec3::new(1.75, 1.4, 0.0), DVec3::X * 0.05, DVec3::Y * 0.1);

@@ -71,8 +71,6 @@ pub(crate) struct Case {
     pub(crate) lit: bool,
     /// Whether form factors are looked at.
     pub(crate) factors: bool,
-    /// Whether no element's row may be above 1.
-    pub(crate) elements: bool,
     /// Whether links are compared with a cold build.
     pub(crate) cold: bool,
     pub(crate) times_s: Vec<f64>,
@@ -104,7 +102,6 @@ impl Case {
             sensors: Vec::new(),
             lit: false,
             factors: true,
-            elements: false,
             cold: false,
             times_s: vec![0.0],
             irradiance: None,

@@ -86,7 +86,7 @@ pub(crate) fn motion(r: &mut Random, case: &mut Case) {
     }
     case.times_s = vec![0.0, 0.21, 0.4, 0.43, 0.9, 0.4];
     (case.lit, case.factors, case.sealed) = (true, false, false);
-    (case.cold, case.elements) = (true, true);
+    case.cold = true;
     case.story = format!("reflectance {white}:{words}");
 }
 
@@ -132,7 +132,6 @@ pub(crate) fn closet(r: &mut Random, case: &mut Case) {
     let white = if chance(r, 0.5) { 0.98 } else { 0.9 };
     case.panels.iter_mut().filter(|p| p.name != "lamp").for_each(|p| p.reflectance = white);
     (case.lit, case.factors, case.sealed) = (true, false, false);
-    case.elements = true;
     case.story =
         format!("closet {wide:.3?} with {drawers} drawers, gaps of {gap:.4}, reflectance {white}");
 }
@@ -166,7 +165,7 @@ pub(crate) fn table(r: &mut Random, case: &mut Case) {
     for p in &mut case.panels[start..] {
         (p.reflectance, p.both_sides) = (white, both);
     }
-    (case.lit, case.factors, case.sealed, case.elements) = (true, false, false, true);
+    (case.lit, case.factors, case.sealed) = (true, false, false);
     case.story = format!(
         "table {:.3?}, legs {:.4} m through it, two sides: {both}, {white}",
         hi - lo,

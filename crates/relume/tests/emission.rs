@@ -136,8 +136,9 @@ fn extrapolated_links_follow_a_lamp_that_changes() {
         let mut cold = Session::new(scene.clone(), options(Oracle::Error)).unwrap();
         cold.step(0, time_s).unwrap();
         for (one, two) in means(&session).iter().zip(means(&cold)) {
-            // Links that follow a line are not judged anew for their light: a quarter of the tolerance.
-            assert!((one[0] - two[0]).abs() <= 0.025 * two[0], "frame {frame}: {one:?} {two:?}");
+            // The bottom of the box is all but dark: there the residual is what is left.
+            let allowed = 0.01 * two[0].max(1.0);
+            assert!((one[0] - two[0]).abs() <= allowed, "frame {frame}: {one:?} {two:?}");
         }
     }
 }

@@ -134,7 +134,8 @@ impl Session {
         if self.options.balance {
             tally::fill_balance(&mut report, &self.scene, &solved);
             let share = report.energy.map_or(0.0, |energy| energy.unbalanced());
-            if solved.is_settled() && (share > UNBALANCED_MAX || share.is_nan()) {
+            let most = self.unbalanced_max();
+            if solved.is_settled() && (share > most || share.is_nan()) {
                 let surfaces = tally::suspects(&self.scene, &solved);
                 return Err(SessionError::Unbalanced { frame, share, surfaces });
             }
@@ -145,6 +146,14 @@ impl Session {
         report.seconds.total = clock.total();
         solved.report = report;
         Ok(solved)
+    }
+
+    /// Share of what is emitted that may be unaccounted for in a result: as much as is asked for, or a tenth.
+    fn unbalanced_max(&self) -> f64 {
+        match self.options.oracle {
+            super::Oracle::Error => self.options.tolerance.max(0.1),
+            super::Oracle::FormFactor { .. } => 0.5,
+        }
     }
 
     /// A bound on the mean radiosity of the scene at any time: all that can be emitted, over what is
@@ -345,9 +354,6 @@ impl Session {
         }
     }
 }
-
-/// Share of what is emitted that may be unaccounted for in a result.
-const UNBALANCED_MAX: f64 = 0.1;
 
 /// Links by receiver, for each pair of the tree, bytes.
 const PAIR_LINKS_BYTES: u64 = 20;

@@ -110,7 +110,7 @@ macro_rules! a_few {
 }
 
 a_few! {
-    pairs_at_a_gap: "pair", 0..8;
+    pairs_at_a_gap: "pair", 1..8;
     slabs_at_a_gap: "slab", 0..3;
     partitions_with_slots: "partitions", 0..3;
     shelves_that_share_edges: "shelves", 0..3;

@@ -212,7 +212,9 @@ impl Radiosity {
             });
         }
         self.pending.fill(0.0);
-        self.owed.fill(0.0);
+        // A solve that changed most of the scene has given it back.
+        self.owed.clear();
+        self.owed.resize(self.pending.len(), 0.0);
         self.trend = Trend::default();
         (self.held, self.passed_over, self.sweeps) = (0.0, 0.0, 0);
     }

@@ -50,6 +50,7 @@ pub(crate) type Draw<'a, S> = Box<dyn FnMut(&S, f64) -> Result<f64, Failure> + '
 pub(crate) fn bench(args: &BenchArgs) -> Result<(), Failure> {
     let clip = Clip::open(&args.source, &args.clip)?;
     clip.warn();
+    let clip = clip.without_dark_sides();
     let plan = Plan::new(&args.measure, args.update, args.clip.quiet);
     let draw = match args.no_pictures || plan.compare {
         true => None,

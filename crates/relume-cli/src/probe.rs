@@ -27,6 +27,8 @@ pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
         say_renamed(&sensors);
         hidden.iter().for_each(|line| output::complain(line));
     }
+    // A sensor in a dark shell reads nothing, whether its walls are there or not; on the mesh it needs them.
+    let clip = if args.interpolate { clip } else { clip.without_dark_sides() };
     let mut sink = Sink::open(args.output.as_deref())?;
     let mut session = clip.session(args.update, false)?;
     let progress = Progress::new(clip.frames.len(), 0, args.clip.quiet);

@@ -103,12 +103,13 @@ impl Job {
             ));
         }
         let clip = Clip::of_file(&self.scene, &self.solve.clip, self.tolerance)?;
+        clip.warn();
+        clip.warn_of(self.solve.update);
+        let clip = clip.without_dark_sides();
         let camera = self.picture.as_ref().map(|(_, flags)| {
             Viewpoint::new(&clip.scene, flags.camera.as_deref()).map_err(Failure::new)
         });
         let camera = camera.transpose()?;
-        clip.warn();
-        clip.warn_of(self.solve.update);
         if let Some(dir) = &self.dir {
             make_directory(dir)?;
         }

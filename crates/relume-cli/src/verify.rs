@@ -18,6 +18,7 @@ const TWO: &str = "from scratch";
 pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
     let clip = Clip::open(&args.source, &args.clip)?;
     clip.warn();
+    let clip = clip.without_dark_sides();
     frames(&clip, UpdateChoice::of(args.update.into()), args.clip.quiet)
 }
 

@@ -8,6 +8,9 @@ use std::fs;
 use std::path::Path;
 
 use common::{json, relume, room, text};
+use glam::{DQuat, DVec3};
+use relume::scene::SceneBuilder;
+use relume_picture::export::write_glb;
 use serde_json::Value;
 
 fn frames_of(report: &Value) -> Vec<u64> {
@@ -269,4 +272,24 @@ fn a_reader_that_goes_away_is_no_error() {
     let ran = child.wait_with_output().unwrap();
     assert_eq!(String::from_utf8(ran.stderr).unwrap(), "");
     assert!(ran.status.success());
+}
+
+#[test]
+fn walls_inside_a_closed_shell_are_solved_only_where_they_may_be_seen() {
+    let patches_with = |lamp_at: f64| {
+        let mut b = SceneBuilder::new("crate");
+        let thin = b.double_sided_material("thin", [0.5; 3], [0.0; 3]);
+        let bright = b.material("bright", [0.0; 3], [9.0; 3]);
+        let node = b.node("crate", None, DVec3::ZERO, DQuat::IDENTITY);
+        b.cuboid(node, "crate", thin, DVec3::splat(-0.5), DVec3::splat(0.5));
+        let node = b.node("lamp", None, DVec3::Y * lamp_at, DQuat::IDENTITY);
+        b.polygon(node, "lamp", bright, &[DVec3::ZERO, DVec3::X * 0.2, DVec3::Z * 0.2]);
+        let dir = tempfile::tempdir().unwrap();
+        let [file, report] = ["crate.glb", "report.json"].map(|name| dir.path().join(name));
+        write_glb(&b.build().unwrap(), &file).unwrap();
+        let all = ["solve", text(&file), "--tolerance", "0.5", "--report", text(&report)];
+        relume(&all).succeeds();
+        json(&report)["scene"]["patches"].as_u64()
+    };
+    assert_eq!((patches_with(1.0), patches_with(0.0)), (Some(7), Some(13)));
 }

@@ -36,7 +36,7 @@ const IN_PLANE: f64 = 1e-6;
 
 /// Solid angle of a triangle seen from the origin; positive where its front faces away; 0 in its plane.
 /// Source: van Oosterom and Strackee 1983.
-fn solid_angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
+pub(super) fn solid_angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let volume = a.dot(b.cross(c));
     if volume.abs() <= IN_PLANE * la * lb * lc {

@@ -13,6 +13,7 @@ use crate::geometry::Pose;
 mod assemble;
 mod builder;
 mod check;
+mod dark;
 mod draft;
 mod drift;
 mod error;
@@ -26,7 +27,9 @@ mod merge;
 mod motion;
 mod names;
 mod rigid;
+mod shell;
 mod solid;
+mod topology;
 mod view3d;
 mod weld;
 

@@ -89,6 +89,19 @@ impl Motion {
         Some(pose)
     }
 
+    /// Where a node is at `time_s`, or would be if it were present.
+    pub(super) fn place(&self, node: NodeId, time_s: f64) -> Pose {
+        self.upward(node).fold(Pose::IDENTITY, |pose, n| n.local_pose(time_s) * pose)
+    }
+
+    /// The times between which anything moves: nothing does before the first and after the last.
+    pub(super) fn span_s(&self) -> [f64; 2] {
+        let slides = self.nodes.iter().filter_map(|n| n.translation_track.as_ref());
+        let turns = self.nodes.iter().filter_map(|n| n.rotation_track.as_ref());
+        let times = slides.flat_map(|t| &t.times_s).chain(turns.flat_map(|t| &t.times_s));
+        times.fold([0.0, self.duration_s], |[from, to], &t| [t.min(from), t.max(to)])
+    }
+
     /// The node, its parent, and so on up to the root.
     pub(super) fn upward(&self, node: NodeId) -> impl Iterator<Item = &Node> + '_ {
         let get = |id: NodeId| &self.nodes[id.0 as usize];

@@ -9,7 +9,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::{Material, MaterialId, Note, Scene, Severity};
 
 mod shape;
-mod topology;
 
 /// Reflectances from here on are reported: real paints stay below.
 const REFLECTANCE_HIGH: f64 = 0.95;

@@ -6,8 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DVec2, DVec3};
 
-use super::topology::Topology;
 use super::{listed, note};
+use crate::scene::topology::Topology;
 use crate::scene::{Note, Scene, Severity};
 
 /// Adds what is wrong with the shape at time 0.
@@ -32,7 +32,7 @@ fn bent(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
     let mut counts: BTreeMap<&str, (usize, f64)> = BTreeMap::new();
     for group in &topology.sides {
         let [one, two] = group[..] else { continue };
-        let patch = |side: &super::topology::Side| {
+        let patch = |side: &crate::scene::topology::Side| {
             &scene.patches[topology.polygons[side.polygon as usize].patch.0 as usize]
         };
         let (a, b) = (patch(&one), patch(&two));

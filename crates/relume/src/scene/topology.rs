@@ -6,8 +6,8 @@
 
 use glam::DVec3;
 
-use crate::scene::weld::Weld;
-use crate::scene::{BodyId, PatchId, Scene};
+use super::weld::Weld;
+use super::{BodyId, PatchId, Scene};
 
 /// Share of the scene's diagonal below which two corners are one.
 const WELD: f64 = 1e-6;
@@ -62,7 +62,7 @@ impl Topology {
     }
 }
 
-fn sides_of(polygons: &[Polygon]) -> Vec<Side> {
+pub(super) fn sides_of(polygons: &[Polygon]) -> Vec<Side> {
     let mut sides = Vec::new();
     for (number, polygon) in polygons.iter().enumerate() {
         let n = polygon.corners.len();
@@ -76,9 +76,9 @@ fn sides_of(polygons: &[Polygon]) -> Vec<Side> {
     sides
 }
 
-/// Groups sides that join the same points; what is left alone is cut where corners lie on it and
+/// Groups sides that join the same points in the order of those; what is left alone is cut where corners lie on it and
 /// tried again.
-fn matched(points: &[DVec3], tolerance: f64, sides: Vec<Side>) -> Vec<Vec<Side>> {
+pub(super) fn matched(points: &[DVec3], tolerance: f64, sides: Vec<Side>) -> Vec<Vec<Side>> {
     let (mut groups, alone): (Vec<_>, Vec<_>) =
         grouped(sides).into_iter().partition(|g| g.len() > 1);
     let alone: Vec<Side> = alone.into_iter().flatten().collect();
@@ -86,7 +86,7 @@ fn matched(points: &[DVec3], tolerance: f64, sides: Vec<Side>) -> Vec<Vec<Side>>
     groups
 }
 
-fn grouped(mut sides: Vec<Side>) -> Vec<Vec<Side>> {
+pub(super) fn grouped(mut sides: Vec<Side>) -> Vec<Vec<Side>> {
     let key = |s: &Side| (s.start.min(s.end), s.start.max(s.end));
     sides.sort_by_key(|s| (key(s), s.polygon));
     sides.chunk_by(|a, b| key(a) == key(b)).map(<[Side]>::to_vec).collect()
@@ -134,7 +134,7 @@ fn widest_axis(points: impl Iterator<Item = DVec3>) -> usize {
 }
 
 /// Numbers what hangs together along sides, in the order of the first polygon.
-fn components(polygons: usize, sides: &[Vec<Side>]) -> Vec<u32> {
+pub(super) fn components(polygons: usize, sides: &[Vec<Side>]) -> Vec<u32> {
     let mut parent: Vec<u32> = (0..polygons as u32).collect();
     fn root(parent: &mut [u32], mut p: u32) -> u32 {
         while parent[p as usize] != p {

@@ -7,6 +7,8 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
+use super::shell;
+use super::topology::Polygon;
 use super::weld::Weld;
 use super::{BodyId, Scene};
 
@@ -101,6 +103,20 @@ impl Scene {
         };
         // What is thinner than the tolerance has no sides to meet others along.
         let faces: Vec<Face> = one_sided().map(face).filter(|f| f.corners.len() > 2).collect();
+        let polygon = |f: &Face| Polygon {
+            patch: super::PatchId(f.patch),
+            two_sided: false,
+            corners: f.corners.clone(),
+        };
+        let polygons: Vec<Polygon> = faces.iter().map(polygon).collect();
+        for group in shell::closed(&weld, &polygons) {
+            if group.iter().all(|m| !m.turned) {
+                let members = group.iter().map(|m| &faces[m.polygon as usize]);
+                let volume = members.clone().map(|face| face.cone(&weld)).sum::<f64>();
+                let enclosure = if volume > 0.0 { Enclosure::Body } else { Enclosure::Space };
+                members.for_each(|f| out.enclosures[f.patch as usize] = enclosure);
+            }
+        }
         for group in closed(&faces) {
             let group: Vec<&Face> = group.into_iter().map(|f| &faces[f]).collect();
             let volume = group.iter().map(|face| face.cone(&weld)).sum::<f64>();
@@ -344,6 +360,39 @@ mod tests {
             let [p, q] = edge.ends.map(|c| solid.corners[c as usize]);
             let [left, right] = edge.faces.map(|f| solid.faces[f as usize].normal);
             assert!(left.cross(right).dot(q - p) > 0.0, "{edge:?}");
+        }
+    }
+
+    #[test]
+    fn bodies_whose_parts_meet_along_parts_of_sides_enclose_matter_and_such_rooms_space() {
+        let p = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        for inward in [false, true] {
+            let mut b = SceneBuilder::new("step");
+            let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+            let node = b.node("step", None, DVec3::ZERO, DQuat::IDENTITY);
+            let mut add = |mut corners: [DVec3; 4]| {
+                if inward {
+                    corners.reverse();
+                }
+                b.polygon(node, "step", grey, &corners);
+            };
+            // An L: the longer of the two parts of an end meets the shorter along half of its side.
+            let outline = [[0., 0.], [2., 0.], [2., 1.], [1., 1.], [1., 2.], [0., 2.]];
+            let at = |k: usize, z: f64| p(outline[k % 6][0], outline[k % 6][1], z);
+            (0..6).for_each(|k| add([at(k, 0.), at(k + 1, 0.), at(k + 1, 1.), at(k, 1.)]));
+            for (z, turned) in [(0., true), (1., false)] {
+                for mut end in [
+                    [p(0., 0., z), p(1., 0., z), p(1., 2., z), p(0., 2., z)],
+                    [p(1., 0., z), p(2., 0., z), p(2., 1., z), p(1., 1., z)],
+                ] {
+                    if turned {
+                        end.reverse();
+                    }
+                    add(end);
+                }
+            }
+            let wanted = if inward { Enclosure::Space } else { Enclosure::Body };
+            assert_eq!(b.build().unwrap().solids().enclosures, vec![wanted; 10]);
         }
     }
 

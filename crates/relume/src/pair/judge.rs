@@ -10,15 +10,15 @@ use crate::geometry::{Aabb, Plane, no_smaller, shaft_meets_box};
 use crate::scene::{BodyId, LightKind, PatchId};
 use crate::transport::{
     CELLS_MAX, CLIPPED_MAX, Clipping, Exchange, Meeting, SegmentBundle, Shaft, Simd, Visibility,
-    clipping, contact_exchange, exchange, light_at, light_exchange, light_visibility, meeting,
-    visibility,
+    clipping, contact_exchange, exchange_by_points, light_at, light_exchange, light_visibility,
+    meeting, visibility,
 };
 
 use super::brightness::Brightness;
 use super::certificate::SpaceOutlook;
 use super::hash::pair_key;
 use super::margin::{Margin, SideMargin};
-use super::oracle::{End, Oracle, Side, estimate};
+use super::oracle::{End, Estimate, Oracle, Side, estimate};
 use super::outlook::{Finding, Outlook};
 use super::since::Since;
 use super::tree::{Carried, CullReason, Gradients, in_steps};
@@ -184,6 +184,22 @@ fn culled(reason: CullReason) -> Judgement {
     passing(Verdict::Cull(reason), 0)
 }
 
+/// The verdict to refine a side, if there is one to be refined and the error is too large; `way` is how far the light is
+/// from V being found in another way.
+fn refined(
+    e: &Estimate,
+    wish: Option<(Side, SideMargin)>,
+    threshold: f64,
+    way: u16,
+    segments: u32,
+) -> Option<Judgement> {
+    let (side, side_margin) = wish.filter(|_| e.error() > threshold)?;
+    let error = way.min(Margin::between(e.error(), threshold));
+    let both_ways = way != Margin::ENDLESS;
+    let margin = Margin::Refined { error, on: e.larger(), both_ways, side: side_margin };
+    Some(Judgement { margin, ..passing(Verdict::Refine(side), segments) })
+}
+
 /// A verdict to link or to hold, with what the link carries.
 fn carrying(
     verdict: Verdict,
@@ -333,14 +349,37 @@ impl Placed<'_> {
     ) -> Judgement {
         let key = pair_key(self.forest.key(a), self.forest.key(b));
         let in_contact = met == Meeting::Coplanar;
-        let x = match in_contact {
+        let end =
+            |brightness: &Brightness, id, area| End { area, light: brightness.of(self.forest, id) };
+        let mut x = match in_contact {
             true => {
                 contact_exchange(place_a, place_b, shaft.contact_m2(&shaft.blockers(candidates)))
             }
-            false => exchange(self.simd, place_a, place_b, met),
+            false => exchange_by_points(self.simd, place_a, place_b, met),
         };
         if in_contact && x.area_m2 <= 0.0 {
             return culled(CullReason::FacingAway);
+        }
+        // How many times too large the area is that verdicts are first made with.
+        let mut overstated = 1.0;
+        if x.is_steep {
+            // What the smaller area by points is enough to refine needs no better one.
+            if let (Stage::Fine(brightness), Oracle::Error { threshold }) =
+                (self.stage, self.oracle)
+                && shaft.blockers(candidates).is_empty()
+            {
+                let (clear, open) = (Visibility::CLEAR, (f64::INFINITY, f64::INFINITY));
+                let ends = (end(brightness, a, place_a.area), end(brightness, b, place_b.area));
+                let scale = (brightness.reference_area_m2(), threshold);
+                let e = estimate(&x, &clear, (&ends.0, &ends.1), open, f64::INFINITY, scale);
+                let wish = self.wish((a, b), &ends, &e);
+                if let Some(refined) = refined(&e, wish, threshold, Margin::ENDLESS, 0) {
+                    return refined;
+                }
+            }
+            let exact = x.along_outlines(place_a, place_b);
+            overstated = (x.area_m2 / exact.area_m2.max(f64::MIN_POSITIVE)).max(1.0);
+            x = exact;
         }
         let mut firm = Margin::Firm;
         if let (Oracle::FormFactor { epsilon, min_area_m2 }, Stage::Fine(_)) =
@@ -405,25 +444,18 @@ impl Placed<'_> {
             let carrying = carrying(verdict, &x, &v, (place_a, place_b));
             return Judgement { margin: firm, ..carrying };
         };
-        let end = |id, area| End { area, light: brightness.of(self.forest, id) };
-        let ends = (end(a, place_a.area), end(b, place_b.area));
+        let ends = (end(brightness, a, place_a.area), end(brightness, b, place_b.area));
         let shone = shaft.shone_on(&blockers);
         let scale = (brightness.reference_area_m2(), threshold);
         let e = estimate(&x, &v, (&ends.0, &ends.1), shone, shaft.least_m2(&blockers), scale);
         let stake = factor / threshold.max(FINEST);
         let both_ways = way != Margin::ENDLESS;
-        let (better, ahead) = e.side(&ends.0, &ends.1);
-        let wish = self.splittable((a, b), (place_a.area, place_b.area), better);
-        if let Some((side, firm)) = wish
-            && e.error() > threshold
-        {
-            let (error, on) = (way.min(Margin::between(e.error(), threshold)), e.larger());
-            let side_margin = if firm { SideMargin::ENDLESS } else { SideMargin::new(ahead) };
-            let margin = Margin::Refined { error, on, both_ways, side: side_margin };
-            return Judgement { margin, ..passing(Verdict::Refine(side), v.segments) };
+        let wish = self.wish((a, b), &ends, &e);
+        if let Some(refined) = refined(&e, wish, threshold, way, v.segments) {
+            return refined;
         }
         let below = |error: f64| match wish {
-            Some(_) => way.min(Margin::between(threshold, error)),
+            Some(_) => way.min(Margin::between(threshold, (overstated * error).min(threshold))),
             None => way,
         };
         let margin = Margin::Link { on: e.on.map(below), both_ways };
@@ -487,6 +519,18 @@ impl Placed<'_> {
             let (id, area) = if side == Side::A { (a, area_a) } else { (b, area_b) };
             area > min_area && self.forest.can_split(id)
         })
+    }
+
+    /// The side that is to be refined if any is, and how firmly.
+    fn wish(
+        &self,
+        ids: (ElementId, ElementId),
+        (a, b): &(End, End),
+        e: &Estimate,
+    ) -> Option<(Side, SideMargin)> {
+        let (better, ahead) = e.side(a, b);
+        let (side, firm) = self.splittable(ids, (a.area, b.area), better)?;
+        Some((side, if firm { SideMargin::ENDLESS } else { SideMargin::new(ahead) }))
     }
 
     /// The side to refine: the one wished for if it can be, else the other unless it is the smaller; and whether

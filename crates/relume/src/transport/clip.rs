@@ -217,12 +217,7 @@ impl Cutter {
         let target = &Target::new(target);
         for occluder in &occluders.list {
             let start = self.lines.len();
-            let is_met = match &occluder.kind {
-                Kind::Polygon(range, area) => {
-                    self.cast(point, &occluders.corners[range.clone()], *area, target)
-                }
-                Kind::Solid(solid) => self.cast_solid(point, solid, target),
-            };
+            let is_met = self.cast_any(point, occluder, occluders, target);
             if !is_met {
                 self.lines.truncate(start);
             } else if self.lines.len() == start {
@@ -244,26 +239,56 @@ impl Cutter {
         }
     }
 
-    /// Whether one of the occluders hides all of `target` from each of the points.
+    /// Whether `target` falls into parts, by `halvings` halvings at most, each of which one occluder hides from all of
+    /// the points.
+    ///
+    /// The points from which a convex occluder hides a convex part are a convex set: what is hidden from the
+    /// corners of an end is hidden from all of it.
     pub(super) fn hides_from_all(
         &mut self,
         points: &[DVec3],
         target: &[DVec2],
         occluders: &Occluders,
+        halvings: u32,
     ) -> bool {
-        let target = &Target::new(target);
-        occluders.list.iter().any(|occluder| {
+        let bounds = Target::new(target);
+        let hides = |occluder: &Occluder| {
             points.iter().all(|&point| {
                 self.lines.clear();
-                let is_met = match &occluder.kind {
-                    Kind::Polygon(range, area) => {
-                        self.cast(point, &occluders.corners[range.clone()], *area, target)
-                    }
-                    Kind::Solid(solid) => self.cast_solid(point, solid, target),
-                };
-                is_met && self.lines.is_empty()
+                self.cast_any(point, occluder, occluders, &bounds) && self.lines.is_empty()
             })
+        };
+        if occluders.list.iter().any(hides) {
+            return true;
+        }
+        if halvings == 0 {
+            return false;
+        }
+        let across = if bounds.half.x > bounds.half.y { DVec2::X } else { DVec2::Y };
+        let middle = bounds.middle.dot(across);
+        self.sides.clear();
+        self.sides.extend(target.iter().map(|p| p.dot(across) - middle));
+        let (mut one, mut other) = (Vec::new(), Vec::new());
+        split(target, &self.sides, &mut one, |p| other.push(p));
+        [one, other].iter().all(|half| {
+            half.len() < 3 || self.hides_from_all(points, half, occluders, halvings - 1)
         })
+    }
+
+    /// Finds the edges of an occluder's shadow that cross the target; false where it falls beside it.
+    fn cast_any(
+        &mut self,
+        point: DVec3,
+        occluder: &Occluder,
+        all: &Occluders,
+        target: &Target<'_>,
+    ) -> bool {
+        match &occluder.kind {
+            Kind::Polygon(range, area) => {
+                self.cast(point, &all.corners[range.clone()], *area, target)
+            }
+            Kind::Solid(solid) => self.cast_solid(point, solid, target),
+        }
     }
 
     fn lines_of(&self, shadow: usize) -> std::ops::Range<usize> {

@@ -95,6 +95,18 @@ const UNEVEN: f64 = 4.0;
 /// Error: below 0.25 % of the exchange area at worst, 0.05 % typically (see the tests, which sweep
 /// decades of distance and size). Symmetric: both directions of a pair use this one number.
 pub fn exchange(simd: Simd, a: &WorldElement, b: &WorldElement, meeting: Meeting) -> Exchange {
+    let x = exchange_by_points(simd, a, b, meeting);
+    if x.is_steep { x.along_outlines(a, b) } else { x }
+}
+
+/// The same, but of a pair that is steep only about: the smaller of what points of each side find. A tenth of the price
+/// of [`Exchange::along_outlines`], which is to follow where the pair is not refined.
+pub fn exchange_by_points(
+    simd: Simd,
+    a: &WorldElement,
+    b: &WorldElement,
+    meeting: Meeting,
+) -> Exchange {
     let (reach, apart) = (a.radius + b.radius, (b.centre - a.centre).length_squared());
     let beyond = |nearness: f64| meeting == Meeting::Facing && reach * reach <= nearness * apart;
     if !beyond(CLOSE) {
@@ -294,13 +306,10 @@ fn exchange_of_grids(a: &WorldElement, b: &WorldElement) -> Exchange {
     }
 }
 
-/// The closed form from points of each side to the whole of the other; the area from the smaller, or where
-/// that may be wrong from the outlines of both.
+/// The closed form from points of each side to the whole of the other; the area from the smaller side, or where it
+/// may be wrong the smaller area.
 fn close_exchange(simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
-    let slack = a.rounding_m + b.rounding_m;
-    let part =
-        |e: &WorldElement, plane| ConvexPolygon::new(&e.corners[..e.len]).clipped(plane, slack);
-    let (of_a, of_b) = (part(a, &b.plane), part(b, &a.plane));
+    let (of_a, of_b) = facing_parts(a, b);
     if of_a.corners().len() < 3 || of_b.corners().len() < 3 {
         return Exchange::default();
     }
@@ -312,17 +321,37 @@ fn close_exchange(simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
     // Where nearly all of the smaller end is seen, what its edges lose lies between the points.
     let is_full = large > FULL * a.area.min(b.area);
     let is_steep = disagree || is_full || bend > BENT || steep_a || steep_b;
-    let area_m2 = if is_steep {
-        // No more than either has room for.
-        let most = of_a.area().min(of_b.area());
-        let error_max = OUTLINE_ERROR * large.max(1e-3 * most);
-        exchange_along_outlines(of_a.corners(), of_b.corners(), error_max).min(most)
-    } else if no_smaller(b.area, a.area) {
-        from_a
-    } else {
-        from_b
+    let area_m2 = match is_steep {
+        true => small,
+        false if no_smaller(b.area, a.area) => from_a,
+        false => from_b,
     };
     Exchange { area_m2, over_a, over_b, is_steep }
+}
+
+/// The parts of two elements that face each other.
+fn facing_parts(a: &WorldElement, b: &WorldElement) -> (ConvexPolygon, ConvexPolygon) {
+    let slack = a.rounding_m + b.rounding_m;
+    let part =
+        |e: &WorldElement, plane| ConvexPolygon::new(&e.corners[..e.len]).clipped(plane, slack);
+    (part(a, &b.plane), part(b, &a.plane))
+}
+
+impl Exchange {
+    /// With the exchange area as an integral along the outlines of both elements, whatever their distance and shape.
+    ///
+    /// Error: 1e-4 of the exchange area, or 1e-7 of the smaller element's area.
+    pub fn along_outlines(self, a: &WorldElement, b: &WorldElement) -> Exchange {
+        let (of_a, of_b) = facing_parts(a, b);
+        if of_a.corners().len() < 3 || of_b.corners().len() < 3 {
+            return self;
+        }
+        // No more than either has room for.
+        let most = of_a.area().min(of_b.area());
+        let error_max = OUTLINE_ERROR * self.area_m2.max(1e-3 * most);
+        let area_m2 = exchange_along_outlines(of_a.corners(), of_b.corners(), error_max).min(most);
+        Exchange { area_m2, ..self }
+    }
 }
 
 /// Relative difference of what points of both sides find up to which they are right.
@@ -331,8 +360,9 @@ const AGREE: f64 = 2e-3;
 /// Form factor from the smaller end above which points miss what happens along its edges.
 const FULL: f64 = 0.8;
 
-/// Bend over both sides above which points may have missed what is between them, though they agree.
-const BENT: f64 = 0.3;
+/// Bend over both sides above which points may have missed what is between them, though they agree. Of 65,000
+/// pairs of three scenes that agree half are off by 1e-4 below it, one in a hundred by 2e-3.
+const BENT: f64 = 0.75;
 
 /// Relative error of exchange areas along outlines.
 const OUTLINE_ERROR: f64 = 1e-4;

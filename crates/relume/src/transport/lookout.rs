@@ -211,9 +211,8 @@ impl Lookout {
         self.room.looks.points.iter().map(|point| share(point).clamp(0.0, 1.0)).collect()
     }
 
-    /// Whether one occluder alone hides the other end from all of the looker, its rim aside.
-    ///
-    /// The points from which a convex occluder hides a convex target are a convex set: the corners decide.
+    /// Whether the other end, in parts of each of which one occluder hides all, is hidden from all of the looker, its
+    /// rim aside.
     fn is_hidden(&mut self, looker: &WorldElement) -> bool {
         let corners = ConvexPolygon::new(&looker.corners[..looker.len]).clipped(&self.other, 0.0);
         let corners = corners.corners();
@@ -223,7 +222,7 @@ impl Lookout {
         let middle = corners.iter().sum::<DVec3>() / corners.len() as f64;
         let drawn_in = |&c: &DVec3| self.frame.place(c.lerp(middle, DRAWN_IN));
         let points: Vec<DVec3> = corners.iter().map(drawn_in).collect();
-        self.room.cutter.hides_from_all(&points, &self.target, &self.between)
+        self.room.cutter.hides_from_all(&points, &self.target, &self.between, HALVINGS)
     }
 
     fn look(&mut self, part: &WorldElement, cells: u32) -> &Sums {
@@ -351,6 +350,9 @@ const SLIVER: f64 = 1e-4;
 
 /// What four points that see nothing may have overlooked of V, where nothing proves that it is hidden.
 const OVERLOOKED: f64 = 0.3;
+
+/// Halvings of an end of which each part must be hidden by one occluder.
+const HALVINGS: u32 = 5;
 
 /// Share of the way to the middle by which the corners of an end are drawn in, so that none lies in the plane of
 /// what stands on the end.

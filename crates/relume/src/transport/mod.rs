@@ -18,8 +18,8 @@ pub use bend::{Bend, Receiver};
 pub use clip::keep_in_front;
 pub use contact::{InPlane, in_plane, lies_in, overlap_m2};
 pub use exchange::{
-    Exchange, Meeting, Variation, contact_exchange, exchange, exchange_of_points, light_at,
-    light_exchange, meeting,
+    Exchange, Meeting, Variation, contact_exchange, exchange, exchange_by_points,
+    exchange_of_points, light_at, light_exchange, meeting,
 };
 pub use kernel::Simd;
 pub use lookout::{CELLS_MAX, Clipping, FactorPast, Looker, Lookout, form_factor_past};

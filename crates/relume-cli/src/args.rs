@@ -247,9 +247,9 @@ pub(crate) struct DemoArgs {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum DemoScene {
     /// Three walls, a floor, no ceiling, a box, a light moving in the plane of the ceiling:
-    /// 109 frames, Gouraud shaded.
+    /// 109 frames.
     Corridor,
-    /// A closed cubical room, a light circling below the ceiling: 20 frames, flat shaded.
+    /// A closed cubical room, a light circling below the ceiling: 20 frames.
     Room,
 }
 

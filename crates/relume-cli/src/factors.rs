@@ -135,7 +135,7 @@ fn judge(args: &FactorsArgs, format: FactorFormat, clip: &Clip) -> Result<(), Fa
 
 /// Warnings about the scene, and names that were made unique.
 fn say(scene: &Scene, things: &Things, by: By) {
-    scene_file::warn_but_for(scene, &["nothing-emits"]);
+    scene_file::warn_but_for(scene, &["nothing-emits", "light-lost"]);
     if by != By::Body || things.environment != ENVIRONMENT {
         let renamed = scene.notes.iter().filter(|note| note.code == "renamed");
         renamed.for_each(|note| output::complain(&scene_file::line(note)));

@@ -3,8 +3,13 @@
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use crate::failure::Failure;
+
+/// How often, and how far apart, the number of the run that holds a lock is looked for.
+const LOOKS: u32 = 100;
+const BETWEEN_LOOKS: Duration = Duration::from_millis(10);
 
 /// Held while a run writes into a folder. The system lets go of it when the process ends, however it
 /// does; the file that is left behind then locks nothing.
@@ -48,9 +53,16 @@ impl Drop for Lock {
 
 fn taken(dir: &Path, file: &mut File) -> Failure {
     let mut number = String::new();
-    let who = match file.read_to_string(&mut number) {
-        Ok(1..) => format!("process {}", number.trim()),
-        _ => "another process".to_owned(),
+    // Who has only just taken it may not have written its number yet.
+    for _ in 0..LOOKS {
+        if !matches!(file.read_to_string(&mut number), Ok(0)) {
+            break;
+        }
+        std::thread::sleep(BETWEEN_LOOKS);
+    }
+    let who = match number.trim() {
+        "" => "another process".to_owned(),
+        number => format!("process {number}"),
     };
     Failure::new(format_args!("{who} is writing to {}", dir.display()))
         .help("wait for it to end, or choose another directory with -o")

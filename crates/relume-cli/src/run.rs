@@ -54,7 +54,7 @@ pub(crate) fn demo(args: DemoArgs) -> Result<(), Failure> {
         scene: path,
         dir: Some(dir),
         tolerance: demo.tolerance,
-        picture: Some((args.picture.shading.unwrap_or(demo.shading), args.picture)),
+        picture: Some((args.picture.shading.unwrap_or(Shading::Gouraud), args.picture)),
         solve: args.solve,
     };
     job.run()

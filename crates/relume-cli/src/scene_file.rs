@@ -39,17 +39,22 @@ pub(crate) fn failure(error: SceneError) -> Failure {
 }
 
 /// Says on stderr, before a scene is solved, what was noticed while reading, unless it is merely
-/// worth knowing, and what `relume check` would call an error or an overlap.
+/// worth knowing, and what `relume check` would call an error, an overlap or a
+/// light that lights nothing.
 pub(crate) fn warn(scene: &Scene) {
     warn_but_for(scene, &[]);
 }
+
+/// What `relume check` finds that is said before a scene is solved, errors aside.
+const SAID_BEFORE: [&str; 2] = ["overlap", "light-lost"];
 
 /// The same but for some codes that do not matter for what is to be done.
 pub(crate) fn warn_but_for(scene: &Scene, codes: &[&str]) {
     let read = scene.notes.iter().filter(|note| note.severity > Severity::Info).cloned();
     let found = check(scene)
         .into_iter()
-        .filter(|note| note.severity == Severity::Error || note.code == "overlap");
+        .filter(|note| note.severity > Severity::Info)
+        .filter(|note| note.severity == Severity::Error || SAID_BEFORE.contains(&note.code));
     for note in read.chain(found).filter(|note| !codes.contains(&note.code)) {
         // The run goes on, so it is no more than a warning here.
         output::complain(&line(&Note { severity: Severity::Warning, ..note }));

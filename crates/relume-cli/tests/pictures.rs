@@ -56,7 +56,7 @@ fn a_demonstration_writes_scene_pictures_and_report() {
     let report = report(dir.path());
     assert_eq!(frames_of(&report), [0, 1, 2]);
     assert_eq!(report["options"]["picture"]["size"], "64x48");
-    assert_eq!(report["options"]["picture"]["shading"], "flat");
+    assert_eq!(report["options"]["picture"]["shading"], "gouraud");
     assert!(report["options"]["picture"]["exposure_ev"].is_f64());
     let png = fs::read(dir.path().join("frame-0001.png")).unwrap();
     assert_eq!(&png[1..4], b"PNG");
@@ -84,7 +84,7 @@ fn part_matches_whole(how: &[&str]) {
     succeeded(&relume(&[&demo[..], &scratch].concat()));
     let scene = format!("{whole}/room.glb");
     // Frame 6 alone: the exposure is still that of frame 0.
-    let render = ["render", &scene, "-o", &part, "--frames", "6", "--shading", "flat"];
+    let render = ["render", &scene, "-o", &part, "--frames", "6"];
     succeeded(&relume(&[&render[..], &scratch].concat()));
     let picture = |dir: &str| fs::read(format!("{dir}/frame-0006.png")).unwrap();
     assert!(picture(&whole) == picture(&part), "the pictures differ");
@@ -146,10 +146,10 @@ fn resuming_makes_what_is_missing_and_nothing_else() {
     assert_eq!(relume(&small).status.code(), Some(1));
     assert!(fs::read(dir.path().join("report.json")).unwrap() == before);
 
-    let refused = relume(&[&demo[..], &["0-2", "--shading", "gouraud"]].concat());
+    let refused = relume(&[&demo[..], &["0-2", "--shading", "flat"]].concat());
     assert_eq!(refused.status.code(), Some(1));
     let message = String::from_utf8(refused.stderr).unwrap();
-    assert!(message.contains("shading was flat and is gouraud now"), "{message}");
+    assert!(message.contains("shading was gouraud and is flat now"), "{message}");
 }
 
 #[test]

@@ -275,3 +275,34 @@ fn wild_values_and_places_do_not_panic() {
         }
     }
 }
+
+/// Of surfaces in one plane the smaller is seen, in whatever order they come and however far the view is
+/// turned: that is how they are lit.
+#[test]
+fn a_lamp_in_the_plane_of_the_ceiling_is_seen() {
+    for lamp_first in [false, true] {
+        let mut scene = empty();
+        let (grey, glow) =
+            (material(&mut scene, [0.5; 3], 0.0), material(&mut scene, [0.0; 3], 1.0));
+        let square = |h: f64| vec![v(-h, 0.3, -h), v(h, 0.3, -h), v(h, 0.3, h), v(-h, 0.3, h)];
+        let mut polygons = vec![(square(2.0), grey), (square(0.5), glow)];
+        if lamp_first {
+            polygons.reverse();
+        }
+        body(&mut scene, &polygons);
+        let snapshot =
+            snapshot(&scene, uneven, |_, _, m| if m.exitance[0] > 0.0 { [1.0; 3] } else { GREY });
+        for k in 0..12 {
+            let angle = f64::from(k) * 0.5;
+            let eye = v(1.3 * angle.cos(), -0.4 - 0.1 * f64::from(k), 1.7 * angle.sin());
+            let view = View::look_at(eye, v(0.0, 0.3, 0.0), 0.4);
+            for projection in [view.projection, Projection::Orthographic { xmag: 0.3, ymag: 0.2 }] {
+                let view = View { projection, ..view };
+                let image = render(&snapshot, &view, &settings(Shading::Gouraud));
+                for (x, y) in [(100, 75), (95, 70), (104, 78)] {
+                    assert_eq!(image.pixel(x, y), [255; 3], "view {k} at {x}, {y}");
+                }
+            }
+        }
+    }
+}

@@ -1,8 +1,9 @@
 //! A snapshot as an ordered list of things to draw.
 //!
-//! Must not know how pixels are made or how radiosity becomes a colour. Order: patches by id,
-//! leaves (or triangles) in order within, then their outlines; it decides between equally near
-//! things, so it must not depend on threads.
+//! Must not know how pixels are made or how radiosity becomes a colour. Order: patches by
+//! area, the smallest first, then by id; leaves (or triangles) in order within, then their outlines. It
+//! decides between equally near things: of surfaces in one plane the smaller is seen, as in the solution. It
+//! must not depend on threads.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -73,9 +74,16 @@ impl Drawing {
                 PatchDrawing::new(snapshot, PatchId(i), projector, grid, near, shading, outlines)
             })
             .collect();
+        let mut seen: Vec<(usize, PatchDrawing)> = of_patches
+            .into_iter()
+            .enumerate()
+            .filter_map(|(i, patch)| patch.map(|patch| (i, patch)))
+            .collect();
+        // In single precision without its last digits: areas that rounding sets apart are equal.
+        let area = |i: usize| (snapshot.scene.patches[i].area_m2() as f32).to_bits() >> 4;
+        seen.sort_by_cached_key(|&(i, _)| area(i));
         let mut drawing = Drawing::default();
-        for (i, patch) in of_patches.into_iter().enumerate() {
-            let Some(patch) = patch else { continue };
+        for (i, patch) in seen {
             let plane = drawing.planes.len() as u32;
             drawing.planes.push(patch.plane);
             for (primitive, mut fill) in patch.pieces {

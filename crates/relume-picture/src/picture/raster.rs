@@ -2,7 +2,7 @@
 //!
 //! Must not know what a primitive is a picture of. The result depends on the order of the
 //! primitives and on nothing else: tiles are independent, and within a tile primitives are drawn
-//! in order, the earlier one winning where two are equally near. So the bits are the same for
+//! in order, the earlier one winning where two are equally near, up to rounding. So the bits are the same for
 //! every number of threads.
 
 use std::num::NonZeroU32;
@@ -16,6 +16,9 @@ const TILE: usize = 16;
 /// Edges are moved outwards by this much, pixels, so that no sample falls between neighbours
 /// whose common edge is rounded differently (T-vertices, single-precision input).
 const OVERLAP: f64 = 1.0 / 1024.0;
+
+/// What is nearer by less than this share is as near: rounding of what lies in one plane.
+const AS_NEAR: f32 = 1.0 / 1_048_576.0;
 
 /// Most samples a pixel: they fit the bits of a mask.
 pub(crate) const SAMPLES_MAX: usize = 64;
@@ -209,7 +212,7 @@ struct TileBuffer<'a> {
 impl<'a> TileBuffer<'a> {
     fn new(grid: &'a Grid, x: usize, y: usize) -> Self {
         let count = TILE * TILE * grid.offsets.len();
-        TileBuffer { grid, x, y, nearness: vec![f32::NEG_INFINITY; count], seen: vec![None; count] }
+        TileBuffer { grid, x, y, nearness: vec![f32::MIN / 2.0; count], seen: vec![None; count] }
     }
 
     fn draw(&mut self, index: u32, p: &Primitive) {
@@ -235,7 +238,7 @@ impl<'a> TileBuffer<'a> {
                 // Without branches, so that it is done for several samples at a time.
                 for (s, ((slot, slot_seen), step)) in slots.zip(&steps).enumerate() {
                     let k = (nearness + step).max(low).min(high);
-                    let wins = (mask >> s & 1 == 1) & (k > *slot);
+                    let wins = (mask >> s & 1 == 1) & (k > *slot + slot.abs() * AS_NEAR);
                     *slot = if wins { k } else { *slot };
                     *slot_seen = if wins { seen } else { *slot_seen };
                 }

@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Material, MaterialId, Note, Scene, Severity};
 
+mod blind;
 mod shape;
 
 /// Reflectances from here on are reported: real paints stay below.
@@ -32,15 +33,18 @@ const SUN_HIGH: f64 = 1.4e4;
 /// | `touching` | info | double-sided polygons back to back |
 /// | `non-planar` | info | triangles that are nearly, but not quite, in one plane |
 /// | `reflectance` | warning | a reflectance of 0.95 or more |
+/// | `light-lost` | warning, info | lights and lamps that light nothing: something is in their way; only the inside of what is closed around them |
 /// | `units` | warning | a size or a brightness that suggests a mistaken unit |
 ///
-/// O(n log n) in the number of polygons, where sides are short beside the scene.
+/// O(n log n) in the number of polygons, where sides are short beside the scene, and O(n) for each light:
+/// a ray or a few, a few hundred for those that light nothing.
 pub fn check(scene: &Scene) -> Vec<Note> {
     let mut notes = Vec::new();
     emission(scene, &mut notes);
     reflectance(scene, &mut notes);
     units(scene, &mut notes);
     shape::shape(scene, &mut notes);
+    blind::blind(scene, &mut notes);
     notes.sort_by_key(|n| std::cmp::Reverse(n.severity));
     notes
 }

@@ -299,8 +299,9 @@ fn overlaps(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
     }
     for (name, (count, with)) in found {
         let message = format!(
-            "{count} polygons overlap polygons of {} in one plane (they are coplanar), so light counts twice \
-             where both are; raise one by a millimetre, or cut the other out beneath it",
+            "{count} polygons overlap polygons of {} in one plane and face the same way (they are coplanar): the \
+             smaller is taken to lie on the larger, of equal ones the first; raise by a millimetre what is to be on \
+             top, or cut the other out beneath it",
             listed(&with)
         );
         notes.push(note(Severity::Warning, "overlap", name, count, message));

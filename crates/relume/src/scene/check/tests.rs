@@ -242,3 +242,102 @@ fn a_rug_in_the_plane_of_the_floor_overlaps_it_and_one_above_does_not() {
     assert_eq!(found(&rug(0.0), "overlap").len(), 1);
     assert_eq!(found(&rug(0.001), "overlap"), []);
 }
+
+/// A shade of 0.1 m around a light below the ceiling of the room; one side may be left out.
+fn shaded(double_sided: bool, sides: usize) -> Vec<(Severity, String, usize)> {
+    found(
+        &notes(|b, _, grey| {
+            let paper = b.double_sided_material("paper", [0.5; 3], [0.0; 3]);
+            let shade = b.node("shade", None, O, DQuat::IDENTITY);
+            let (low, high) = (DVec3::new(0.7, 0.6, 0.7), DVec3::new(0.8, 0.7, 0.8));
+            for side in &super::super::builder::cuboid_sides(low, high)[..sides] {
+                b.polygon(shade, "shade", if double_sided { paper } else { grey }, side);
+            }
+            let bulb = b.node("bulb", None, (low + high) / 2.0, DQuat::IDENTITY);
+            b.light("bulb", bulb, LightKind::Point, [1.0; 3]);
+        }),
+        "light-lost",
+    )
+}
+
+#[test]
+fn a_bulb_in_its_closed_shade_is_named_and_in_an_open_one_is_not() {
+    let bulb = |severity| vec![(severity, "bulb".to_owned(), 1)];
+    assert_eq!(shaded(false, 6), bulb(Severity::Warning));
+    // That may be a room.
+    assert_eq!(shaded(true, 6), bulb(Severity::Info));
+    assert_eq!(shaded(false, 5), []);
+    assert_eq!(shaded(true, 5), []);
+}
+
+#[test]
+fn a_sun_outside_a_closed_room_is_named_and_one_through_a_roof_light_is_not() {
+    let sun = |double_sided: bool, window: f64| {
+        let mut b = SceneBuilder::new("s");
+        let grey = match double_sided {
+            true => b.double_sided_material("grey", [0.5; 3], [0.0; 3]),
+            false => b.material("grey", [0.5; 3], [0.0; 3]),
+        };
+        let room = b.node("room", None, O, DQuat::IDENTITY);
+        let all = super::super::builder::cuboid_sides(O, I);
+        for side in all.iter().filter(|side| side.iter().any(|c| c.y == 0.0)) {
+            let mut side = *side;
+            side.reverse();
+            b.polygon(room, "room", grey, &side);
+        }
+        let at = |x: f64, z: f64| DVec3::new(x, 1.0, z);
+        for (from, to) in [(0.0, 0.5 - window / 2.0), (0.5 + window / 2.0, 1.0)] {
+            b.polygon(room, "room", grey, &[at(from, 0.), at(to, 0.), at(to, 1.), at(from, 1.)]);
+        }
+        let crate_ = b.node("crate", None, O, DQuat::IDENTITY);
+        b.cuboid(crate_, "crate", grey, I * 0.1, I * 0.3);
+        let tilt = DQuat::from_xyzw(-1.0, 0.1, 0.05, 1.0).normalize();
+        let node = b.node("sun", None, O, tilt);
+        b.light("sun", node, LightKind::Directional, [1.0; 3]);
+        found(&check(&b.build().unwrap()), "light-lost")
+    };
+    let named = vec![(Severity::Warning, "sun".to_owned(), 1)];
+    assert_eq!(sun(true, 0.0), named);
+    assert_eq!(sun(false, 0.0), named);
+    assert_eq!(sun(true, 0.1), []);
+    assert_eq!(sun(false, 0.1), []);
+}
+
+#[test]
+fn a_lamp_just_above_the_ceiling_is_named_and_one_below_or_beside_is_not() {
+    // The lamp faces down; the ceiling is seen from both sides.
+    let lamp = |height: f64, x: f64, rises: bool| {
+        let mut b = SceneBuilder::new("s");
+        let grey = b.double_sided_material("grey", [0.5; 3], [0.0; 3]);
+        let glow = b.material("glow", [0.0; 3], [10.0; 3]);
+        let room = b.node("room", None, O, DQuat::IDENTITY);
+        b.cuboid(room, "walls", grey, O, I);
+        let lamp = b.node("lamp", None, DVec3::new(x, height, 0.5), DQuat::IDENTITY);
+        let at = |x: f64, z: f64| DVec3::new(x * 0.1, 0.0, z * 0.1);
+        b.polygon(lamp, "lamp", glow, &[at(0., 0.), at(1., 0.), at(1., 1.), at(0., 1.)]);
+        let floor = b.node("ground", None, O, DQuat::IDENTITY);
+        let at = |x: f64, z: f64| DVec3::new(x, -1.0, z) * 9.0;
+        b.polygon(floor, "ground", grey, &[at(-1., -1.), at(-1., 1.), at(1., 1.), at(1., -1.)]);
+        if rises {
+            let place = |y: f64| DVec3::new(x, y, 0.5);
+            b.animate_translation(
+                lamp,
+                crate::scene::Track {
+                    times_s: vec![0.0, 1.0],
+                    values: vec![place(height), place(height + 1.0)],
+                    interpolation: crate::scene::Interpolation::Linear,
+                },
+            );
+        }
+        let mut lost = found(&check(&b.build().unwrap()), "light-lost");
+        lost.retain(|note| note.0 > Severity::Info);
+        lost
+    };
+    let named = vec![(Severity::Warning, "lamp".to_owned(), 1)];
+    assert_eq!(lamp(1.001, 0.5, false), named);
+    assert_eq!(lamp(0.999, 0.5, false), []);
+    assert_eq!(lamp(1.0, 0.5, false), []);
+    assert_eq!(lamp(1.001, 1.5, false), []);
+    // It is lifted off later.
+    assert_eq!(lamp(1.001, 0.5, true), []);
+}

@@ -775,4 +775,23 @@ mod tests {
         assert_eq!(visibility(&a, &b, &[blocker(1.0, 2.0, 3.0)]).value, 1.0);
         assert_eq!(visibility(&a, &b, &[blocker(2.5, 0.0, 1.0)]).value, 1.0);
     }
+
+    #[test]
+    fn what_two_occluders_hide_together_is_proven_hidden_without_more_points() {
+        let (a, b) = (square(0.0, -0.5, 0.5, true), square(2.0, -0.5, 0.5, false));
+        // Either hides some more than half of the other end from all of this one.
+        let strip = |lo: f64, hi: f64| {
+            [(lo, -9.0), (hi, -9.0), (hi, 9.0), (lo, 9.0)].map(|(x, y)| DVec3::new(x, y, 1.9))
+        };
+        let look = |strips: [[DVec3; 4]; 2]| {
+            let mut polygons = Between::default();
+            strips.iter().for_each(|c| polygons.push(c.iter().copied(), DVec3::Z, None));
+            Clipping::new(Simd::detect(), (&a, &b), &polygons).first_look(0.0).0
+        };
+        let hidden = look([strip(-9.0, 0.1), strip(-0.1, 9.0)]);
+        assert_eq!((hidden.value, hidden.segments), (0.0, 4));
+        // A slit that no point looks through.
+        let slit = look([strip(-9.0, -1e-7), strip(1e-7, 9.0)]);
+        assert!(slit.segments > 4, "{slit:?}");
+    }
 }

@@ -7,8 +7,10 @@ use std::time::Duration;
 
 use crate::failure::Failure;
 
-/// How often, and how far apart, the number of the run that holds a lock is looked for.
+/// How often the number of the run that holds a lock is looked for, at most.
 const LOOKS: u32 = 100;
+
+/// Time between two of these looks.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(10);
 
 /// Held while a run writes into a folder. The system lets go of it when the process ends, however it

@@ -99,8 +99,10 @@ pub fn exchange(simd: Simd, a: &WorldElement, b: &WorldElement, meeting: Meeting
     if x.is_steep { x.along_outlines(a, b) } else { x }
 }
 
-/// The same, but of a pair that is steep only about: the smaller of what points of each side find. A tenth of the price
-/// of [`Exchange::along_outlines`], which is to follow where the pair is not refined.
+/// Exchange area of two elements that meet as `meeting` says, m2, from points alone.
+///
+/// Error: that of [`exchange`] unless the pair is steep. Then it is the smaller of what points of each side find, of no
+/// stated error: enough to refine the pair; else [`Exchange::along_outlines`] is to follow.
 pub fn exchange_by_points(
     simd: Simd,
     a: &WorldElement,
@@ -360,8 +362,8 @@ const AGREE: f64 = 2e-3;
 /// Form factor from the smaller end above which points miss what happens along its edges.
 const FULL: f64 = 0.8;
 
-/// Bend over both sides above which points may have missed what is between them, though they agree. Of 65,000
-/// pairs of three scenes that agree half are off by 1e-4 below it, one in a hundred by 2e-3.
+/// Bend over both sides above which points may have missed what is between them, though they agree. Of 52,000 pairs of
+/// three scenes with a bend from 0.3 to this, half are off by less than 1e-4, one in a hundred by 1e-3 to 3e-3.
 const BENT: f64 = 0.75;
 
 /// Relative error of exchange areas along outlines.

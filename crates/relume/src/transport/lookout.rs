@@ -310,8 +310,8 @@ impl<'a> Clipping<'a> {
     /// overlooked something. Where all four are behind the other's plane there are more. Measured on 47,000
     /// links of three scenes (docs/exchange.md).
     ///
-    /// Where all points see nothing though no occluder alone hides all of the other end, there are more of them
-    /// too, while what they may overlook is above `error_max`, in V.
+    /// Where all points see nothing though it is not proven that occluders hide all of the other end, there are more of
+    /// them too, while what they may overlook is above `error_max`, in V.
     pub fn first_look(&mut self, error_max: f64) -> (Visibility, f64) {
         let mut v = self.visibility(1);
         let mut cells = 1;

@@ -2,7 +2,7 @@
 //! segments they block.
 
 use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldView};
-use crate::geometry::{Aabb, Plane, Pose, shaft_meets_box};
+use crate::geometry::{Aabb, Convex, Plane, Pose, are_apart, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
 use super::clip::keep_in_front;
@@ -80,6 +80,25 @@ const COVER: f64 = 0.5;
 /// disregarded because it is close to an end.
 const LIFT: f64 = 8.0;
 
+/// Distance from the hull of both ends, in slacks, up to which a polygon may block: what is lifted may get
+/// into it.
+const NEAR: f64 = 2.0 * LIFT;
+
+/// The same where the tests are wider.
+const NEAR_WIDE: f64 = 2.0 * NEAR;
+
+/// Whether a thing with a middle is farther than `within_m` from the convex hull of two elements.
+fn is_beside<C: Convex + ?Sized>(
+    (a, b): (&WorldElement, &WorldElement),
+    (thing, middle): (&C, DVec3),
+    within_m: f64,
+) -> bool {
+    let (from, along) = (middle - a.centre, b.centre - a.centre);
+    let t = from.dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
+    let towards = along * t.clamp(0.0, 1.0) - from;
+    are_apart(&(&a.corners[..], &b.corners[..]), thing, towards, within_m)
+}
+
 /// A polygon, moved.
 struct Lifted<'a> {
     polygon: OccluderPolygon<'a>,
@@ -127,29 +146,30 @@ impl<'a> Shaft<'a> {
             (self.view.occluder(patch), self.view.fixed_box(root))
         };
         // The margin: what covers an end may lie a little behind it.
-        let (slack, margin) = match test {
-            Test::Exact => (self.slack(), COVER * self.slack()),
-            Test::Wide => (0.5 * self.slack(), 1.5 * COVER * self.slack()),
+        let (slack, margin, near) = match test {
+            Test::Exact => (self.slack(), COVER * self.slack(), NEAR * self.slack()),
+            Test::Wide => (0.5 * self.slack(), 1.5 * COVER * self.slack(), NEAR_WIDE * self.slack()),
         };
         if !shaft_meets_box(&a.bounds, &b.bounds, &bounds.grown(margin)) {
             return false;
         }
         let behind =
             |e: &WorldElement| occluder.corners.iter().all(|&c| e.plane.distance(c) <= slack);
+        let is_beside = || is_beside((a, b), (occluder.corners, bounds.centre()), near);
         let (on_a, on_b) = self.covered(patch, &occluder, (a, b), margin);
         if on_a || on_b {
             // What two ends in contact exchange is found within their plane.
             if self.is_contact() {
-                return true;
+                return !is_beside();
             }
-            return if on_a { !behind(b) } else { !behind(a) };
+            return !(if on_a { behind(b) } else { behind(a) }) && !is_beside();
         }
         let (a_lo, a_hi) = a.span(&occluder.plane);
         let (b_lo, b_hi) = b.span(&occluder.plane);
         if a_lo.min(b_lo) >= -slack || a_hi.max(b_hi) <= slack {
             return false;
         }
-        !behind(a) && !behind(b)
+        !behind(a) && !behind(b) && !is_beside()
     }
 
     /// For each end the width (area over length, m) of the narrowest blocker that emits light at any time and shines
@@ -341,7 +361,9 @@ impl<'a> Shaft<'a> {
         let body = self.forest.cluster_body(id);
         let (own, a, b) = self.seen_by(body);
         let bounds = if own { self.view.box_in_body(id) } else { world };
-        if !shaft_meets_box(&a.bounds, &b.bounds, &bounds.grown(self.slack())) {
+        if !shaft_meets_box(&a.bounds, &b.bounds, &bounds.grown(self.slack()))
+            || is_beside((a, b), (bounds, bounds.centre()), NEAR_WIDE * self.slack())
+        {
             return true;
         }
         // Groups of bodies are never kept: their boxes mix frames.

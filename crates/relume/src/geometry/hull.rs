@@ -46,19 +46,19 @@ const STEPS: usize = 48;
 /// Share of the distance below which a step brings nothing.
 const SETTLED: f64 = 1e-9;
 
-/// Whether two convex sets are farther apart than `margin_m`: never said where they are not, up to rounding (some 1e-16 of
-/// their coordinates).
+/// A distance that two convex sets are at least apart, metres: more than `margin_m` if they are, else 0. Never too large, up to
+/// rounding (some 1e-16 of their coordinates).
 ///
 /// `towards` points from `b` to `a`; the better it points across the gap, the fewer steps.
 /// Source: Gilbert, Johnson & Keerthi 1988; each step looks at the two from another direction, the shortest difference known,
 /// and ends if there is a gap. Some 20 ns where the first direction shows one, 300 ns where the two meet.
 #[inline]
-pub fn are_apart<A: Convex + ?Sized, B: Convex + ?Sized>(
+pub fn gap_m<A: Convex + ?Sized, B: Convex + ?Sized>(
     a: &A,
     b: &B,
     towards: DVec3,
     margin_m: f64,
-) -> bool {
+) -> f64 {
     let mut simplex = Simplex { points: [DVec3::ZERO; 4], len: 0 };
     let mut shortest = towards;
     for _ in 0..STEPS {
@@ -66,17 +66,17 @@ pub fn are_apart<A: Convex + ?Sized, B: Convex + ?Sized>(
         let next = a.farthest(-shortest) - b.farthest(shortest);
         let along = shortest.dot(next);
         if along > 0.0 && along * along > margin_m * margin_m * length2 {
-            return true;
+            return along / length2.sqrt();
         }
         if simplex.len > 0 && length2 - along <= SETTLED * length2 {
-            return false;
+            return 0.0;
         }
         match simplex.with(next) {
             Some(closest) if closest.length_squared() > margin_m * margin_m => shortest = closest,
-            _ => return false,
+            _ => return 0.0,
         }
     }
-    false
+    0.0
 }
 
 /// Up to four differences of points.

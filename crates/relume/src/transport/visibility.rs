@@ -2,7 +2,7 @@
 //! segments they block.
 
 use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldView};
-use crate::geometry::{Aabb, Convex, Plane, Pose, are_apart, shaft_meets_box};
+use crate::geometry::{Aabb, Plane, Pose, Sweep, gap_m, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
 use super::clip::keep_in_front;
@@ -63,16 +63,6 @@ pub struct Shaft<'a> {
     pub patches: (PatchId, PatchId),
 }
 
-/// How strict a test of a shaft is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Test {
-    /// What counts: a blocker of a pair passes this test for the pair itself.
-    Exact,
-    /// A little wider, by less than the slack: what passes the exact test for a pair passes this one
-    /// for the pair and for every pair above it, in spite of rounding.
-    Wide,
-}
-
 /// Distance from an end's plane, in slacks, within which a polygon lies on it.
 const COVER: f64 = 0.5;
 
@@ -87,16 +77,30 @@ const NEAR: f64 = 2.0 * LIFT;
 /// The same where the tests are wider.
 const NEAR_WIDE: f64 = 2.0 * NEAR;
 
-/// Whether a thing with a middle is farther than `within_m` from the convex hull of two elements.
-fn is_beside<C: Convex + ?Sized>(
-    (a, b): (&WorldElement, &WorldElement),
-    (thing, middle): (&C, DVec3),
-    within_m: f64,
-) -> bool {
-    let (from, along) = (middle - a.centre, b.centre - a.centre);
-    let t = from.dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
-    let towards = along * t.clamp(0.0, 1.0) - from;
-    are_apart(&(&a.corners[..], &b.corners[..]), thing, towards, within_m)
+/// How a patch stands to a shaft.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Standing {
+    /// It blocks neither this pair nor any below it.
+    Out,
+    /// It may be a blocker of a pair below this one.
+    Beside,
+    /// It counts as a blocker of this very pair.
+    Between,
+}
+
+/// The two ends in the frame in which a body is looked at, and their boxes' shaft.
+#[derive(Clone, Copy)]
+struct Frame<'a> {
+    own: bool,
+    a: &'a WorldElement,
+    b: &'a WorldElement,
+    sweep: &'a Sweep,
+}
+
+/// Shafts of the ends' boxes: in the world, and in the frame of the body that both ride on.
+struct Sweeps {
+    world: Sweep,
+    own: Option<Sweep>,
 }
 
 /// A polygon, moved.
@@ -119,6 +123,40 @@ impl<'a> Lifted<'a> {
     }
 }
 
+/// Distances of a polygon's corners from a plane: smallest and largest, metres.
+#[inline]
+fn span(polygon: &OccluderPolygon<'_>, plane: &Plane) -> (f64, f64) {
+    let with = |(lo, hi): (f64, f64), &c: &DVec3| {
+        let d = plane.distance(c);
+        (lo.min(d), hi.max(d))
+    };
+    polygon.corners.iter().fold((f64::INFINITY, f64::NEG_INFINITY), with)
+}
+
+/// How far two elements reach to either side of a plane, the smaller of both, metres; negative where they
+/// stay away from it.
+#[inline]
+fn reach(plane: &Plane, a: &WorldElement, b: &WorldElement) -> f64 {
+    let ((a_lo, a_hi), (b_lo, b_hi)) = (a.span(plane), b.span(plane));
+    (-a_lo.min(b_lo)).min(a_hi.max(b_hi))
+}
+
+/// A distance that a polygon is at least away from the convex hull of two elements, metres: 0 unless that is more
+/// than `margin_m`.
+fn gap_to_hull(
+    (a, b): (&WorldElement, &WorldElement),
+    polygon: &OccluderPolygon<'_>,
+    margin_m: f64,
+) -> f64 {
+    // From what of the polygon to where on the axis it is worth looking first.
+    let corners = polygon.corners;
+    let from = (corners[0] + corners[1] + corners[2]) / 3.0 - a.centre;
+    let along = b.centre - a.centre;
+    let t = from.dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
+    let towards = along * t.clamp(0.0, 1.0) - from;
+    gap_m(&(&a.corners[..], &b.corners[..]), corners, towards, margin_m)
+}
+
 impl<'a> Shaft<'a> {
     fn slack(&self) -> f64 {
         self.a.rounding_m + self.b.rounding_m
@@ -133,43 +171,82 @@ impl<'a> Shaft<'a> {
         }
     }
 
+    fn sweeps(&self) -> Sweeps {
+        Sweeps {
+            world: Sweep::new(&self.a.bounds, &self.b.bounds),
+            own: self.own.map(|(_, a, b)| Sweep::new(&a.bounds, &b.bounds)),
+        }
+    }
+
+    fn frame<'s>(&'s self, sweeps: &'s Sweeps, body: Option<BodyId>) -> Frame<'s> {
+        let (own, a, b) = self.seen_by(body);
+        let sweep = if own { sweeps.own.as_ref() } else { None }.unwrap_or(&sweeps.world);
+        Frame { own, a, b, sweep }
+    }
+
     /// Whether a patch could block any segment.
-    fn may_be_blocked_by(&self, patch: PatchId, test: Test) -> bool {
+    fn standing(&self, sweeps: &Sweeps, patch: PatchId) -> Standing {
         if patch == self.patches.0 || patch == self.patches.1 || self.view.is_hidden_twin(patch) {
-            return false;
+            return Standing::Out;
         }
         let root = self.forest.patch_root(patch);
-        let (own, a, b) = self.seen_by(Some(self.view.patch(patch).body));
+        let Frame { own, a, b, sweep } =
+            self.frame(sweeps, Some(self.view.patch(patch).body));
         let (occluder, bounds) = if own {
             (self.view.occluder_in_body(patch), self.view.box_in_body(root))
         } else {
             (self.view.occluder(patch), self.view.fixed_box(root))
         };
-        // The margin: what covers an end may lie a little behind it.
-        let (slack, margin, near) = match test {
-            Test::Exact => (self.slack(), COVER * self.slack(), NEAR * self.slack()),
-            Test::Wide => (0.5 * self.slack(), 1.5 * COVER * self.slack(), NEAR_WIDE * self.slack()),
-        };
-        if !shaft_meets_box(&a.bounds, &b.bounds, &bounds.grown(margin)) {
-            return false;
+        let slack = self.slack();
+        // The margins: what covers an end may lie a little behind it.
+        let (margin, wide_margin) = (COVER * slack, 1.5 * COVER * slack);
+        if !sweep.meets(bounds, wide_margin) {
+            return Standing::Out;
         }
-        let behind =
-            |e: &WorldElement| occluder.corners.iter().all(|&c| e.plane.distance(c) <= slack);
-        let is_beside = || is_beside((a, b), (occluder.corners, bounds.centre()), near);
-        let (on_a, on_b) = self.covered(patch, &occluder, (a, b), margin);
+        let (above_a, above_b) = (span(&occluder, &a.plane), span(&occluder, &b.plane));
+        let is_near = |(lo, hi): (f64, f64)| lo >= -wide_margin && hi <= wide_margin;
+        let (passes_wide, passes) = if is_near(above_a) || is_near(above_b) {
+            let behind = (above_a.1, above_b.1);
+            let blocks = |slack, margin| self.blocks(patch, &occluder, (a, b), behind, (slack, margin));
+            (blocks(0.5 * slack, wide_margin), blocks(slack, margin))
+        } else {
+            // The same without a look at what covers an end.
+            let height = above_a.1.min(above_b.1);
+            if height <= 0.5 * slack {
+                return Standing::Out;
+            }
+            let reach = reach(&occluder.plane, a, b);
+            (reach > 0.5 * slack, reach > slack && height > slack)
+        };
+        if !passes_wide {
+            return Standing::Out;
+        }
+        let gap = gap_to_hull((a, b), &occluder, NEAR * slack);
+        if gap > NEAR_WIDE * slack {
+            Standing::Out
+        } else if gap > 0.0 || !passes || !sweep.meets(bounds, margin) {
+            Standing::Beside
+        } else {
+            Standing::Between
+        }
+    }
+
+    /// Whether a polygon that may cover an end could block any segment, its box and the hull of the ends aside.
+    fn blocks(
+        &self,
+        patch: PatchId,
+        occluder: &OccluderPolygon<'_>,
+        (a, b): (&WorldElement, &WorldElement),
+        (above_a, above_b): (f64, f64),
+        (slack, margin): (f64, f64),
+    ) -> bool {
+        let behind = (above_a <= slack, above_b <= slack);
+        let (on_a, on_b) = self.covered(patch, occluder, (a, b), margin);
         if on_a || on_b {
             // What two ends in contact exchange is found within their plane.
-            if self.is_contact() {
-                return !is_beside();
-            }
-            return !(if on_a { behind(b) } else { behind(a) }) && !is_beside();
+            return self.is_contact() || !(if on_a { behind.1 } else { behind.0 });
         }
-        let (a_lo, a_hi) = a.span(&occluder.plane);
-        let (b_lo, b_hi) = b.span(&occluder.plane);
-        if a_lo.min(b_lo) >= -slack || a_hi.max(b_hi) <= slack {
-            return false;
-        }
-        !behind(a) && !behind(b) && !is_beside()
+        !behind.0 && !behind.1 && reach(&occluder.plane, a, b) > slack
     }
 
     /// For each end the width (area over length, m) of the narrowest blocker that emits light at any time and shines
@@ -263,31 +340,61 @@ impl<'a> Shaft<'a> {
     /// Which of `parents` (candidates of a pair above) remain candidates here, appended to `out`;
     /// clusters large against the shaft are opened.
     pub fn narrow(&self, parents: &Candidates, out: &mut Vec<u32>) {
-        let reach = (self.b.centre - self.a.centre).length() + self.a.radius + self.b.radius;
+        let (sweeps, keep_m) = (self.sweeps(), self.keep_m());
         for &parent in parents {
-            self.walk(ElementId(parent), 0.25 * reach, Test::Wide, &mut |id| {
+            self.walk(&sweeps, ElementId(parent), keep_m, &mut |id, _| {
                 out.push(id.0);
                 true
             });
         }
     }
 
+    /// Clusters of this size are small against the shaft, metres.
+    fn keep_m(&self) -> f64 {
+        0.25 * ((self.b.centre - self.a.centre).length() + self.a.radius + self.b.radius)
+    }
+
     /// The patches among and below `candidates` that may block segments of this very pair, in the
     /// forest's order. Which they are depends on the pair alone, not on how `candidates` were found.
     pub fn blockers(&self, candidates: &Candidates) -> Vec<PatchId> {
-        let mut out = Vec::new();
+        let (sweeps, mut out) = (self.sweeps(), Vec::new());
         for &candidate in candidates {
-            self.walk(ElementId(candidate), -1.0, Test::Exact, &mut |id| {
-                out.extend(self.forest.patch(id));
+            self.walk(&sweeps, ElementId(candidate), -1.0, &mut |id, standing| {
+                out.extend(self.forest.patch(id).filter(|_| standing == Standing::Between));
                 true
             });
         }
         out
     }
 
+    /// [`Shaft::narrow`] and [`Shaft::blockers`] in one walk.
+    pub fn narrow_to_blockers(&self, parents: &Candidates, out: &mut Vec<u32>) -> Vec<PatchId> {
+        let (sweeps, keep_m) = (self.sweeps(), self.keep_m());
+        let mut blockers = Vec::new();
+        for &parent in parents {
+            self.walk(&sweeps, ElementId(parent), keep_m, &mut |id, standing| {
+                out.push(id.0);
+                match self.forest.patch(id) {
+                    Some(patch) if standing == Standing::Between => blockers.push(patch),
+                    Some(_) => {}
+                    None => {
+                        self.walk(&sweeps, id, -1.0, &mut |id, standing| {
+                            let blocks = standing == Standing::Between;
+                            blockers.extend(self.forest.patch(id).filter(|_| blocks));
+                            true
+                        });
+                    }
+                }
+                true
+            });
+        }
+        blockers
+    }
+
     /// Those of the blockers of a pair above that may block segments of this one.
     pub fn those_that_block(&self, blockers: &[PatchId]) -> Vec<PatchId> {
-        let blocks = |patch: &PatchId| self.may_be_blocked_by(*patch, Test::Exact);
+        let sweeps = self.sweeps();
+        let blocks = |patch: &PatchId| self.standing(&sweeps, *patch) == Standing::Between;
         blockers.iter().copied().filter(blocks).collect()
     }
 
@@ -324,53 +431,56 @@ impl<'a> Shaft<'a> {
     /// Whether anything at or below `id` may block segments of this pair or of one below it,
     /// what rides on `except` aside.
     pub fn is_entered_by(&self, id: ElementId, except: Option<BodyId>) -> bool {
+        self.enters(&self.sweeps(), id, except)
+    }
+
+    fn enters(&self, sweeps: &Sweeps, id: ElementId, except: Option<BodyId>) -> bool {
         if except.is_some() && self.forest.cluster_body(id) == except {
             return false;
         }
         if except.is_some() && self.forest.patch(id).is_none() {
             // Groups of bodies are opened one by one, so that the excepted one is met.
-            let bounds = self.view.fixed_box(id).grown(self.slack());
+            let bounds = self.view.fixed_box(id);
             return self.forest.kind(id) == Kind::Cluster
-                && shaft_meets_box(&self.a.bounds, &self.b.bounds, &bounds)
-                && self.forest.children(id).any(|c| self.is_entered_by(ElementId(c), except));
+                && sweeps.world.meets(bounds, self.slack())
+                && self.forest.children(id).any(|c| self.enters(sweeps, ElementId(c), except));
         }
         let mut entered = false;
-        self.walk(id, -1.0, Test::Wide, &mut |_| {
+        self.walk(sweeps, id, -1.0, &mut |_, _| {
             entered = true;
             false
         });
         entered
     }
 
-    /// Visits the candidates at or below `id`: patches, and clusters no larger than `keep_m`; ends
-    /// and returns false as soon as `visit` does.
+    /// Visits the candidates at or below `id`: patches that are not out, and clusters no larger than `keep_m`;
+    /// ends and returns false as soon as `visit` does.
     fn walk(
         &self,
+        sweeps: &Sweeps,
         id: ElementId,
         keep_m: f64,
-        test: Test,
-        visit: &mut dyn FnMut(ElementId) -> bool,
+        visit: &mut dyn FnMut(ElementId, Standing) -> bool,
     ) -> bool {
         let world = self.view.fixed_box(id);
         if world.is_empty() || self.forest.kind(id) == Kind::Light {
             return true;
         }
         if let Some(patch) = self.forest.patch(id) {
-            return !self.may_be_blocked_by(patch, test) || visit(id);
+            let standing = self.standing(sweeps, patch);
+            return standing == Standing::Out || visit(id, standing);
         }
         let body = self.forest.cluster_body(id);
-        let (own, a, b) = self.seen_by(body);
+        let Frame { own, sweep, .. } = self.frame(sweeps, body);
         let bounds = if own { self.view.box_in_body(id) } else { world };
-        if !shaft_meets_box(&a.bounds, &b.bounds, &bounds.grown(self.slack()))
-            || is_beside((a, b), (bounds, bounds.centre()), NEAR_WIDE * self.slack())
-        {
+        if !sweep.meets(bounds, self.slack()) {
             return true;
         }
         // Groups of bodies are never kept: their boxes mix frames.
         if body.is_some() && bounds.diagonal() <= keep_m {
-            return visit(id);
+            return visit(id, Standing::Beside);
         }
-        self.forest.children(id).all(|c| self.walk(ElementId(c), keep_m, test, visit))
+        self.forest.children(id).all(|c| self.walk(sweeps, ElementId(c), keep_m, visit))
     }
 
     /// Blockers in one frame: that of the pair's body if it has one of its own.

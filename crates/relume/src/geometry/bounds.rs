@@ -40,6 +40,7 @@ impl Aabb {
     }
 
     /// Whether nothing is inside.
+    #[inline]
     pub fn is_empty(&self) -> bool {
         !self.lo.cmple(self.hi).all()
     }

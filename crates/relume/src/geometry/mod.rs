@@ -4,12 +4,10 @@
 
 mod bounds;
 mod convex;
-mod hull;
 mod pose;
 
 pub use bounds::{Aabb, Sweep, shaft_meets_box};
 pub use convex::{ConvexPolygon, Plane, split_convex};
-pub use hull::{Convex, gap_m};
 pub use pose::Pose;
 
 /// How far apart equal areas may be for rounding, relative: files hold corners in single precision.

@@ -2,7 +2,7 @@
 //! segments they block.
 
 use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldView};
-use crate::geometry::{Aabb, Plane, Pose, Sweep, gap_m, shaft_meets_box};
+use crate::geometry::{Aabb, Plane, Pose, Sweep, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
 use super::clip::keep_in_front;
@@ -70,13 +70,6 @@ const COVER: f64 = 0.5;
 /// disregarded because it is close to an end.
 const LIFT: f64 = 8.0;
 
-/// Distance from the hull of both ends, in slacks, up to which a polygon may block: what is lifted may get
-/// into it.
-const NEAR: f64 = 2.0 * LIFT;
-
-/// The same where the tests are wider.
-const NEAR_WIDE: f64 = 2.0 * NEAR;
-
 /// How a patch stands to a shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Standing {
@@ -139,22 +132,6 @@ fn span(polygon: &OccluderPolygon<'_>, plane: &Plane) -> (f64, f64) {
 fn reach(plane: &Plane, a: &WorldElement, b: &WorldElement) -> f64 {
     let ((a_lo, a_hi), (b_lo, b_hi)) = (a.span(plane), b.span(plane));
     (-a_lo.min(b_lo)).min(a_hi.max(b_hi))
-}
-
-/// A distance that a polygon is at least away from the convex hull of two elements, metres: 0 unless that is more
-/// than `margin_m`.
-fn gap_to_hull(
-    (a, b): (&WorldElement, &WorldElement),
-    polygon: &OccluderPolygon<'_>,
-    margin_m: f64,
-) -> f64 {
-    // From what of the polygon to where on the axis it is worth looking first.
-    let corners = polygon.corners;
-    let from = (corners[0] + corners[1] + corners[2]) / 3.0 - a.centre;
-    let along = b.centre - a.centre;
-    let t = from.dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
-    let towards = along * t.clamp(0.0, 1.0) - from;
-    gap_m(&(&a.corners[..], &b.corners[..]), corners, towards, margin_m)
 }
 
 impl<'a> Shaft<'a> {
@@ -221,17 +198,13 @@ impl<'a> Shaft<'a> {
         if !passes_wide {
             return Standing::Out;
         }
-        let gap = gap_to_hull((a, b), &occluder, NEAR * slack);
-        if gap > NEAR_WIDE * slack {
-            Standing::Out
-        } else if gap > 0.0 || !passes || !sweep.meets(bounds, margin) {
-            Standing::Beside
-        } else {
-            Standing::Between
+        match passes && sweep.meets(bounds, margin) {
+            true => Standing::Between,
+            false => Standing::Beside,
         }
     }
 
-    /// Whether a polygon that may cover an end could block any segment, its box and the hull of the ends aside.
+    /// Whether a polygon that may cover an end could block any segment, its box aside.
     fn blocks(
         &self,
         patch: PatchId,

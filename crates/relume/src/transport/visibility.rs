@@ -507,18 +507,17 @@ impl<'a> Shaft<'a> {
     fn blocked(
         &self,
         simd: Simd,
-        blockers: &[PatchId],
+        blockers: &[(bool, Lifted<'_>)],
         world: &SegmentBundle,
         own: Option<&SegmentBundle>,
     ) -> u16 {
         let mut mask = 0_u16;
         let slack = 2.0 * self.slack();
-        for &patch in blockers {
+        for (rides, lifted) in blockers {
             if mask == u16::MAX {
                 break;
             }
-            let (rides, lifted) = self.lifted(patch);
-            let bundle = own.filter(|_| rides).unwrap_or(world);
+            let bundle = own.filter(|_| *rides).unwrap_or(world);
             mask |= bundle.blocked_by(simd, &lifted.polygon(), slack);
         }
         mask
@@ -539,10 +538,11 @@ pub fn visibility(
     }
     let (a, b) = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
     let mut tally = Tally::default();
+    let lifted: Vec<_> = blockers.iter().map(|&patch| shaft.lifted(patch)).collect();
     for block in 0..(1_u32 << log2_count) / SEGMENTS as u32 {
         let world = SegmentBundle::new(shaft.a, shaft.b, key, log2_count, block);
         let own = shaft.own.map(|(_, a, b)| SegmentBundle::new(a, b, key, log2_count, block));
-        let mask = shaft.blocked(simd, blockers, &world, own.as_ref());
+        let mask = shaft.blocked(simd, &lifted, &world, own.as_ref());
         // Weights from the body's frame where there is one: they must not follow its motion.
         tally.add(own.as_ref().unwrap_or(&world), mask, a, b);
     }
@@ -580,7 +580,8 @@ pub fn light_visibility(
         return Visibility::CLEAR;
     }
     let mut tally = Tally::default();
-    let blocked = shaft.blocked(simd, blockers, segments, None);
+    let lifted: Vec<_> = blockers.iter().map(|&patch| shaft.lifted(patch)).collect();
+    let blocked = shaft.blocked(simd, &lifted, segments, None);
     if blocked == u16::MAX && shaft.is_hidden_from(from, blockers) {
         return Visibility { value: 0.0, segments: 1, ..Visibility::CLEAR };
     }

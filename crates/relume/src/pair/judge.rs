@@ -351,9 +351,7 @@ impl Placed<'_> {
         let end =
             |brightness: &Brightness, id, area| End { area, light: brightness.of(self.forest, id) };
         let mut x = match in_contact {
-            true => {
-                contact_exchange(place_a, place_b, shaft.contact_m2(blockers))
-            }
+            true => contact_exchange(place_a, place_b, shaft.contact_m2(blockers)),
             false => exchange_by_points(self.simd, place_a, place_b, met),
         };
         if in_contact && x.area_m2 <= 0.0 {

@@ -167,8 +167,7 @@ impl<'a> Shaft<'a> {
             return Standing::Out;
         }
         let root = self.forest.patch_root(patch);
-        let Frame { own, a, b, sweep } =
-            self.frame(sweeps, Some(self.view.patch(patch).body));
+        let Frame { own, a, b, sweep } = self.frame(sweeps, Some(self.view.patch(patch).body));
         let (occluder, bounds) = if own {
             (self.view.occluder_in_body(patch), self.view.box_in_body(root))
         } else {
@@ -184,7 +183,8 @@ impl<'a> Shaft<'a> {
         let is_near = |(lo, hi): (f64, f64)| lo >= -wide_margin && hi <= wide_margin;
         let (passes_wide, passes) = if is_near(above_a) || is_near(above_b) {
             let behind = (above_a.1, above_b.1);
-            let blocks = |slack, margin| self.blocks(patch, &occluder, (a, b), behind, (slack, margin));
+            let blocks =
+                |slack, margin| self.blocks(patch, &occluder, (a, b), behind, (slack, margin));
             (blocks(0.5 * slack, wide_margin), blocks(slack, margin))
         } else {
             // The same without a look at what covers an end.

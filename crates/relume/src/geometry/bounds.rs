@@ -192,6 +192,25 @@ mod tests {
         }
     }
 
+    proptest! {
+        /// Boxes on a grid, so that faces rest, are flush and touch.
+        #[test]
+        fn a_sweep_says_what_the_shaft_says(
+            at in prop::array::uniform9(-2..3_i32), size in prop::array::uniform9(0..2_i32),
+        ) {
+            let box_at = |k: usize| {
+                let of = |v: &[i32; 9]| {
+                    DVec3::new(f64::from(v[k]), f64::from(v[k + 1]), f64::from(v[k + 2]))
+                };
+                Aabb { lo: of(&at), hi: of(&at) + of(&size) }
+            };
+            let (a, b, o) = (box_at(0), box_at(3), box_at(6));
+            let sweep = Sweep::new(&a, &b);
+            prop_assert_eq!(shaft_meets_box(&a, &b, &o.grown(1e-9)), sweep.meets(&o, 1e-9));
+            prop_assert_eq!(shaft_meets_box(&a, &b, &o.grown(-1e-9)), sweep.meets(&o, -1e-9));
+        }
+    }
+
     #[test]
     fn a_box_beside_the_shaft_is_missed() {
         let at = |x: f64, y: f64| Aabb {

@@ -769,6 +769,82 @@ mod tests {
         assert!(floor_to_ceiling(false, |b| cuboid(b, 0.0, 1.0, [0.0, 1.0])) < 1e-4);
     }
 
+    /// What segments between two slivers cross is among their blockers, and among the candidates of every
+    /// pair above them; and the walk for both at once finds what either finds alone.
+    #[test]
+    fn no_sliver_that_segments_cross_is_left_out() {
+        let mut b = SceneBuilder::new("slivers");
+        let grey = b.double_sided_material("grey", [0.5; 3], [0.0; 3]);
+        let node = b.node("slivers", None, DVec3::ZERO, DQuat::IDENTITY);
+        // Two twisted tubes through each other.
+        let ring = |k: usize, x: f64, turned: bool| {
+            let (sin, cos) = (k as f64 * std::f64::consts::TAU / 12.0 + x).sin_cos();
+            let p = DVec3::new(x, 0.3 * sin, 0.3 * cos);
+            if turned { DVec3::new(p.z, p.x, p.y) } else { p }
+        };
+        for k in 0..24 {
+            let p = |by: usize, x| ring(k + by, x, k >= 12);
+            b.polygon(node, &format!("{k} up"), grey, &[p(0, -1.0), p(1, -1.0), p(1, 1.0)]);
+            b.polygon(node, &format!("{k} down"), grey, &[p(0, -1.0), p(1, 1.0), p(0, 1.0)]);
+        }
+        let scene = b.build().unwrap();
+        let mut forest = Forest::new(&scene);
+        let view = WorldView::new(&scene, &forest, 0.0);
+        let patches = || (0..scene.patches.len() as u32).map(PatchId);
+        // Of every seventh patch one part besides.
+        let roots: Vec<ElementId> = patches().map(|p| forest.patch_root(p)).collect();
+        let mut ends: Vec<(ElementId, ElementId)> = roots.iter().map(|&id| (id, id)).collect();
+        for &root in roots.iter().step_by(7) {
+            ends.extend(forest.split(root).0.map(|part| (ElementId(part), root)));
+        }
+        let place = |id| WorldElement::new(&view, &forest, id, false);
+        let patch = |id| forest.patch(id).unwrap();
+        let (mut crossed, mut looked_at, mut found) = (0, 0, 0);
+        for (k, &(one, one_above)) in ends.iter().enumerate() {
+            for &(two, two_above) in ends[k + 1..].iter().step_by(5) {
+                let patches_of = (patch(one), patch(two));
+                let (a, b, above) = (place(one), place(two), (place(one_above), place(two_above)));
+                let shaft = |a, b| Shaft {
+                    forest: &forest,
+                    view: &view,
+                    a,
+                    b,
+                    own: None,
+                    patches: patches_of,
+                };
+                let (mut handed, mut both) = (Vec::new(), Vec::new());
+                shaft(&above.0, &above.1).narrow(&[Forest::ROOT.0], &mut handed);
+                let pair = shaft(&a, &b);
+                let blockers = pair.blockers(&[Forest::ROOT.0]);
+                assert_eq!(pair.narrow_to_blockers(&handed, &mut both), blockers);
+                let mut alone = Vec::new();
+                pair.narrow(&handed, &mut alone);
+                assert_eq!(both, alone);
+                let fronts = patches().filter(|&p| !view.is_hidden_twin(p)).count();
+                (looked_at, found) = (looked_at + fronts, found + blockers.len());
+                for block in 0..4 {
+                    let segments = SegmentBundle::new(&a, &b, 7, 6, block);
+                    // Those that leave one front and arrive at the other.
+                    let faces = (0..SEGMENTS).filter(|&k| segments.weight[k] > 0.0);
+                    let mask = faces.fold(0_u16, |mask, k| mask | 1 << k);
+                    for by in patches().filter(|&p| !view.is_hidden_twin(p)) {
+                        if by == patches_of.0 || by == patches_of.1 {
+                            continue;
+                        }
+                        let slack = 8.0 * pair.slack();
+                        let hits = segments.blocked_by(Simd::detect(), &view.occluder(by), slack);
+                        if hits & mask != 0 {
+                            crossed += 1;
+                            assert!(blockers.contains(&by), "{patches_of:?} {by:?}");
+                        }
+                    }
+                }
+            }
+        }
+        assert!(crossed > 10_000, "{crossed}");
+        assert!(5 * found < 4 * looked_at, "{found} of {looked_at}");
+    }
+
     #[test]
     fn the_other_side_of_a_polygon_does_not_cover_it() {
         assert_eq!(floor_to_ceiling(true, |_| ()), 1.0);

@@ -464,11 +464,13 @@ impl Forest {
     /// The patch an element or polygon belongs to.
     #[inline]
     pub fn patch(&self, id: ElementId) -> Option<PatchId> {
-        let subjects = &self.fixed.subjects;
-        match self.kind(id) {
-            Kind::Element => Some(PatchId(subjects[self.twins(id).facet as usize])),
-            Kind::Polygon => Some(PatchId(subjects[id.0 as usize])),
-            _ => None,
+        match self.fixed.kinds.get(id.0 as usize) {
+            Some(Kind::Element | Kind::Polygon) => {
+                Some(PatchId(self.fixed.subjects[id.0 as usize]))
+            }
+            Some(_) => None,
+            None if self.nodes[id.0 as usize].fan.is_other() => None,
+            None => Some(PatchId(self.fixed.subjects[self.twins(id).facet as usize])),
         }
     }
 

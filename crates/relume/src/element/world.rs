@@ -342,7 +342,9 @@ impl WorldElement {
     /// Signed distances of the corners from a plane: smallest and largest, metres.
     #[inline]
     pub fn span(&self, plane: &Plane) -> (f64, f64) {
-        let d = self.corners.map(|c| plane.distance(c));
+        // Written out: as a map it is a call for each corner.
+        let [p, q, r, s] = &self.corners;
+        let d = [plane.distance(*p), plane.distance(*q), plane.distance(*r), plane.distance(*s)];
         (d[0].min(d[1]).min(d[2].min(d[3])), d[0].max(d[1]).max(d[2].max(d[3])))
     }
 }

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use crate::element::{ElementId, ElementKey, Forest, Kind, WorldElement, WorldLight, WorldView};
 use crate::event::{Foresight, Lookahead, Tick};
-use crate::geometry::{Aabb, Plane, no_smaller, shaft_meets_box};
+use crate::geometry::{Aabb, Plane, Sweep, no_smaller};
 use crate::scene::{BodyId, LightKind, PatchId};
 use crate::transport::{
     CELLS_MAX, CLIPPED_MAX, Clipping, Exchange, Meeting, SegmentBundle, Shaft, Simd, Visibility,
@@ -311,13 +311,12 @@ impl Placed<'_> {
         if met == Meeting::Away || (met == Meeting::Coplanar && !shaft.is_contact()) {
             return culled(CullReason::FacingAway);
         }
-        let start = narrowed.len();
-        shaft.narrow(candidates, narrowed);
-        let candidates = &narrowed[start..];
         if self.is_above_coarse(a, b) {
+            shaft.narrow(candidates, narrowed);
             return passing(Verdict::Refine(self.larger_above_coarse(a, b)), 0);
         }
-        self.decide((a, b), known, (&places.own.0, &places.own.1), met, &shaft, candidates)
+        let blockers = shaft.narrow_to_blockers(candidates, narrowed);
+        self.decide((a, b), known, (&places.own.0, &places.own.1), met, &shaft, &blockers)
     }
 
     fn shaft<'a>(
@@ -345,16 +344,14 @@ impl Placed<'_> {
         (place_a, place_b): (&WorldElement, &WorldElement),
         met: Meeting,
         shaft: &Shaft<'_>,
-        candidates: &[u32],
+        blockers: &[PatchId],
     ) -> Judgement {
         let key = pair_key(self.forest.key(a), self.forest.key(b));
         let in_contact = met == Meeting::Coplanar;
         let end =
             |brightness: &Brightness, id, area| End { area, light: brightness.of(self.forest, id) };
         let mut x = match in_contact {
-            true => {
-                contact_exchange(place_a, place_b, shaft.contact_m2(&shaft.blockers(candidates)))
-            }
+            true => contact_exchange(place_a, place_b, shaft.contact_m2(blockers)),
             false => exchange_by_points(self.simd, place_a, place_b, met),
         };
         if in_contact && x.area_m2 <= 0.0 {
@@ -366,7 +363,7 @@ impl Placed<'_> {
             // What the smaller area by points is enough to refine needs no better one.
             if let (Stage::Fine(brightness), Oracle::Error { threshold }) =
                 (self.stage, self.oracle)
-                && shaft.blockers(candidates).is_empty()
+                && blockers.is_empty()
             {
                 let (clear, open) = (Visibility::CLEAR, (f64::INFINITY, f64::INFINITY));
                 let ends = (end(brightness, a, place_a.area), end(brightness, b, place_b.area));
@@ -399,8 +396,8 @@ impl Placed<'_> {
                 }
             }
         }
-        let blockers = if in_contact { Vec::new() } else { shaft.blockers(candidates) };
-        let occluders = shaft.occluders(&blockers);
+        let blockers = if in_contact { &[][..] } else { blockers };
+        let occluders = shaft.occluders(blockers);
         let mut most = CLIPPED_MAX;
         let mut way = Margin::ENDLESS;
         if let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle) {
@@ -421,13 +418,13 @@ impl Placed<'_> {
             _ => f64::INFINITY,
         };
         let mut clipped =
-            (1..=most).contains(&occluders).then(|| clipping(self.simd, shaft, &blockers));
+            (1..=most).contains(&occluders).then(|| clipping(self.simd, shaft, blockers));
         let mut sampled = None;
         if clipped.is_none() {
-            let v = visibility(self.simd, shaft, &blockers, key, 4);
+            let v = visibility(self.simd, shaft, blockers, key, 4);
             // Segments that are all blocked prove nothing.
             if v.value <= 0.0 && occluders <= CLIPPED_MAX_CLOSE && SAMPLED_MAX > overlooked_max {
-                clipped = Some(clipping(self.simd, shaft, &blockers));
+                clipped = Some(clipping(self.simd, shaft, blockers));
             }
             sampled = Some(v);
         }
@@ -445,9 +442,9 @@ impl Placed<'_> {
             return Judgement { margin: firm, ..carrying };
         };
         let ends = (end(brightness, a, place_a.area), end(brightness, b, place_b.area));
-        let shone = shaft.shone_on(&blockers);
+        let shone = shaft.shone_on(blockers);
         let scale = (brightness.reference_area_m2(), threshold);
-        let e = estimate(&x, &v, (&ends.0, &ends.1), shone, shaft.least_m2(&blockers), scale);
+        let e = estimate(&x, &v, (&ends.0, &ends.1), shone, shaft.least_m2(blockers), scale);
         let stake = factor / threshold.max(FINEST);
         let both_ways = way != Margin::ENDLESS;
         let wish = self.wish((a, b), &ends, &e);
@@ -467,7 +464,7 @@ impl Placed<'_> {
             Some(clipped) => look_closer(v, clipped, stake * doubt),
             None if v.segments == 0 => v,
             None => {
-                let again = visibility(self.simd, shaft, &blockers, key, 6);
+                let again = visibility(self.simd, shaft, blockers, key, 6);
                 Visibility { segments: v.segments + again.segments, ..again }
             }
         };
@@ -577,9 +574,7 @@ impl Placed<'_> {
         }
         let place = LightPlace::new(lamp, &e, self.view.far_m());
         let shaft = self.shaft((&e, &place.stand_in), None, (patch, patch));
-        let start = narrowed.len();
-        shaft.narrow(candidates, narrowed);
-        let blockers = shaft.blockers(&narrowed[start..]);
+        let blockers = shaft.narrow_to_blockers(candidates, narrowed);
         let key = pair_key(self.forest.key(element), self.forest.key(light));
         let segments = place.segments(lamp, &e, key);
         let v = light_visibility(self.simd, &shaft, &blockers, (&segments, place.from(lamp, &e)));
@@ -748,9 +743,13 @@ pub(super) fn body_of(forest: &Forest, view: &WorldView, id: ElementId) -> Optio
 pub(super) struct BoxShaft<'a> {
     view: &'a WorldView,
     forest: &'a Forest,
-    world: (&'a Aabb, &'a Aabb),
-    /// Both boxes in the frame of the one body that they are in.
-    own: Option<(BodyId, &'a Aabb, &'a Aabb)>,
+    world: Sweep,
+    /// Of both boxes in the frame of the one body that they are in.
+    own: Option<(BodyId, Sweep)>,
+    /// Ends that are patches.
+    patches: [Option<PatchId>; 2],
+    /// Clusters of this size are small against it.
+    keep_m: f64,
     margin_m: f64,
 }
 
@@ -762,39 +761,82 @@ impl<'a> BoxShaft<'a> {
         (a, b): (ElementId, ElementId),
         body: Option<BodyId>,
     ) -> BoxShaft<'a> {
+        let patches = [forest.patch(a), forest.patch(b)];
         let (a, b) = (forest.fixed(a), forest.fixed(b));
-        let own = body.map(|body| (body, view.box_in_body(a), view.box_in_body(b)));
+        let in_body = |_| Sweep::new(view.box_in_body(a), view.box_in_body(b));
+        let own = body.map(|body| (body, in_body(body)));
         let world = (view.fixed_box(a), view.fixed_box(b));
-        // More than the slack of any pair: what lies on an end may hide it.
-        BoxShaft { view, forest, world, own, margin_m: 5e-7 * view.far_m() }
+        BoxShaft {
+            view,
+            forest,
+            world: Sweep::new(world.0, world.1),
+            own,
+            patches,
+            keep_m: 0.5 * world.0.union(*world.1).diagonal(),
+            // More than the slack of any pair: what lies on an end may hide it.
+            margin_m: 5e-7 * view.far_m(),
+        }
     }
 
     fn meets(&self, id: ElementId) -> bool {
         let world = self.view.fixed_box(id);
-        let (a, b, bounds) = match self.own {
-            Some((body, a, b)) if body_of(self.forest, self.view, id) == Some(body) => {
-                (a, b, self.view.box_in_body(id))
+        let (sweep, bounds) = match &self.own {
+            Some((body, own)) if body_of(self.forest, self.view, id) == Some(*body) => {
+                (own, self.view.box_in_body(id))
             }
-            _ => (self.world.0, self.world.1, world),
+            _ => (&self.world, world),
         };
-        !world.is_empty() && shaft_meets_box(a, b, &bounds.grown(self.margin_m))
+        !world.is_empty() && sweep.meets(bounds, self.margin_m)
+    }
+
+    /// Whether a patch blocks no segment of this pair or of one below it though its box may meet the shaft.
+    fn is_spared_by(&self, patch: PatchId) -> bool {
+        if self.view.is_hidden_twin(patch) {
+            return true;
+        }
+        self.patches.iter().flatten().any(|&end| patch == end || self.is_behind(patch, end))
+    }
+
+    /// Whether a patch is wholly behind the plane of another, and does not lie in it.
+    fn is_behind(&self, patch: PatchId, end: PatchId) -> bool {
+        let (body, of_end) = (self.view.patch(patch).body, self.view.patch(end));
+        // In the frame in which it is looked at by every pair below.
+        let in_body = self.own.as_ref().is_some_and(|own| own.0 == body);
+        let (frame, occluder) = match in_body {
+            true => (&of_end.local, self.view.occluder_in_body(patch)),
+            false => (&of_end.world, self.view.occluder(patch)),
+        };
+        let plane = Plane::through(frame.origin, frame.normal);
+        let mut least = f64::INFINITY;
+        for &corner in occluder.corners {
+            let above = plane.distance(corner);
+            if above > 0.0 {
+                return false;
+            }
+            least = least.min(above);
+        }
+        least < -self.margin_m
     }
 
     /// Which of `parents` may block; clusters large against the shaft are opened.
     fn narrow(&self, parents: &[u32], out: &mut Vec<u32>) {
-        let keep_m = 0.5 * self.world.0.union(*self.world.1).diagonal();
         let mut stack: Vec<u32> = parents.iter().rev().copied().collect();
         while let Some(id) = stack.pop() {
             let element = ElementId(id);
             if self.forest.kind(element) == Kind::Light || !self.meets(element) {
                 continue;
             }
-            let group = self.forest.patch(element).is_none();
-            let mixed = body_of(self.forest, self.view, element).is_none();
-            if !group || (!mixed && self.view.fixed_box(element).diagonal() <= keep_m) {
-                out.push(id);
-            } else {
-                stack.extend(self.forest.children(element).rev());
+            match self.forest.patch(element) {
+                Some(patch) if self.is_spared_by(patch) => {}
+                Some(_) => out.push(id),
+                None => {
+                    let mixed = self.forest.cluster_body(element).is_none();
+                    if !mixed && self.view.fixed_box(element).diagonal() <= self.keep_m {
+                        out.push(id);
+                    } else {
+                        stack.extend(self.forest.children(element).rev());
+                    }
+                }
             }
         }
     }

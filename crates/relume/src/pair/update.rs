@@ -5,6 +5,7 @@
 //! of a tree that holds nothing but its root.
 
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -336,6 +337,8 @@ pub fn update<J: Judge>(
 struct Wave {
     items: Vec<Item>,
     candidates: Vec<u32>,
+    /// Where lists of the wave before are that were handed on as they were, by their start there.
+    handed_on: BTreeMap<u32, List>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -366,8 +369,24 @@ impl Wave {
         List { start, len: list.len() as u32 }
     }
 
+    /// Takes over a list of the wave before: once, however many pairs have it in common.
+    fn hand_on(&mut self, list: List, before: &Wave) -> List {
+        match (list, self.handed_on.get(&list.start)) {
+            (List::CLEAR, _) => list,
+            (_, Some(&known)) if list.len > 0 => known,
+            _ => {
+                let here = self.push_candidates(list.of(&before.candidates));
+                if list.len > 0 {
+                    self.handed_on.insert(list.start, here);
+                }
+                here
+            }
+        }
+    }
+
     fn memory_bytes(&self) -> u64 {
-        (self.items.capacity() * size_of::<Item>() + self.candidates.capacity() * 4) as u64
+        let lists = self.handed_on.len() * size_of::<(u32, List)>();
+        (self.items.capacity() * size_of::<Item>() + self.candidates.capacity() * 4 + lists) as u64
     }
 }
 
@@ -387,6 +406,31 @@ impl List {
     }
 }
 
+/// The candidates of the children of a pair.
+#[derive(Clone, Copy, Debug)]
+enum Below {
+    /// Those of the pair above it: nearly all were left.
+    Same,
+    /// A list of its own, of its chunk.
+    Own(List),
+}
+
+impl Below {
+    /// A list that leaves more than this of every 8 is not worth a copy: in a heap of slivers every shaft holds nearly
+    /// all others, and lists of their own would be most of the memory.
+    const MOST: usize = 7;
+
+    /// The list at the end of `narrowed` if it is short against the one that it was found in.
+    fn of(above: List, start: usize, narrowed: &mut Vec<u32>) -> Below {
+        let (all, left) = (above.len as usize, narrowed.len() - start);
+        if left > 0 && left <= all && 8 * left >= Below::MOST * all {
+            narrowed.truncate(start);
+            return Below::Same;
+        }
+        Below::Own(List::since(start, narrowed))
+    }
+}
+
 struct Chunk<'a> {
     items: &'a [Item],
     ends: Vec<(ElementId, ElementId)>,
@@ -403,13 +447,13 @@ enum Look {
     /// Look at the children; with a certificate, unless the pair keeps the one it has, as below.
     Descend(Option<Tick>),
     /// Look at the children, with these candidates.
-    Narrowed(List),
+    Narrowed(Below),
     /// The light changed, the verdict did not; look at the children.
     Withstands(Margin, Option<Tick>),
     /// A link, extrapolated.
     Extrapolated(Carried, Option<Margin>),
     /// Judged, with the candidates of its children and a certificate.
-    Judged(Judgement, Stale, List, Option<Tick>),
+    Judged(Judgement, Stale, Below, Option<Tick>),
 }
 
 fn judge_block<'a, J: Judge>(
@@ -472,7 +516,7 @@ fn look_at<J: Judge>(
         Stale::Occlusion
             if state.is_refined() && judge.narrow(a, b, item.list.of(candidates), narrowed) =>
         {
-            return Look::Narrowed(List::since(start, narrowed));
+            return Look::Narrowed(Below::of(item.list, start, narrowed));
         }
         _ => {}
     }
@@ -508,7 +552,10 @@ fn look_at<J: Judge>(
         }
         _ => Some(0),
     };
-    let list = if stale == Stale::Followed { List::CLEAR } else { List::since(start, narrowed) };
+    let list = match stale {
+        Stale::Followed => Below::Own(List::CLEAR),
+        _ => Below::of(item.list, start, narrowed),
+    };
     Look::Judged(found, stale, list, due)
 }
 
@@ -562,17 +609,17 @@ impl<J: Judge> Editor<'_, J> {
                 Look::Descend(due) => {
                     self.certify(item.pair, *due);
                     let children = self.tree.children(item.pair);
-                    self.look_at(children, item.list, &wave.candidates);
+                    self.look_at(children, Below::Same, item, (chunk, wave));
                 }
                 Look::Narrowed(list) => {
                     let children = self.tree.children(item.pair);
-                    self.look_at(children, *list, &chunk.candidates);
+                    self.look_at(children, *list, item, (chunk, wave));
                 }
                 Look::Withstands(margin, due) => {
                     self.certify(item.pair, *due);
                     self.tree.set_margin(item.pair, *margin);
                     let children = self.tree.children(item.pair);
-                    self.look_at(children, item.list, &wave.candidates);
+                    self.look_at(children, Below::Same, item, (chunk, wave));
                 }
                 Look::Extrapolated(carried, margin) => {
                     self.changes.work.extrapolated += 1;
@@ -587,7 +634,7 @@ impl<J: Judge> Editor<'_, J> {
                     self.remember(item.pair, found, *stale);
                     let children = self.apply(item.pair, found, *stale);
                     self.certify(item.pair, *due);
-                    self.look_at(children, *list, &chunk.candidates);
+                    self.look_at(children, *list, item, (chunk, wave));
                 }
             }
         }
@@ -652,11 +699,18 @@ impl<J: Judge> Editor<'_, J> {
         self.tree.set_history(pair, history);
     }
 
-    fn look_at(&mut self, pairs: Range<u32>, list: List, candidates: &[u32]) {
+    fn look_at(
+        &mut self,
+        pairs: Range<u32>,
+        list: Below,
+        item: &Item,
+        (chunk, wave): (&Chunk<'_>, &Wave),
+    ) {
         if !pairs.is_empty() {
             let list = match list {
-                List::CLEAR => list,
-                _ => self.next.push_candidates(list.of(candidates)),
+                Below::Same => self.next.hand_on(item.list, wave),
+                Below::Own(List::CLEAR) => List::CLEAR,
+                Below::Own(list) => self.next.push_candidates(list.of(&chunk.candidates)),
             };
             self.next.items.extend(pairs.map(|id| Item { pair: PairId(id), list }));
         }

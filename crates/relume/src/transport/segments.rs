@@ -168,6 +168,9 @@ impl SegmentBundle {
                 let d = m.x * x + m.y * y + m.z * z - edge.offset + give;
                 inside[k] = inside[k].min(d);
             }
+            if inside.iter().all(|&v| v <= 0.0) {
+                return 0;
+            }
         }
         let mut mask = 0;
         for (k, &v) in inside.iter().enumerate() {

@@ -2,7 +2,7 @@
 //! segments they block.
 
 use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldView};
-use crate::geometry::{Aabb, Plane, Pose, shaft_meets_box};
+use crate::geometry::{Aabb, Plane, Pose, Sweep, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
 use super::clip::keep_in_front;
@@ -63,22 +63,38 @@ pub struct Shaft<'a> {
     pub patches: (PatchId, PatchId),
 }
 
-/// How strict a test of a shaft is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Test {
-    /// What counts: a blocker of a pair passes this test for the pair itself.
-    Exact,
-    /// A little wider, by less than the slack: what passes the exact test for a pair passes this one
-    /// for the pair and for every pair above it, in spite of rounding.
-    Wide,
-}
-
 /// Distance from an end's plane, in slacks, within which a polygon lies on it.
 const COVER: f64 = 0.5;
 
 /// How far a polygon that lies on an end is lifted off it, in slacks: more than anything that is
 /// disregarded because it is close to an end.
 const LIFT: f64 = 8.0;
+
+/// How a patch stands to a shaft.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Standing {
+    /// It blocks neither this pair nor any below it.
+    Out,
+    /// It may be a blocker of a pair below this one.
+    Beside,
+    /// It counts as a blocker of this very pair.
+    Between,
+}
+
+/// The two ends in the frame in which a body is looked at, and their boxes' shaft.
+#[derive(Clone, Copy)]
+struct Frame<'a> {
+    own: bool,
+    a: &'a WorldElement,
+    b: &'a WorldElement,
+    sweep: &'a Sweep,
+}
+
+/// Shafts of the ends' boxes: in the world, and in the frame of the body that both ride on.
+struct Sweeps {
+    world: Sweep,
+    own: Option<Sweep>,
+}
 
 /// A polygon, moved.
 struct Lifted<'a> {
@@ -100,6 +116,24 @@ impl<'a> Lifted<'a> {
     }
 }
 
+/// Distances of a polygon's corners from a plane: smallest and largest, metres.
+#[inline]
+fn span(polygon: &OccluderPolygon<'_>, plane: &Plane) -> (f64, f64) {
+    let with = |(lo, hi): (f64, f64), &c: &DVec3| {
+        let d = plane.distance(c);
+        (lo.min(d), hi.max(d))
+    };
+    polygon.corners.iter().fold((f64::INFINITY, f64::NEG_INFINITY), with)
+}
+
+/// How far two elements reach to either side of a plane, the smaller of both, metres; negative where they
+/// stay away from it.
+#[inline]
+fn reach(plane: &Plane, a: &WorldElement, b: &WorldElement) -> f64 {
+    let ((a_lo, a_hi), (b_lo, b_hi)) = (a.span(plane), b.span(plane));
+    (-a_lo.min(b_lo)).min(a_hi.max(b_hi))
+}
+
 impl<'a> Shaft<'a> {
     fn slack(&self) -> f64 {
         self.a.rounding_m + self.b.rounding_m
@@ -114,42 +148,78 @@ impl<'a> Shaft<'a> {
         }
     }
 
+    fn sweeps(&self) -> Sweeps {
+        Sweeps {
+            world: Sweep::new(&self.a.bounds, &self.b.bounds),
+            own: self.own.map(|(_, a, b)| Sweep::new(&a.bounds, &b.bounds)),
+        }
+    }
+
+    fn frame<'s>(&'s self, sweeps: &'s Sweeps, body: Option<BodyId>) -> Frame<'s> {
+        let (own, a, b) = self.seen_by(body);
+        let sweep = if own { sweeps.own.as_ref() } else { None }.unwrap_or(&sweeps.world);
+        Frame { own, a, b, sweep }
+    }
+
     /// Whether a patch could block any segment.
-    fn may_be_blocked_by(&self, patch: PatchId, test: Test) -> bool {
+    fn standing(&self, sweeps: &Sweeps, patch: PatchId) -> Standing {
         if patch == self.patches.0 || patch == self.patches.1 || self.view.is_hidden_twin(patch) {
-            return false;
+            return Standing::Out;
         }
         let root = self.forest.patch_root(patch);
-        let (own, a, b) = self.seen_by(Some(self.view.patch(patch).body));
+        let Frame { own, a, b, sweep } = self.frame(sweeps, Some(self.view.patch(patch).body));
         let (occluder, bounds) = if own {
             (self.view.occluder_in_body(patch), self.view.box_in_body(root))
         } else {
             (self.view.occluder(patch), self.view.fixed_box(root))
         };
-        // The margin: what covers an end may lie a little behind it.
-        let (slack, margin) = match test {
-            Test::Exact => (self.slack(), COVER * self.slack()),
-            Test::Wide => (0.5 * self.slack(), 1.5 * COVER * self.slack()),
-        };
-        if !shaft_meets_box(&a.bounds, &b.bounds, &bounds.grown(margin)) {
-            return false;
+        let slack = self.slack();
+        // The margins: what covers an end may lie a little behind it.
+        let (margin, wide_margin) = (COVER * slack, 1.5 * COVER * slack);
+        if !sweep.meets(bounds, wide_margin) {
+            return Standing::Out;
         }
-        let behind =
-            |e: &WorldElement| occluder.corners.iter().all(|&c| e.plane.distance(c) <= slack);
-        let (on_a, on_b) = self.covered(patch, &occluder, (a, b), margin);
+        let (above_a, above_b) = (span(&occluder, &a.plane), span(&occluder, &b.plane));
+        let is_near = |(lo, hi): (f64, f64)| lo >= -wide_margin && hi <= wide_margin;
+        let (passes_wide, passes) = if is_near(above_a) || is_near(above_b) {
+            let behind = (above_a.1, above_b.1);
+            let blocks =
+                |slack, margin| self.blocks(patch, &occluder, (a, b), behind, (slack, margin));
+            (blocks(0.5 * slack, wide_margin), blocks(slack, margin))
+        } else {
+            // The same without a look at what covers an end.
+            let height = above_a.1.min(above_b.1);
+            if height <= 0.5 * slack {
+                return Standing::Out;
+            }
+            let reach = reach(&occluder.plane, a, b);
+            (reach > 0.5 * slack, reach > slack && height > slack)
+        };
+        if !passes_wide {
+            return Standing::Out;
+        }
+        match passes && sweep.meets(bounds, margin) {
+            true => Standing::Between,
+            false => Standing::Beside,
+        }
+    }
+
+    /// Whether a polygon that may cover an end could block any segment, its box aside.
+    fn blocks(
+        &self,
+        patch: PatchId,
+        occluder: &OccluderPolygon<'_>,
+        (a, b): (&WorldElement, &WorldElement),
+        (above_a, above_b): (f64, f64),
+        (slack, margin): (f64, f64),
+    ) -> bool {
+        let behind = (above_a <= slack, above_b <= slack);
+        let (on_a, on_b) = self.covered(patch, occluder, (a, b), margin);
         if on_a || on_b {
             // What two ends in contact exchange is found within their plane.
-            if self.is_contact() {
-                return true;
-            }
-            return if on_a { !behind(b) } else { !behind(a) };
+            return self.is_contact() || !(if on_a { behind.1 } else { behind.0 });
         }
-        let (a_lo, a_hi) = a.span(&occluder.plane);
-        let (b_lo, b_hi) = b.span(&occluder.plane);
-        if a_lo.min(b_lo) >= -slack || a_hi.max(b_hi) <= slack {
-            return false;
-        }
-        !behind(a) && !behind(b)
+        !behind.0 && !behind.1 && reach(&occluder.plane, a, b) > slack
     }
 
     /// For each end the width (area over length, m) of the narrowest blocker that emits light at any time and shines
@@ -243,31 +313,61 @@ impl<'a> Shaft<'a> {
     /// Which of `parents` (candidates of a pair above) remain candidates here, appended to `out`;
     /// clusters large against the shaft are opened.
     pub fn narrow(&self, parents: &Candidates, out: &mut Vec<u32>) {
-        let reach = (self.b.centre - self.a.centre).length() + self.a.radius + self.b.radius;
+        let (sweeps, keep_m) = (self.sweeps(), self.keep_m());
         for &parent in parents {
-            self.walk(ElementId(parent), 0.25 * reach, Test::Wide, &mut |id| {
+            self.walk(&sweeps, ElementId(parent), keep_m, &mut |id, _| {
                 out.push(id.0);
                 true
             });
         }
     }
 
+    /// Clusters of this size are small against the shaft, metres.
+    fn keep_m(&self) -> f64 {
+        0.25 * ((self.b.centre - self.a.centre).length() + self.a.radius + self.b.radius)
+    }
+
     /// The patches among and below `candidates` that may block segments of this very pair, in the
     /// forest's order. Which they are depends on the pair alone, not on how `candidates` were found.
     pub fn blockers(&self, candidates: &Candidates) -> Vec<PatchId> {
-        let mut out = Vec::new();
+        let (sweeps, mut out) = (self.sweeps(), Vec::new());
         for &candidate in candidates {
-            self.walk(ElementId(candidate), -1.0, Test::Exact, &mut |id| {
-                out.extend(self.forest.patch(id));
+            self.walk(&sweeps, ElementId(candidate), -1.0, &mut |id, standing| {
+                out.extend(self.forest.patch(id).filter(|_| standing == Standing::Between));
                 true
             });
         }
         out
     }
 
+    /// [`Shaft::narrow`] and [`Shaft::blockers`] in one walk.
+    pub fn narrow_to_blockers(&self, parents: &Candidates, out: &mut Vec<u32>) -> Vec<PatchId> {
+        let (sweeps, keep_m) = (self.sweeps(), self.keep_m());
+        let mut blockers = Vec::new();
+        for &parent in parents {
+            self.walk(&sweeps, ElementId(parent), keep_m, &mut |id, standing| {
+                out.push(id.0);
+                match self.forest.patch(id) {
+                    Some(patch) if standing == Standing::Between => blockers.push(patch),
+                    Some(_) => {}
+                    None => {
+                        self.walk(&sweeps, id, -1.0, &mut |id, standing| {
+                            let blocks = standing == Standing::Between;
+                            blockers.extend(self.forest.patch(id).filter(|_| blocks));
+                            true
+                        });
+                    }
+                }
+                true
+            });
+        }
+        blockers
+    }
+
     /// Those of the blockers of a pair above that may block segments of this one.
     pub fn those_that_block(&self, blockers: &[PatchId]) -> Vec<PatchId> {
-        let blocks = |patch: &PatchId| self.may_be_blocked_by(*patch, Test::Exact);
+        let sweeps = self.sweeps();
+        let blocks = |patch: &PatchId| self.standing(&sweeps, *patch) == Standing::Between;
         blockers.iter().copied().filter(blocks).collect()
     }
 
@@ -304,51 +404,56 @@ impl<'a> Shaft<'a> {
     /// Whether anything at or below `id` may block segments of this pair or of one below it,
     /// what rides on `except` aside.
     pub fn is_entered_by(&self, id: ElementId, except: Option<BodyId>) -> bool {
+        self.enters(&self.sweeps(), id, except)
+    }
+
+    fn enters(&self, sweeps: &Sweeps, id: ElementId, except: Option<BodyId>) -> bool {
         if except.is_some() && self.forest.cluster_body(id) == except {
             return false;
         }
         if except.is_some() && self.forest.patch(id).is_none() {
             // Groups of bodies are opened one by one, so that the excepted one is met.
-            let bounds = self.view.fixed_box(id).grown(self.slack());
+            let bounds = self.view.fixed_box(id);
             return self.forest.kind(id) == Kind::Cluster
-                && shaft_meets_box(&self.a.bounds, &self.b.bounds, &bounds)
-                && self.forest.children(id).any(|c| self.is_entered_by(ElementId(c), except));
+                && sweeps.world.meets(bounds, self.slack())
+                && self.forest.children(id).any(|c| self.enters(sweeps, ElementId(c), except));
         }
         let mut entered = false;
-        self.walk(id, -1.0, Test::Wide, &mut |_| {
+        self.walk(sweeps, id, -1.0, &mut |_, _| {
             entered = true;
             false
         });
         entered
     }
 
-    /// Visits the candidates at or below `id`: patches, and clusters no larger than `keep_m`; ends
-    /// and returns false as soon as `visit` does.
+    /// Visits the candidates at or below `id`: patches that are not out, and clusters no larger than `keep_m`;
+    /// ends and returns false as soon as `visit` does.
     fn walk(
         &self,
+        sweeps: &Sweeps,
         id: ElementId,
         keep_m: f64,
-        test: Test,
-        visit: &mut dyn FnMut(ElementId) -> bool,
+        visit: &mut dyn FnMut(ElementId, Standing) -> bool,
     ) -> bool {
         let world = self.view.fixed_box(id);
         if world.is_empty() || self.forest.kind(id) == Kind::Light {
             return true;
         }
         if let Some(patch) = self.forest.patch(id) {
-            return !self.may_be_blocked_by(patch, test) || visit(id);
+            let standing = self.standing(sweeps, patch);
+            return standing == Standing::Out || visit(id, standing);
         }
         let body = self.forest.cluster_body(id);
-        let (own, a, b) = self.seen_by(body);
+        let Frame { own, sweep, .. } = self.frame(sweeps, body);
         let bounds = if own { self.view.box_in_body(id) } else { world };
-        if !shaft_meets_box(&a.bounds, &b.bounds, &bounds.grown(self.slack())) {
+        if !sweep.meets(bounds, self.slack()) {
             return true;
         }
         // Groups of bodies are never kept: their boxes mix frames.
         if body.is_some() && bounds.diagonal() <= keep_m {
-            return visit(id);
+            return visit(id, Standing::Beside);
         }
-        self.forest.children(id).all(|c| self.walk(ElementId(c), keep_m, test, visit))
+        self.forest.children(id).all(|c| self.walk(sweeps, ElementId(c), keep_m, visit))
     }
 
     /// Blockers in one frame: that of the pair's body if it has one of its own.
@@ -402,18 +507,17 @@ impl<'a> Shaft<'a> {
     fn blocked(
         &self,
         simd: Simd,
-        blockers: &[PatchId],
+        blockers: &[(bool, Lifted<'_>)],
         world: &SegmentBundle,
         own: Option<&SegmentBundle>,
     ) -> u16 {
         let mut mask = 0_u16;
         let slack = 2.0 * self.slack();
-        for &patch in blockers {
+        for (rides, lifted) in blockers {
             if mask == u16::MAX {
                 break;
             }
-            let (rides, lifted) = self.lifted(patch);
-            let bundle = own.filter(|_| rides).unwrap_or(world);
+            let bundle = own.filter(|_| *rides).unwrap_or(world);
             mask |= bundle.blocked_by(simd, &lifted.polygon(), slack);
         }
         mask
@@ -434,10 +538,11 @@ pub fn visibility(
     }
     let (a, b) = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
     let mut tally = Tally::default();
+    let lifted: Vec<_> = blockers.iter().map(|&patch| shaft.lifted(patch)).collect();
     for block in 0..(1_u32 << log2_count) / SEGMENTS as u32 {
         let world = SegmentBundle::new(shaft.a, shaft.b, key, log2_count, block);
         let own = shaft.own.map(|(_, a, b)| SegmentBundle::new(a, b, key, log2_count, block));
-        let mask = shaft.blocked(simd, blockers, &world, own.as_ref());
+        let mask = shaft.blocked(simd, &lifted, &world, own.as_ref());
         // Weights from the body's frame where there is one: they must not follow its motion.
         tally.add(own.as_ref().unwrap_or(&world), mask, a, b);
     }
@@ -475,7 +580,8 @@ pub fn light_visibility(
         return Visibility::CLEAR;
     }
     let mut tally = Tally::default();
-    let blocked = shaft.blocked(simd, blockers, segments, None);
+    let lifted: Vec<_> = blockers.iter().map(|&patch| shaft.lifted(patch)).collect();
+    let blocked = shaft.blocked(simd, &lifted, segments, None);
     if blocked == u16::MAX && shaft.is_hidden_from(from, blockers) {
         return Visibility { value: 0.0, segments: 1, ..Visibility::CLEAR };
     }
@@ -661,6 +767,82 @@ mod tests {
         assert!((alone - 0.327).abs() < 2e-3, "{alone}");
         assert!((alone - filled).abs() < 1e-9, "{alone} {filled}");
         assert!(floor_to_ceiling(false, |b| cuboid(b, 0.0, 1.0, [0.0, 1.0])) < 1e-4);
+    }
+
+    /// What segments between two slivers cross is among their blockers, and among the candidates of every
+    /// pair above them; and the walk for both at once finds what either finds alone.
+    #[test]
+    fn no_sliver_that_segments_cross_is_left_out() {
+        let mut b = SceneBuilder::new("slivers");
+        let grey = b.double_sided_material("grey", [0.5; 3], [0.0; 3]);
+        let node = b.node("slivers", None, DVec3::ZERO, DQuat::IDENTITY);
+        // Two twisted tubes through each other.
+        let ring = |k: usize, x: f64, turned: bool| {
+            let (sin, cos) = (k as f64 * std::f64::consts::TAU / 12.0 + x).sin_cos();
+            let p = DVec3::new(x, 0.3 * sin, 0.3 * cos);
+            if turned { DVec3::new(p.z, p.x, p.y) } else { p }
+        };
+        for k in 0..24 {
+            let p = |by: usize, x| ring(k + by, x, k >= 12);
+            b.polygon(node, &format!("{k} up"), grey, &[p(0, -1.0), p(1, -1.0), p(1, 1.0)]);
+            b.polygon(node, &format!("{k} down"), grey, &[p(0, -1.0), p(1, 1.0), p(0, 1.0)]);
+        }
+        let scene = b.build().unwrap();
+        let mut forest = Forest::new(&scene);
+        let view = WorldView::new(&scene, &forest, 0.0);
+        let patches = || (0..scene.patches.len() as u32).map(PatchId);
+        // Of every seventh patch one part besides.
+        let roots: Vec<ElementId> = patches().map(|p| forest.patch_root(p)).collect();
+        let mut ends: Vec<(ElementId, ElementId)> = roots.iter().map(|&id| (id, id)).collect();
+        for &root in roots.iter().step_by(7) {
+            ends.extend(forest.split(root).0.map(|part| (ElementId(part), root)));
+        }
+        let place = |id| WorldElement::new(&view, &forest, id, false);
+        let patch = |id| forest.patch(id).unwrap();
+        let (mut crossed, mut looked_at, mut found) = (0, 0, 0);
+        for (k, &(one, one_above)) in ends.iter().enumerate() {
+            for &(two, two_above) in ends[k + 1..].iter().step_by(5) {
+                let patches_of = (patch(one), patch(two));
+                let (a, b, above) = (place(one), place(two), (place(one_above), place(two_above)));
+                let shaft = |a, b| Shaft {
+                    forest: &forest,
+                    view: &view,
+                    a,
+                    b,
+                    own: None,
+                    patches: patches_of,
+                };
+                let (mut handed, mut both) = (Vec::new(), Vec::new());
+                shaft(&above.0, &above.1).narrow(&[Forest::ROOT.0], &mut handed);
+                let pair = shaft(&a, &b);
+                let blockers = pair.blockers(&[Forest::ROOT.0]);
+                assert_eq!(pair.narrow_to_blockers(&handed, &mut both), blockers);
+                let mut alone = Vec::new();
+                pair.narrow(&handed, &mut alone);
+                assert_eq!(both, alone);
+                let fronts = patches().filter(|&p| !view.is_hidden_twin(p)).count();
+                (looked_at, found) = (looked_at + fronts, found + blockers.len());
+                for block in 0..4 {
+                    let segments = SegmentBundle::new(&a, &b, 7, 6, block);
+                    // Those that leave one front and arrive at the other.
+                    let faces = (0..SEGMENTS).filter(|&k| segments.weight[k] > 0.0);
+                    let mask = faces.fold(0_u16, |mask, k| mask | 1 << k);
+                    for by in patches().filter(|&p| !view.is_hidden_twin(p)) {
+                        if by == patches_of.0 || by == patches_of.1 {
+                            continue;
+                        }
+                        let slack = 8.0 * pair.slack();
+                        let hits = segments.blocked_by(Simd::detect(), &view.occluder(by), slack);
+                        if hits & mask != 0 {
+                            crossed += 1;
+                            assert!(blockers.contains(&by), "{patches_of:?} {by:?}");
+                        }
+                    }
+                }
+            }
+        }
+        assert!(crossed > 10_000, "{crossed}");
+        assert!(5 * found < 4 * looked_at, "{found} of {looked_at}");
     }
 
     #[test]

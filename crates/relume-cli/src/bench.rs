@@ -15,9 +15,9 @@ use crate::clip::{self, Clip, fixed, now};
 use crate::failure::Failure;
 use crate::figures::{Cold, Figures, Held, Measured};
 use crate::interrupt;
+use crate::memory;
 use crate::output::{self, count, counted};
 use crate::progress::Progress;
-use crate::report::peak_memory_bytes;
 use crate::sequence::{Sequence, Stepping};
 use crate::strategies;
 
@@ -234,13 +234,13 @@ impl<'a, Q: Sequence> Bench<'a, Q> {
 
     /// What was measured; `None` before the second frame.
     fn figures(self) -> Option<Figures> {
-        let memory = self.session.held();
-        let peak = peak_memory_bytes().unwrap_or_else(|| self.session.held_bytes());
+        let held = self.session.held();
+        let peak = memory::peak_bytes().unwrap_or_else(|| self.session.held_bytes());
         let report = &self.frames.last()?.report;
         let held = Held {
-            pair_bytes: memory.pairs,
-            element_bytes: memory.elements,
-            fixed_bytes: memory.fixed,
+            pair_bytes: held.pairs,
+            element_bytes: held.elements,
+            fixed_bytes: held.fixed,
             peak_bytes: peak,
             pairs: report.pairs.active + report.pairs.refined + report.pairs.culled,
             elements: report.elements,

@@ -81,7 +81,7 @@ pub(crate) struct RunOptions {
     pub(crate) update: String,
     /// Threads used.
     pub(crate) threads: usize,
-    /// Limit on the engine's memory.
+    /// Limit on the memory of the process.
     pub(crate) max_memory_bytes: Option<u64>,
     /// How pictures were drawn, if they were.
     pub(crate) picture: Option<PictureOptions>,
@@ -224,14 +224,6 @@ fn holds_null(value: &serde_json::Value) -> bool {
     }
 }
 
-/// Most memory this process has held, bytes, as the system counts it; `None` where it does not say.
-pub(crate) fn peak_memory_bytes() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kilobytes * 1024)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -296,11 +288,5 @@ mod tests {
         other.schema = "relume-report/9".into();
         other.write(&path).unwrap();
         assert!(Report::read(&path).unwrap_err().to_string().contains("relume-report/9"));
-    }
-
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn peak_memory_is_known() {
-        assert!(peak_memory_bytes().unwrap() > 100_000);
     }
 }

@@ -25,9 +25,10 @@ use crate::failure::Failure;
 use crate::frames;
 use crate::interrupt;
 use crate::lock::Lock;
+use crate::memory;
 use crate::output::{self, count, counted};
 use crate::progress::Progress;
-use crate::report::{PictureOptions, Report, RunOptions, SceneSummary, peak_memory_bytes};
+use crate::report::{PictureOptions, Report, RunOptions, SceneSummary};
 use crate::resume;
 use crate::scene_file;
 
@@ -205,7 +206,7 @@ impl Job {
             oracle: flags.oracle.to_string(),
             update: self.solve.update.name(),
             threads: clip.threads,
-            max_memory_bytes: flags.max_memory.map(|memory| memory.bytes),
+            max_memory_bytes: memory::limit_bytes(),
             picture,
         }
     }
@@ -340,7 +341,7 @@ impl Finished {
     }
 
     fn write_report(&mut self) -> Result<(), Failure> {
-        let peak = peak_memory_bytes().unwrap_or(0);
+        let peak = memory::peak_bytes().unwrap_or(0);
         self.report.peak_memory_bytes = self.report.peak_memory_bytes.max(peak);
         self.paths.0.iter().try_for_each(|path| self.report.write(path))
     }

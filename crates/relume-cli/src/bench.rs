@@ -197,7 +197,7 @@ impl<'a, Q: Sequence> Bench<'a, Q> {
         let from = self.sequence.frames()[k - 1];
         let mut cold = if asked && before { Some(self.cold(frame, from)?) } else { None };
         let started = now();
-        let report = self.sequence.step(&mut self.session, frame)?;
+        let report = self.sequence.step(&mut self.session, frame, 0)?;
         let seconds = started.elapsed().as_secs_f64();
         let picture_seconds = self.draw(frame)?;
         if asked && !before {
@@ -221,7 +221,7 @@ impl<'a, Q: Sequence> Bench<'a, Q> {
         let started = now();
         let mut session = self.sequence.begin(update)?;
         session.count_from(from.map(|frame| self.sequence.time_of(frame)));
-        let report = self.sequence.step(&mut session, frame)?;
+        let report = self.sequence.step(&mut session, frame, self.session.held_bytes())?;
         let seconds = started.elapsed().as_secs_f64();
         Ok((session, Cold { seconds, report }))
     }

@@ -18,9 +18,9 @@ use crate::args::MemorySize;
 use crate::failure::Failure;
 use crate::interrupt;
 
-/// What the program itself and its allocator hold beside what is counted, bytes. Half of what a process may
-/// be above its limit: the other half is for what it takes between two looks.
-const OWN_BYTES: u64 = 16 << 20;
+/// What the program itself holds beside what is counted, bytes. A quarter of what a process may be above its
+/// limit: the rest is for what it takes between two looks, on a machine whose cores are taken.
+const OWN_BYTES: u64 = 8 << 20;
 /// Shortest and longest time between two looks.
 const INTERVAL: (Duration, Duration) = (Duration::from_millis(1), Duration::from_millis(50));
 /// What one core can take of memory in a second, bytes: fresh pages are zeroed first.
@@ -61,6 +61,11 @@ pub(crate) fn limit_bytes() -> Option<u64> {
     LIMIT.get().copied()
 }
 
+/// The limit for one of several, bytes, where the others hold so many.
+pub(crate) fn left_beside(bytes: u64) -> Option<u64> {
+    limit_bytes().map(|limit| limit.saturating_sub(bytes))
+}
+
 /// Says what is under way: `frame 3`, ``reading `room.glb` ``.
 pub(crate) fn at(what: impl Display) {
     if LIMIT.get().is_some() {
@@ -84,8 +89,8 @@ pub(crate) fn exceeded(what: &str) -> Failure {
     let limit = HumanBytes(limit_bytes().unwrap_or(u64::MAX));
     let what = if what.is_empty() { "this".to_owned() } else { what.to_owned() };
     Failure::out_of_memory(format_args!("{what} needs more than the {limit} of memory allowed")).help(
-        "raise --max-memory, or ask for less: a coarser --tolerance, smaller pictures, fewer threads, a simpler \
-         scene; what is finished stays",
+        "raise --max-memory, or ask for less: a coarser tolerance or epsilon, smaller pictures, fewer threads, a \
+         simpler scene; what is finished stays",
     )
 }
 

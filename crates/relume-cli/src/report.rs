@@ -16,6 +16,7 @@ use serde_json::value::RawValue;
 use crate::args::Shading;
 use crate::failure::Failure;
 use crate::interrupt;
+use crate::memory;
 
 /// Name of the format.
 pub(crate) const SCHEMA: &str = "relume-report/1";
@@ -183,6 +184,8 @@ impl Report {
 
     /// Reads a report; `None` if there is no such file.
     pub(crate) fn read(path: &Path) -> Result<Option<Report>, Failure> {
+        let length = fs::metadata(path).map_or(0, |file| file.len());
+        memory::ask(length, format_args!("reading {}", path.display()))?;
         let text = match fs::read_to_string(path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),

@@ -111,6 +111,10 @@ impl Job {
             Viewpoint::new(&clip.scene, flags.camera.as_deref()).map_err(Failure::new)
         });
         let camera = camera.transpose()?;
+        if let Some((_, flags)) = &self.picture {
+            // Not only after the first frame.
+            ask_for_picture(flags)?;
+        }
         if let Some(dir) = &self.dir {
             make_directory(dir)?;
         }
@@ -429,10 +433,14 @@ impl Run<'_> {
         let Some((view, options, flags)) = self.view(frame)? else { return Ok(()) };
         let exposure = options.exposure_ev.map_or(Exposure::Automatic, fixed);
         let settings = clip::picture_settings(flags, options.shading, exposure);
+        ask_for_picture(flags)?;
         let image = picture::render(&snapshot, &view, &settings);
+        drop(snapshot);
+        let bytes = image.to_png().map_err(Failure::new)?;
+        // No longer than it takes: while this is held, nothing can end the run.
         let _guard = interrupt::writing();
-        image.write_png(path).map_err(|error| {
-            Failure::new(error)
+        write_atomically(path, &bytes).map_err(|error| {
+            Failure::write(path, &error)
                 .help("free some space or check the permissions, then run again with --resume")
         })
     }
@@ -499,6 +507,15 @@ impl Run<'_> {
         let kept = if kept { "the frames before it are finished and stay" } else { "" };
         clip::step_failure(error, kept)
     }
+}
+
+/// Bytes a pixel while a picture is drawn: in tiles and whole.
+const PIXEL_BYTES: u64 = 6;
+
+/// An error if there is no room for a picture.
+fn ask_for_picture(flags: &PictureFlags) -> Result<(), Failure> {
+    let pixels = u64::from(flags.size.width) * u64::from(flags.size.height);
+    memory::ask(pixels * PIXEL_BYTES, format_args!("a picture of {}", flags.size))
 }
 
 /// The first of the frames of the animation in which most is emitted; `None` if nothing ever is.

@@ -96,8 +96,10 @@ pub(crate) fn exceeded(what: &str) -> Failure {
 
 /// The bytes of a file, if there is room for them.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    let reading = format_args!("reading {}", path.display());
+    at(reading);
     if let Ok(file) = fs::metadata(path) {
-        ask(file.len(), format_args!("reading {}", path.display()))?;
+        ask(file.len(), reading)?;
     }
     fs::read(path).map_err(|error| Failure::read(path, &error))
 }

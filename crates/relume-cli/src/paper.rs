@@ -19,6 +19,7 @@ use crate::failure::Failure;
 use crate::figures::{Row, time, times};
 use crate::flat::draw::{BLACK, GREY, PINK, table};
 use crate::interrupt;
+use crate::memory;
 use crate::output;
 
 /// Largest form factor of a link, as in the tables of docs/prediction.md.
@@ -109,6 +110,7 @@ fn columns(clip: &Clip, update: UpdateChoice, shown: &[u32]) -> Result<[Vec<Draw
             return Err(Failure::interrupted("interrupted; nothing is written"));
         }
         let time_s = clip.time_of(frame);
+        memory::at(format_args!("frame {frame}"));
         session.step(frame, time_s).map_err(|error| step_failure(error, ""))?;
         let view = camera.at(&clip.scene, time_s).map_err(Failure::new)?;
         let snapshot = session.snapshot();

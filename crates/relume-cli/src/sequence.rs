@@ -46,9 +46,9 @@ impl Stepping for Session {
 impl Stepping for FlatSession {
     fn go(&mut self, frame: u32, time_s: f64, beside_bytes: u64) -> Result<FrameReport, Failure> {
         let limit = memory::left_beside(beside_bytes);
-        let report = self.step_within(frame, time_s, limit).map_err(|OutOfMemory| {
-            memory::exceeded(&format!("frame {frame}"))
-        })?;
+        let report = self
+            .step_within(frame, time_s, limit)
+            .map_err(|OutOfMemory| memory::exceeded(&format!("frame {frame}")))?;
         // What settles comes to a few times the residual asked for.
         let most = 10.0 * FlatOptions::default().residual;
         let unbalanced = report.energy.map_or(0.0, |energy| energy.unbalanced());

@@ -60,9 +60,9 @@ pub(crate) fn flat(args: &FlatArgs) -> Result<(), Failure> {
     let path = args.scene.as_deref().ok_or_else(|| {
         Failure::usage("which scene?").help("name a file: relume flat scene.flat")
     })?;
-    memory::at(format_args!("reading {}", path.display()));
     let text = String::from_utf8(memory::read(path)?).map_err(|_| {
-        let invalid = io::Error::new(io::ErrorKind::InvalidData, "stream did not contain valid UTF-8");
+        let invalid =
+            io::Error::new(io::ErrorKind::InvalidData, "stream did not contain valid UTF-8");
         Failure::read(path, &invalid)
     })?;
     let scene = match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("svg")) {

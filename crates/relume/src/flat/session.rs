@@ -7,8 +7,8 @@ use crate::element::{ElementId, ElementKey};
 use crate::event::Ticks;
 use crate::pair::{Carried, LinkEvent, OutOfMemory, PairHash, PairTree, Record, update};
 use crate::session::{
-    Ahead, Clock, ElementName, Event, FrameReport, Memory, PairCounts, Receivers, Solution, Update, budget,
-    apply_edits, balance_of, links_of, most_mean, while_extrapolated, with_names,
+    Ahead, Clock, ElementName, Event, FrameReport, Memory, PairCounts, Receivers, Solution, Update,
+    apply_edits, balance_of, budget, links_of, most_mean, while_extrapolated, with_names,
 };
 use crate::solver::{Dirty, Links, Lit, Place, Radiosity, Surfaces};
 

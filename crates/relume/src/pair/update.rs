@@ -312,8 +312,8 @@ pub fn update<J: Judge>(
                 for chunk in &judged {
                     editor.apply_chunk(chunk, &wave);
                 }
-                let held = editor.changes.held.capacity() * size_of::<Held>();
-                let scratch = wave.memory_bytes() + editor.next.memory_bytes() + held as u64;
+                let held = editor.changes.held.len() * size_of::<Held>();
+                let scratch = wave.used_bytes() + editor.next.used_bytes() + held as u64;
                 if !may_go_on(editor.tree, editor.judge.element_count(), scratch) {
                     return Err(OutOfMemory);
                 }
@@ -366,8 +366,9 @@ impl Wave {
         List { start, len: list.len() as u32 }
     }
 
-    fn memory_bytes(&self) -> u64 {
-        (self.items.capacity() * size_of::<Item>() + self.candidates.capacity() * 4) as u64
+    /// Without the room that is kept to grow into, as [`PairTree::used_bytes`].
+    fn used_bytes(&self) -> u64 {
+        (self.items.len() * size_of::<Item>() + self.candidates.len() * 4) as u64
     }
 }
 

@@ -37,7 +37,9 @@ pub enum SceneError {
         remedy: String,
     },
     /// A file, an image or a list of numbers is larger than the memory allowed, by itself.
-    #[error("`{file}`: {what} needs {needs_bytes} bytes, more than the {limit_bytes} of memory allowed; {remedy}")]
+    #[error(
+        "`{file}`: {what} needs {needs_bytes} bytes, more than the {limit_bytes} of memory allowed; {remedy}"
+    )]
     TooLarge {
         /// The file.
         file: String,

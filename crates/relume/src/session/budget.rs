@@ -15,7 +15,7 @@ const ELEMENT_BYTES: u64 = 122;
 pub(crate) fn within(max_memory_bytes: Option<u64>) -> impl Fn(&PairTree, usize, u64) -> bool {
     let limit = max_memory_bytes.unwrap_or(u64::MAX);
     move |tree, elements, scratch| {
-        let pairs = tree.memory_bytes() + tree.len() as u64 * PAIR_LINKS_BYTES;
+        let pairs = tree.used_bytes() + tree.len() as u64 * PAIR_LINKS_BYTES;
         pairs + elements as u64 * ELEMENT_BYTES + scratch <= limit
     }
 }

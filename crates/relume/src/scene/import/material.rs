@@ -214,7 +214,9 @@ fn mean_of_image(document: &Document, index: usize) -> Result<[f64; 3], NoMean> 
         }
         (None, Some(view)) => document.view(view).map_err(of_scene)?.0.to_vec(),
         (None, None) => {
-            return Err(unreadable(&format!("image {index} names neither a file nor a buffer view")));
+            return Err(unreadable(&format!(
+                "image {index} names neither a file nor a buffer view"
+            )));
         }
     };
     let format = image::guess_format(&bytes).map_err(|e| unreadable(&e))?;

@@ -22,15 +22,15 @@ const MIB: u64 = 1 << 20;
 #[track_caller]
 fn runs_out(arguments: &[&str], mib: u64, texts: &[&str]) -> Ran {
     let limit = format!("{mib}M");
-    let (ran, peak) = measured(&[arguments, &["--max-memory", &limit]].concat());
-    ran.fails(3, &[texts, &["of memory allowed", "\n  help: raise --max-memory"]].concat());
     let most = mib * MIB + (mib * MIB / 10).max(32 * MIB);
+    let (ran, peak) = measured(&[arguments, &["--max-memory", &limit]].concat(), most);
     assert!(peak <= most, "{} MiB of {mib}: {}", peak / MIB, ran.err);
+    ran.fails(3, &[texts, &["of memory allowed", "\n  help: raise --max-memory"]].concat());
     ran
 }
 
-/// Runs the command; the most memory it was seen to hold, bytes.
-fn measured(arguments: &[&str]) -> (Ran, u64) {
+/// Runs the command; the most memory it was seen to hold, bytes. It is ended where that is above a bound.
+fn measured(arguments: &[&str], most: u64) -> (Ran, u64) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_relume"))
         .args(arguments)
         .stdout(Stdio::piped())
@@ -56,6 +56,9 @@ fn measured(arguments: &[&str]) -> (Ran, u64) {
         peak = kilobytes.map_or(peak, |k| k * 1024);
         if let Some(status) = child.try_wait().unwrap() {
             break status.code();
+        }
+        if peak > most {
+            let _ = child.kill();
         }
         std::thread::sleep(std::time::Duration::from_millis(1));
     };

@@ -28,7 +28,7 @@ fn names_in(dir: &Path) -> Vec<String> {
 
 #[test]
 fn wrong_usage_is_explained() {
-    relume(&[]).fails(2, &["Usage: relume <COMMAND>", "demo", "render"]);
+    relume(&[]).fails(2, &["Usage: relume [OPTIONS] <COMMAND>", "demo", "render"]);
     relume(&["solve"]).fails(2, &["SCENE"]);
     relume(&["render", "a.glb"]).fails(2, &["--output"]);
     for (flag, value, message) in [

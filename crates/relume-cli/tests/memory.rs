@@ -5,9 +5,8 @@
 mod common;
 
 use std::fs::{self, File};
-use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use common::{Ran, json, relume, room, text};
 use glam::{DQuat, DVec3};
@@ -31,22 +30,15 @@ fn runs_out(arguments: &[&str], mib: u64, texts: &[&str]) -> Ran {
 
 /// Runs the command; the most memory it was seen to hold, bytes. It is ended where that is above a bound.
 fn measured(arguments: &[&str], most: u64) -> (Ran, u64) {
+    let dir = tempfile::tempdir().unwrap();
+    let (out, err) = (dir.path().join("out"), dir.path().join("err"));
     let mut child = Command::new(env!("CARGO_BIN_EXE_relume"))
         .args(arguments)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
+        .stdout(File::create(&out).unwrap())
+        .stderr(File::create(&err).unwrap())
         .spawn()
         .unwrap();
     let status = format!("/proc/{}/status", child.id());
-    let text = |mut from: Box<dyn Read + Send>| {
-        std::thread::spawn(move || {
-            let mut text = String::new();
-            from.read_to_string(&mut text).unwrap();
-            text
-        })
-    };
-    let out = text(Box::new(child.stdout.take().unwrap()));
-    let err = text(Box::new(child.stderr.take().unwrap()));
     let mut peak = 0;
     let code = loop {
         let held = fs::read_to_string(&status).unwrap_or_default();
@@ -62,7 +54,8 @@ fn measured(arguments: &[&str], most: u64) -> (Ran, u64) {
         }
         std::thread::sleep(std::time::Duration::from_millis(1));
     };
-    (Ran { code, out: out.join().unwrap(), err: err.join().unwrap() }, peak)
+    let text = |path| fs::read_to_string(path).unwrap();
+    (Ran { code, out: text(out), err: text(err) }, peak)
 }
 
 /// A file of zeros that takes no room on the disk.

@@ -24,11 +24,16 @@ const THREADS_MAX: usize = 1_024;
     version,
     about = "Diffuse light of animated glTF scenes, frame by frame (hierarchical radiosity)",
     after_help = "Start with:  relume demo room\n\
-                  Exit codes:  0 done, 1 an error (or one found by `check` or `verify`), 2 wrong usage, 130 interrupted",
+                  Exit codes:  0 done, 1 an error (or one found by `check` or `verify`), 2 wrong usage, 3 more than \
+                  --max-memory is needed, 130 interrupted",
     arg_required_else_help = true,
     max_term_width = 100
 )]
 pub(crate) struct Cli {
+    /// Limit on all memory that the process holds, in bytes or with K, M, G or T (powers of 1024): 4G,
+    /// 512M; what needs more ends with exit code 3 [default: no limit].
+    #[arg(long, value_name = "SIZE", global = true, allow_negative_numbers = true)]
+    pub(crate) max_memory: Option<MemorySize>,
     /// What to do.
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -470,10 +475,6 @@ pub(crate) struct ClipFlags {
     /// Threads to use; the result has the same bits for any number [default: all cores].
     #[arg(long, value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
-    /// Limit on the memory of the engine, in bytes or with K, M, G or T (powers of 1024): 4G, 512M
-    /// [default: no limit].
-    #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
-    pub(crate) max_memory: Option<MemorySize>,
     /// No progress bar, no warnings, no summary; errors only.
     #[arg(short, long)]
     pub(crate) quiet: bool,
@@ -488,7 +489,6 @@ impl Default for ClipFlags {
             tolerance: None,
             oracle: OracleFlag::Error,
             threads: None,
-            max_memory: None,
             quiet: false,
         }
     }

@@ -15,9 +15,9 @@ use crate::clip::{self, Clip, fixed, now};
 use crate::failure::Failure;
 use crate::figures::{Cold, Figures, Held, Measured};
 use crate::interrupt;
+use crate::memory;
 use crate::output::{self, count, counted};
 use crate::progress::Progress;
-use crate::report::peak_memory_bytes;
 use crate::sequence::{Sequence, Stepping};
 use crate::strategies;
 
@@ -197,7 +197,7 @@ impl<'a, Q: Sequence> Bench<'a, Q> {
         let from = self.sequence.frames()[k - 1];
         let mut cold = if asked && before { Some(self.cold(frame, from)?) } else { None };
         let started = now();
-        let report = self.sequence.step(&mut self.session, frame)?;
+        let report = self.sequence.step(&mut self.session, frame, 0)?;
         let seconds = started.elapsed().as_secs_f64();
         let picture_seconds = self.draw(frame)?;
         if asked && !before {
@@ -221,7 +221,7 @@ impl<'a, Q: Sequence> Bench<'a, Q> {
         let started = now();
         let mut session = self.sequence.begin(update)?;
         session.count_from(from.map(|frame| self.sequence.time_of(frame)));
-        let report = self.sequence.step(&mut session, frame)?;
+        let report = self.sequence.step(&mut session, frame, self.session.held_bytes())?;
         let seconds = started.elapsed().as_secs_f64();
         Ok((session, Cold { seconds, report }))
     }
@@ -234,13 +234,13 @@ impl<'a, Q: Sequence> Bench<'a, Q> {
 
     /// What was measured; `None` before the second frame.
     fn figures(self) -> Option<Figures> {
-        let memory = self.session.held();
-        let peak = peak_memory_bytes().unwrap_or_else(|| self.session.held_bytes());
+        let held = self.session.held();
+        let peak = memory::peak_bytes().unwrap_or_else(|| self.session.held_bytes());
         let report = &self.frames.last()?.report;
         let held = Held {
-            pair_bytes: memory.pairs,
-            element_bytes: memory.elements,
-            fixed_bytes: memory.fixed,
+            pair_bytes: held.pairs,
+            element_bytes: held.elements,
+            fixed_bytes: held.fixed,
             peak_bytes: peak,
             pairs: report.pairs.active + report.pairs.refined + report.pairs.culled,
             elements: report.elements,

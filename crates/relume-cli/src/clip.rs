@@ -90,9 +90,6 @@ impl Clip {
     ) -> Result<Clip, Failure> {
         let frames = frames::resolve(flags.frames.as_ref(), scene.motion.duration_s, flags.fps)
             .map_err(|error| Failure::new(error).help("`relume info` lists the frames"))?;
-        if let Some(memory) = flags.max_memory {
-            memory::keep_below(memory.bytes);
-        }
         Ok(Clip {
             scene: Arc::new(scene),
             frames,
@@ -166,7 +163,7 @@ impl Clip {
             update,
             balance,
             events: false,
-            max_memory_bytes: self.flags.max_memory.map(|memory| memory.bytes),
+            max_memory_bytes: memory::limit_bytes(),
         })
     }
 
@@ -186,10 +183,10 @@ pub(crate) fn step_failure(error: SessionError, kept: &str) -> Failure {
     match error {
         SessionError::OutOfMemory { frame, tolerance, limit_bytes, links } => {
             let separator = if kept.is_empty() { "" } else { "; " };
-            Failure::new(format_args!(
+            Failure::out_of_memory(format_args!(
                 "frame {frame} at tolerance {tolerance} needs more than the {} of memory \
                  allowed ({} pairs so far)",
-                HumanBytes(limit_bytes),
+                HumanBytes(memory::limit_bytes().unwrap_or(limit_bytes)),
                 count(links)
             ))
             .help(format_args!("raise --max-memory or the tolerance{separator}{kept}"))

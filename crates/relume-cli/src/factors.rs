@@ -43,7 +43,7 @@ pub(crate) fn factors(args: &FactorsArgs) -> Result<(), Failure> {
     let progress = Progress::new(clip.frames.len(), 0, args.clip.quiet);
     let outcome = frames(args, &clip, &things, &progress, &mut table);
     progress.clear();
-    let frames = outcome?;
+    let frames = outcome.map_err(interrupt::keeping_rows)?;
     table.finish(&clip, &things)?;
     if let Some(path) = &args.report {
         write_report(path, args, &clip, &things, &frames)?;

@@ -6,6 +6,9 @@ use std::path::Path;
 
 use crate::output;
 
+/// Exit code where `--max-memory` does not suffice.
+const OUT_OF_MEMORY: u8 = 3;
+
 /// An error as the user sees it.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Failure {
@@ -28,6 +31,16 @@ impl Failure {
     /// Ctrl-C: exit code 130, as shells expect.
     pub(crate) fn interrupted(message: impl fmt::Display) -> Failure {
         Failure { exit_code: 130, ..Failure::new(message) }
+    }
+
+    /// `--max-memory` is reached: exit code 3.
+    pub(crate) fn out_of_memory(message: impl fmt::Display) -> Failure {
+        Failure { exit_code: OUT_OF_MEMORY, ..Failure::new(message) }
+    }
+
+    /// Whether the memory allowed is what was missing.
+    pub(crate) fn is_out_of_memory(&self) -> bool {
+        self.exit_code == OUT_OF_MEMORY
     }
 
     /// Says what to do about it.

@@ -53,6 +53,15 @@ pub(crate) fn end(why: &Failure) -> ! {
     std::process::exit(i32::from(why.exit_code()));
 }
 
+/// Ends the process at once where memory ran out, so that the rows kept so far stay as they do when a run is
+/// stopped; hands any other failure on.
+pub(crate) fn keeping_rows(failure: Failure) -> Failure {
+    if failure.is_out_of_memory() {
+        end(&failure);
+    }
+    failure
+}
+
 /// Says how what is finished is kept when the run is ended in the middle of a frame.
 pub(crate) fn keep_with(keep: impl Fn() -> Result<(), Failure> + Send + 'static) {
     *locked(&KEEP) = Some(Box::new(keep));

@@ -36,7 +36,10 @@ use args::{Cli, Command};
 use failure::Failure;
 
 fn main() -> ExitCode {
-    match execute(Cli::parse().command) {
+    let cli = Cli::parse();
+    // Before anything is read.
+    memory::keep_below(cli.max_memory);
+    match execute(cli.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             output::complain(&failure.to_string());

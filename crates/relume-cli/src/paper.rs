@@ -14,11 +14,12 @@ use relume_picture::picture::{self, Exposure, Outlines, View, Viewpoint};
 
 use crate::args::{DemoScene, Figure, FigureArgs, PictureFlags, Size, UpdateChoice, UpdateFlag};
 use crate::bench::{self, Plan};
-use crate::clip::{Clip, picture_settings};
+use crate::clip::{Clip, picture_settings, step_failure};
 use crate::failure::Failure;
 use crate::figures::{Row, time, times};
 use crate::flat::draw::{BLACK, GREY, PINK, table};
 use crate::interrupt;
+use crate::memory;
 use crate::output;
 
 /// Largest form factor of a link, as in the tables of docs/prediction.md.
@@ -49,9 +50,11 @@ pub(crate) fn save(
 ) -> Result<Vec<String>, Failure> {
     let names = [format!("{name}.svg"), format!("{name}.png")];
     let svg = dir.join(&names[0]);
+    let image = drawing.to_image(scale);
+    let _guard = interrupt::writing();
     write_atomically(&svg, drawing.to_svg().as_bytes())
         .map_err(|error| Failure::write(&svg, &error))?;
-    drawing.to_image(scale).write_png(dir.join(&names[1])).map_err(Failure::new)?;
+    image.write_png(dir.join(&names[1])).map_err(Failure::new)?;
     Ok(names.to_vec())
 }
 
@@ -107,7 +110,8 @@ fn columns(clip: &Clip, update: UpdateChoice, shown: &[u32]) -> Result<[Vec<Draw
             return Err(Failure::interrupted("interrupted; nothing is written"));
         }
         let time_s = clip.time_of(frame);
-        session.step(frame, time_s).map_err(Failure::new)?;
+        memory::at(format_args!("frame {frame}"));
+        session.step(frame, time_s).map_err(|error| step_failure(error, ""))?;
         let view = camera.at(&clip.scene, time_s).map_err(Failure::new)?;
         let snapshot = session.snapshot();
         let exposure = *exposure.get_or_insert_with(|| Exposure::automatic(&snapshot, &view));

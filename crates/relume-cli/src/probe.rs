@@ -34,7 +34,7 @@ pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
     let progress = Progress::new(clip.frames.len(), 0, args.clip.quiet);
     let outcome = frames(&clip, &mut session, &riders, args, &progress, &mut sink);
     progress.clear();
-    let done = outcome?;
+    let done = outcome.map_err(interrupt::keeping_rows)?;
     sink.finish()?;
     if done < clip.frames.len() {
         return Err(Failure::interrupted(format_args!(

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use indicatif::{HumanBytes, HumanCount, HumanDuration, ProgressBar, ProgressStyle};
 
 use crate::clip::now;
+use crate::memory;
 
 static DONE: AtomicU64 = AtomicU64::new(0);
 static WANTED: AtomicU64 = AtomicU64::new(0);
@@ -60,6 +61,7 @@ impl Progress {
 
     /// A frame is being computed.
     pub(crate) fn start(&self, frame: u32, links: u64, memory_bytes: u64) {
+        memory::at(format_args!("frame {frame}"));
         let mut message = format!("frame {frame}");
         if links > 0 {
             message += &format!(", {} links", HumanCount(links));

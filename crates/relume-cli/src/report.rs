@@ -16,6 +16,7 @@ use serde_json::value::RawValue;
 use crate::args::Shading;
 use crate::failure::Failure;
 use crate::interrupt;
+use crate::memory;
 
 /// Name of the format.
 pub(crate) const SCHEMA: &str = "relume-report/1";
@@ -81,7 +82,7 @@ pub(crate) struct RunOptions {
     pub(crate) update: String,
     /// Threads used.
     pub(crate) threads: usize,
-    /// Limit on the engine's memory.
+    /// Limit on the memory of the process.
     pub(crate) max_memory_bytes: Option<u64>,
     /// How pictures were drawn, if they were.
     pub(crate) picture: Option<PictureOptions>,
@@ -183,6 +184,8 @@ impl Report {
 
     /// Reads a report; `None` if there is no such file.
     pub(crate) fn read(path: &Path) -> Result<Option<Report>, Failure> {
+        let length = fs::metadata(path).map_or(0, |file| file.len());
+        memory::ask(length, format_args!("reading {}", path.display()))?;
         let text = match fs::read_to_string(path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
@@ -222,14 +225,6 @@ fn holds_null(value: &serde_json::Value) -> bool {
         serde_json::Value::Object(fields) => fields.values().any(holds_null),
         _ => false,
     }
-}
-
-/// Most memory this process has held, bytes, as the system counts it; `None` where it does not say.
-pub(crate) fn peak_memory_bytes() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kilobytes * 1024)
 }
 
 #[cfg(test)]
@@ -296,11 +291,5 @@ mod tests {
         other.schema = "relume-report/9".into();
         other.write(&path).unwrap();
         assert!(Report::read(&path).unwrap_err().to_string().contains("relume-report/9"));
-    }
-
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn peak_memory_is_known() {
-        assert!(peak_memory_bytes().unwrap() > 100_000);
     }
 }

@@ -3,12 +3,14 @@
 //! What may differ: the frames asked for, the number of threads and the memory limit, since none
 //! of them changes a bit of a frame that was finished.
 
-use std::fs;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
 use crate::failure::Failure;
+use crate::memory;
 use crate::report::Report;
 
 /// Fields that may differ between the runs.
@@ -97,14 +99,12 @@ fn flatten(name: String, value: &Value, into: &mut Vec<(String, String)>) {
 /// FNV-1a over 64 bits: it tells an edited file from the same one, and is no protection against
 /// somebody who wants to deceive.
 pub(crate) fn content_hash(scene: &Path) -> Result<String, Failure> {
-    let bytes = fs::read(scene).map_err(|error| Failure::read(scene, &error))?;
+    let bytes = memory::read(scene)?;
     let mut hash = Fnv::new();
     hash.add(&bytes);
     for file in referred_files(scene, &bytes) {
         // A file that is missing is the importer's to complain about.
-        if let Ok(bytes) = fs::read(&file) {
-            hash.add(&bytes);
-        }
+        let _ = File::open(&file).and_then(|file| hash.add_file(file));
     }
     Ok(format!("{:016x}", hash.0))
 }
@@ -162,7 +162,28 @@ impl Fnv {
 
     /// Adds a file: its length too, so that bytes cannot wander from one file to the next.
     fn add(&mut self, bytes: &[u8]) {
-        for byte in (bytes.len() as u64).to_le_bytes().iter().chain(bytes) {
+        self.add_bytes(&(bytes.len() as u64).to_le_bytes());
+        self.add_bytes(bytes);
+    }
+
+    /// The same, read piece by piece. A device or a pipe has no content of its own.
+    fn add_file(&mut self, mut file: File) -> io::Result<()> {
+        let known = file.metadata()?;
+        if !known.is_file() {
+            return Ok(());
+        }
+        self.add_bytes(&known.len().to_le_bytes());
+        let mut piece = vec![0; 1 << 16];
+        loop {
+            match file.read(&mut piece)? {
+                0 => return Ok(()),
+                length => self.add_bytes(&piece[..length]),
+            }
+        }
+    }
+
+    fn add_bytes(&mut self, bytes: &[u8]) {
+        for byte in bytes {
             self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
         }
     }
@@ -170,6 +191,8 @@ impl Fnv {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use relume::session::FrameReport;
 
     use super::*;

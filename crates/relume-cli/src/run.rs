@@ -25,9 +25,10 @@ use crate::failure::Failure;
 use crate::frames;
 use crate::interrupt;
 use crate::lock::Lock;
+use crate::memory;
 use crate::output::{self, count, counted};
 use crate::progress::Progress;
-use crate::report::{PictureOptions, Report, RunOptions, SceneSummary, peak_memory_bytes};
+use crate::report::{PictureOptions, Report, RunOptions, SceneSummary};
 use crate::resume;
 use crate::scene_file;
 
@@ -110,6 +111,10 @@ impl Job {
             Viewpoint::new(&clip.scene, flags.camera.as_deref()).map_err(Failure::new)
         });
         let camera = camera.transpose()?;
+        if let Some((_, flags)) = &self.picture {
+            // Not only after the first frame.
+            ask_for_picture(flags)?;
+        }
         if let Some(dir) = &self.dir {
             make_directory(dir)?;
         }
@@ -205,7 +210,7 @@ impl Job {
             oracle: flags.oracle.to_string(),
             update: self.solve.update.name(),
             threads: clip.threads,
-            max_memory_bytes: flags.max_memory.map(|memory| memory.bytes),
+            max_memory_bytes: memory::limit_bytes(),
             picture,
         }
     }
@@ -340,7 +345,7 @@ impl Finished {
     }
 
     fn write_report(&mut self) -> Result<(), Failure> {
-        let peak = peak_memory_bytes().unwrap_or(0);
+        let peak = memory::peak_bytes().unwrap_or(0);
         self.report.peak_memory_bytes = self.report.peak_memory_bytes.max(peak);
         self.paths.0.iter().try_for_each(|path| self.report.write(path))
     }
@@ -428,10 +433,14 @@ impl Run<'_> {
         let Some((view, options, flags)) = self.view(frame)? else { return Ok(()) };
         let exposure = options.exposure_ev.map_or(Exposure::Automatic, fixed);
         let settings = clip::picture_settings(flags, options.shading, exposure);
+        ask_for_picture(flags)?;
         let image = picture::render(&snapshot, &view, &settings);
+        drop(snapshot);
+        let bytes = image.to_png().map_err(Failure::new)?;
+        // No longer than it takes: while this is held, nothing can end the run.
         let _guard = interrupt::writing();
-        image.write_png(path).map_err(|error| {
-            Failure::new(error)
+        write_atomically(path, &bytes).map_err(|error| {
+            Failure::write(path, &error)
                 .help("free some space or check the permissions, then run again with --resume")
         })
     }
@@ -498,6 +507,15 @@ impl Run<'_> {
         let kept = if kept { "the frames before it are finished and stay" } else { "" };
         clip::step_failure(error, kept)
     }
+}
+
+/// Bytes a pixel while a picture is drawn: in tiles and whole.
+const PIXEL_BYTES: u64 = 6;
+
+/// An error if there is no room for a picture.
+fn ask_for_picture(flags: &PictureFlags) -> Result<(), Failure> {
+    let pixels = u64::from(flags.size.width) * u64::from(flags.size.height);
+    memory::ask(pixels * PIXEL_BYTES, format_args!("a picture of {}", flags.size))
 }
 
 /// The first of the frames of the animation in which most is emitted; `None` if nothing ever is.

@@ -2,25 +2,37 @@
 
 use std::path::Path;
 
+use indicatif::HumanBytes;
 use relume::scene::{ImportOptions, Note, Scene, SceneError, Severity, check, import};
 
 use crate::args::AnimationFlag;
 use crate::failure::Failure;
+use crate::memory;
 use crate::output;
 
 /// Reads a scene.
 pub(crate) fn load(path: &Path, animation: &AnimationFlag) -> Result<Scene, Failure> {
     let AnimationFlag { name, allow_outside } = animation.clone();
-    import(path, &ImportOptions { animation: name, allow_outside }).map_err(failure)
+    memory::at(format_args!("reading {}", path.display()));
+    let max_memory_bytes = memory::limit_bytes();
+    let options = ImportOptions { animation: name, allow_outside, max_memory_bytes };
+    let scene = import(path, &options).map_err(failure)?;
+    memory::at(format_args!("preparing {}", path.display()));
+    Ok(scene)
 }
 
 /// The message of a scene error, its remedy on a line of its own.
 pub(crate) fn failure(error: SceneError) -> Failure {
+    if let SceneError::TooLarge { file, what, needs_bytes, .. } = &error {
+        let needs = HumanBytes(*needs_bytes);
+        return memory::exceeded(&format!("`{file}`: {what} ({needs})"));
+    }
     let text = error.to_string();
     let remedy = match &error {
         SceneError::Read { remedy, .. }
         | SceneError::Format { remedy, .. }
         | SceneError::Outside { remedy, .. }
+        | SceneError::TooLarge { remedy, .. }
         | SceneError::View3d { remedy, .. }
         | SceneError::Extension { remedy, .. }
         | SceneError::Geometry { remedy, .. }

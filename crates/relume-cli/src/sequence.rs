@@ -3,16 +3,19 @@
 
 use relume::element::ElementId;
 use relume::flat::{FlatOptions, FlatSession};
+use relume::pair::OutOfMemory;
 use relume::session::{FrameReport, Memory, Session, Solution};
 
 use crate::args::UpdateChoice;
 use crate::clip::{Clip, step_failure};
 use crate::failure::Failure;
+use crate::memory;
 
 /// A session that goes from frame to frame.
 pub(crate) trait Stepping: Solution {
-    /// Brings the solution to a time; `frame` labels the report.
-    fn go(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, Failure>;
+    /// Brings the solution to a time; `frame` labels the report. `beside_bytes` are held by others under
+    /// the same limit.
+    fn go(&mut self, frame: u32, time_s: f64, beside_bytes: u64) -> Result<FrameReport, Failure>;
     /// Says when the frame before a build from scratch was.
     fn count_from(&mut self, time_s: Option<f64>);
     /// Bytes held.
@@ -26,7 +29,8 @@ pub(crate) trait Stepping: Solution {
 }
 
 impl Stepping for Session {
-    fn go(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, Failure> {
+    fn go(&mut self, frame: u32, time_s: f64, beside_bytes: u64) -> Result<FrameReport, Failure> {
+        self.set_max_memory_bytes(memory::left_beside(beside_bytes));
         self.step(frame, time_s).map_err(|error| step_failure(error, ""))
     }
 
@@ -40,8 +44,11 @@ impl Stepping for Session {
 }
 
 impl Stepping for FlatSession {
-    fn go(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, Failure> {
-        let report = self.step(frame, time_s);
+    fn go(&mut self, frame: u32, time_s: f64, beside_bytes: u64) -> Result<FrameReport, Failure> {
+        let limit = memory::left_beside(beside_bytes);
+        let report = self
+            .step_within(frame, time_s, limit)
+            .map_err(|OutOfMemory| memory::exceeded(&format!("frame {frame}")))?;
         // What settles comes to a few times the residual asked for.
         let most = 10.0 * FlatOptions::default().residual;
         let unbalanced = report.energy.map_or(0.0, |energy| energy.unbalanced());
@@ -97,9 +104,14 @@ pub(crate) trait Sequence {
     /// A session that has solved nothing yet and measures no balance.
     fn begin(&self, update: UpdateChoice) -> Result<Self::Session, Failure>;
 
-    /// Brings a session to a frame.
-    fn step(&self, session: &mut Self::Session, frame: u32) -> Result<FrameReport, Failure> {
-        session.go(frame, self.time_of(frame))
+    /// Brings a session to a frame, beside others that hold so many bytes.
+    fn step(
+        &self,
+        session: &mut Self::Session,
+        frame: u32,
+        beside_bytes: u64,
+    ) -> Result<FrameReport, Failure> {
+        session.go(frame, self.time_of(frame), beside_bytes)
     }
 
     /// How finely it is solved, and by how many threads, in words.

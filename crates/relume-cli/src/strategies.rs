@@ -125,7 +125,9 @@ impl<Q: Sequence> Comparison<'_, Q> {
             for turn in 0..count {
                 let at = (turn + k) % count;
                 let started = now();
-                let report = self.sequence.step(&mut self.sessions[at], frame)?;
+                let others = self.sessions.iter().enumerate().filter(|(k, _)| *k != at);
+                let beside = others.map(|(_, session)| session.held_bytes()).sum();
+                let report = self.sequence.step(&mut self.sessions[at], frame, beside)?;
                 let seconds = started.elapsed().as_secs_f64();
                 cells[at] = Cell {
                     seconds,

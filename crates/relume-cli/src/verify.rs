@@ -68,8 +68,8 @@ impl<S: Stepping> Sides<S> {
                 return Err(interrupted(done, frames.len()));
             }
             progress.start(frame, links, self.warm.held_bytes() + self.cold.held_bytes());
-            let report = sequence.step(&mut self.warm, frame)?;
-            sequence.step(&mut self.cold, frame)?;
+            let report = sequence.step(&mut self.warm, frame, self.cold.held_bytes())?;
+            sequence.step(&mut self.cold, frame, self.warm.held_bytes())?;
             let gap =
                 agree(&self.warm, &self.cold).map_err(|found| differs(frame, update, &found))?;
             if !quiet {

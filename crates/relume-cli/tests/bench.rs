@@ -102,7 +102,7 @@ fn wrong_usage_of_bench_is_explained() {
     relume(&["bench", "--demo", "room", "--frames", "99"])
         .fails(1, &["frame 99 is outside the animation", "help:"]);
     relume(&["bench", "--demo", "room", "--max-memory", "64K"])
-        .fails(1, &["64.00 KiB of memory allowed", "help: raise --max-memory"]);
+        .fails(3, &["64.00 KiB of memory allowed", "help: raise --max-memory"]);
     relume(&["bench", "--help"]).says(&[
         "Example:  relume ",
         "--demo",

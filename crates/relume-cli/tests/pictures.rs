@@ -143,7 +143,7 @@ fn resuming_makes_what_is_missing_and_nothing_else() {
     // A run that fails before its first frame leaves the report of the last.
     let before = fs::read(dir.path().join("report.json")).unwrap();
     let small = ["demo", "room", "-o", out, "--frames", "0-2", "--max-memory", "100K"];
-    assert_eq!(relume(&small).status.code(), Some(1));
+    assert_eq!(relume(&small).status.code(), Some(3));
     assert!(fs::read(dir.path().join("report.json")).unwrap() == before);
 
     let refused = relume(&[&demo[..], &["0-2", "--shading", "flat"]].concat());

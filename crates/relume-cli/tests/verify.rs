@@ -42,7 +42,7 @@ fn wrong_usage_of_verify_is_explained() {
     relume(&["verify", "--demo", "room", "--frames", "99"])
         .fails(1, &["frame 99 is outside the animation", "help:"]);
     relume(&["verify", "--demo", "room", "--max-memory", "64K"])
-        .fails(1, &["64.00 KiB of memory allowed", "help: raise --max-memory"]);
+        .fails(3, &["64.00 KiB of memory allowed", "help: raise --max-memory"]);
     relume(&["verify", "--help"]).says(&[
         "Example:  relume ",
         "--demo",

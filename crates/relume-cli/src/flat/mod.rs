@@ -4,7 +4,7 @@ pub(crate) mod draw;
 mod figures;
 
 use std::fmt::Write;
-use std::fs;
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -20,6 +20,7 @@ use crate::events::EventTable;
 use crate::failure::Failure;
 use crate::frames::{resolve, time_of};
 use crate::interrupt;
+use crate::memory;
 use crate::output;
 use crate::paper::make;
 use crate::sequence::{Sequence, Stepping};
@@ -59,7 +60,11 @@ pub(crate) fn flat(args: &FlatArgs) -> Result<(), Failure> {
     let path = args.scene.as_deref().ok_or_else(|| {
         Failure::usage("which scene?").help("name a file: relume flat scene.flat")
     })?;
-    let text = fs::read_to_string(path).map_err(|error| Failure::read(path, &error))?;
+    let text = String::from_utf8(memory::read(path)?).map_err(|_| {
+        let invalid =
+            io::Error::new(io::ErrorKind::InvalidData, "stream did not contain valid UTF-8");
+        Failure::read(path, &invalid)
+    })?;
     let scene = match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("svg")) {
         true => parse_svg(&text).map_err(|SvgError { element, what, remedy }| {
             Failure::new(format_args!("{}: {element}: {what}", path.display())).help(remedy)
@@ -129,10 +134,11 @@ impl Run<'_> {
         }
         let (mut reports, mut events) = (Vec::new(), EventTable::new());
         for &frame in &self.frames {
+            memory::at(format_args!("frame {frame}"));
             if interrupt::requested() {
                 return Err(Failure::interrupted("interrupted; nothing more is written"));
             }
-            reports.push(session.go(frame, self.time_of(frame))?);
+            reports.push(session.go(frame, self.time_of(frame), 0)?);
             events.add(frame, &session.events());
             if let Some(dir) = &self.args.output {
                 write(&dir.join(format!("frame-{frame:04}.svg")), &picture(&session, part, frame))?;
@@ -205,6 +211,7 @@ impl Sequence for Run<'_> {
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    let _guard = interrupt::writing();
     write_atomically(path, text.as_bytes()).map_err(|error| Failure::write(path, &error))
 }
 

@@ -17,7 +17,7 @@ pub(crate) struct Find {
     pub(crate) said: String,
 }
 
-/// Runs the command; its exit code, 0 or 1, if all is as it should be.
+/// Runs the command; its exit code, 0, 1 or 3, if all is as it should be.
 pub(crate) fn run(arguments: &[String], limits: &Limits) -> Result<i32, Find> {
     // The shell sets the limit of memory: the standard library cannot.
     let limited = format!("ulimit -v {}; exec \"$@\"", limits.kilobytes);
@@ -60,7 +60,7 @@ pub(crate) fn run(arguments: &[String], limits: &Limits) -> Result<i32, Find> {
     let code = match status.map(|s| s.code()) {
         None => return find(format!("not done after {} s", limits.seconds.as_secs())),
         Some(None) => return find("ended by a signal".into()),
-        Some(Some(code @ (0 | 1))) => code,
+        Some(Some(code @ (0 | 1 | 3))) => code,
         Some(Some(code)) => return find(format!("exit code {code}")),
     };
     if err.contains("of memory allowed") {

@@ -62,7 +62,10 @@ impl Image {
     }
 
     /// The bytes of the PNG file.
-    pub(crate) fn to_png(&self) -> Result<Vec<u8>, String> {
+    ///
+    /// # Errors
+    /// What the encoder says: pictures without pixels cannot be written.
+    pub fn to_png(&self) -> Result<Vec<u8>, String> {
         let text = |error: png::EncodingError| error.to_string();
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use crate::element::{ElementId, ElementKey};
 use crate::event::Ticks;
-use crate::pair::{Carried, LinkEvent, PairHash, PairTree, Record, update};
+use crate::pair::{Carried, LinkEvent, OutOfMemory, PairHash, PairTree, Record, update};
 use crate::session::{
     Ahead, Clock, ElementName, Event, FrameReport, Memory, PairCounts, Receivers, Solution, Update,
-    apply_edits, balance_of, links_of, most_mean, while_extrapolated, with_names,
+    apply_edits, balance_of, budget, links_of, most_mean, while_extrapolated, with_names,
 };
 use crate::solver::{Dirty, Links, Lit, Place, Radiosity, Surfaces};
 
@@ -163,6 +163,19 @@ impl FlatSession {
     /// Brings the solution to `time_s`; `frame` only labels the report. Any time may follow any other:
     /// the links are those of a cold build at `time_s`, bit for bit, unless they are extrapolated.
     pub fn step(&mut self, frame: u32, time_s: f64) -> FrameReport {
+        self.step_within(frame, time_s, None).expect("there is no limit")
+    }
+
+    /// The same within a limit on memory, bytes.
+    ///
+    /// # Errors
+    /// [`OutOfMemory`] if the links do not fit; there is no solution then until a step succeeds.
+    pub fn step_within(
+        &mut self,
+        frame: u32,
+        time_s: f64,
+        max_memory_bytes: Option<u64>,
+    ) -> Result<FrameReport, OutOfMemory> {
         let from = self.came_from.take().or(self.solved.as_ref().map(|s| s.time_s));
         let last = self.solved.take().filter(|_| self.options.update != Update::Scratch);
         let settled = |last: &Solved| last.tree.live_count() == 0;
@@ -182,17 +195,18 @@ impl FlatSession {
             }
             last => rayon::scope(|_| {
                 let extrapolates = last.is_some();
-                let solved = self.advance(last, from, view.clone(), label.clone());
+                let limit = max_memory_bytes;
+                let solved = self.advance(last, from, view.clone(), (label.clone(), limit))?;
                 // Extrapolated links by which light grows as it should not: this frame is built anew.
                 match extrapolates && solved.report.residual.is_infinite() {
-                    true => self.advance(None, from, view, label),
-                    false => solved,
+                    true => self.advance(None, from, view, (label, limit)),
+                    false => Ok(solved),
                 }
-            }),
+            })?,
         };
         let report = solved.report.clone();
         self.solved = Some(solved);
-        report
+        Ok(report)
     }
 
     fn advance(
@@ -200,8 +214,8 @@ impl FlatSession {
         last: Option<Solved>,
         from: Option<f64>,
         view: PlaneView,
-        mut report: FrameReport,
-    ) -> Solved {
+        (mut report, max_memory_bytes): (FrameReport, Option<u64>),
+    ) -> Result<Solved, OutOfMemory> {
         let mut clock = Clock::start();
         let cold = last.is_none();
         let mut solved = last.unwrap_or_else(|| self.blank(report.time_s));
@@ -233,8 +247,8 @@ impl FlatSession {
         let walls: Vec<u32> = (0..self.scene.walls().len() as u32).collect();
         let record = Record { edits: !cold, events: !cold && self.options.events };
         let tree = (&mut solved.tree, &mut solved.hash);
-        let changes = update(tree, &mut placed, &walls, (record, &[]), &|_, _, _| true)
-            .expect("no limit was set");
+        let may_go_on = budget::within(max_memory_bytes);
+        let changes = update(tree, &mut placed, &walls, (record, &[]), &may_go_on)?;
         solved.events = changes.events;
         report.seconds.evaluate = clock.lap();
         let dirty = self.edit_links(&mut solved, &changes.edits, cold, &mut report);
@@ -268,7 +282,7 @@ impl FlatSession {
         self.tally(&mut report, &solved);
         report.seconds.total = clock.total();
         solved.report = report;
-        solved
+        Ok(solved)
     }
 
     /// The mean radiosity that no scene with these walls can pass, W/m2, whatever hides what.

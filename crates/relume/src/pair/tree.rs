@@ -297,6 +297,10 @@ impl<T: Copy + Default + PartialEq> Beside<T> {
     fn memory_bytes(&self) -> u64 {
         (self.values.capacity() * size_of::<T>()) as u64
     }
+
+    fn used_bytes(&self) -> u64 {
+        (self.values.len() * size_of::<T>()) as u64
+    }
 }
 
 impl PairTree {
@@ -329,6 +333,14 @@ impl PairTree {
             self.vacant.iter().map(|l| l.capacity() * 4 + size_of::<Vec<u32>>()).sum();
         let beside = self.due.memory_bytes() + self.history.memory_bytes();
         (self.nodes.capacity() * size_of::<Node>() + lists) as u64 + beside
+    }
+
+    /// Bytes in use: without the room that vectors keep to grow into, which is no memory before it is
+    /// written to.
+    pub fn used_bytes(&self) -> u64 {
+        let lists: usize = self.vacant.iter().map(|l| l.len() * 4 + size_of::<Vec<u32>>()).sum();
+        let beside = self.due.used_bytes() + self.history.used_bytes();
+        (self.nodes.len() * size_of::<Node>() + lists) as u64 + beside
     }
 
     /// Room that no pair has.

@@ -313,8 +313,8 @@ pub fn update<J: Judge>(
                 for chunk in &judged {
                     editor.apply_chunk(chunk, &wave);
                 }
-                let held = editor.changes.held.capacity() * size_of::<Held>();
-                let scratch = wave.memory_bytes() + editor.next.memory_bytes() + held as u64;
+                let held = editor.changes.held.len() * size_of::<Held>();
+                let scratch = wave.used_bytes() + editor.next.used_bytes() + held as u64;
                 if !may_go_on(editor.tree, editor.judge.element_count(), scratch) {
                     return Err(OutOfMemory);
                 }
@@ -384,9 +384,10 @@ impl Wave {
         }
     }
 
-    fn memory_bytes(&self) -> u64 {
+    /// Without the room that is kept to grow into, as [`PairTree::used_bytes`].
+    fn used_bytes(&self) -> u64 {
         let lists = self.handed_on.len() * size_of::<(u32, List)>();
-        (self.items.capacity() * size_of::<Item>() + self.candidates.capacity() * 4 + lists) as u64
+        (self.items.len() * size_of::<Item>() + self.candidates.len() * 4 + lists) as u64
     }
 }
 

@@ -36,6 +36,22 @@ pub enum SceneError {
         /// What to do.
         remedy: String,
     },
+    /// A file, an image or a list of numbers is larger than the memory allowed, by itself.
+    #[error(
+        "`{file}`: {what} needs {needs_bytes} bytes, more than the {limit_bytes} of memory allowed; {remedy}"
+    )]
+    TooLarge {
+        /// The file.
+        file: String,
+        /// What of it.
+        what: String,
+        /// Bytes that it would take.
+        needs_bytes: u64,
+        /// Bytes allowed.
+        limit_bytes: u64,
+        /// What to do.
+        remedy: String,
+    },
     /// A line of a file of View3D says nothing that makes sense, or what is not supported.
     #[error("`{file}`{at}: {what}; {remedy}", at = at(*line))]
     View3d {
@@ -118,6 +134,27 @@ pub enum SceneError {
         /// What to do.
         remedy: String,
     },
+}
+
+impl SceneError {
+    /// An error if something of a file needs more bytes, by itself, than are allowed.
+    pub(super) fn unless_fits(
+        file: &str,
+        what: impl std::fmt::Display,
+        needs_bytes: u64,
+        limit_bytes: Option<u64>,
+    ) -> Result<(), SceneError> {
+        match limit_bytes {
+            Some(limit_bytes) if needs_bytes > limit_bytes => Err(SceneError::TooLarge {
+                file: file.to_owned(),
+                what: what.to_string(),
+                needs_bytes,
+                limit_bytes,
+                remedy: "raise --max-memory, or make the file smaller".into(),
+            }),
+            _ => Ok(()),
+        }
+    }
 }
 
 fn at(line: usize) -> String {

@@ -11,6 +11,7 @@ use crate::scene::{self, BodyId, LightKind, Material};
 use crate::solver::{Dirty, Links, Radiosity};
 
 use super::ahead::{Ahead, most_mean, while_extrapolated};
+use super::budget;
 use super::coarse::{self, Coarse};
 use super::report::FrameReport;
 use super::surfaces::{LitForest, apply_edits, links_of};
@@ -217,12 +218,7 @@ impl Session {
         level: Level,
         record_and_fresh: (Record, &[PairId]),
     ) -> Result<Changes, OutOfMemory> {
-        let limit = self.options.max_memory_bytes.unwrap_or(u64::MAX);
-        let may_go_on = |tree: &PairTree, elements: usize, scratch: u64| {
-            // Links by receiver and radiosities may be still to come.
-            let pairs = tree.memory_bytes() + tree.len() as u64 * PAIR_LINKS_BYTES;
-            pairs + elements as u64 * ELEMENT_BYTES + scratch <= limit
-        };
+        let may_go_on = budget::within(self.options.max_memory_bytes);
         let stage = match level {
             Level::Coarse => Stage::Coarse,
             Level::Fine => Stage::Fine(&solved.coarse.brightness),
@@ -354,12 +350,6 @@ impl Session {
         }
     }
 }
-
-/// Links by receiver, for each pair of the tree, bytes.
-const PAIR_LINKS_BYTES: u64 = 20;
-
-/// An element with its radiosity, bytes.
-const ELEMENT_BYTES: u64 = 122;
 
 #[derive(Clone, Copy)]
 enum Level {

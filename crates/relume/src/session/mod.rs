@@ -13,6 +13,7 @@ use crate::transport::Simd;
 mod advance;
 mod ahead;
 mod bends;
+pub(crate) mod budget;
 mod coarse;
 mod compact;
 mod compare;
@@ -181,6 +182,12 @@ impl Session {
     /// The options it is solved with.
     pub fn options(&self) -> &Options {
         &self.options
+    }
+
+    /// Sets the limit on memory, bytes, of the steps to come: what others leave of it may differ from step to
+    /// step. No result depends on it.
+    pub fn set_max_memory_bytes(&mut self, limit: Option<u64>) {
+        self.options.max_memory_bytes = limit;
     }
 
     /// Brings the solution to `time_s` (seconds of the animation); `frame` only labels the report.

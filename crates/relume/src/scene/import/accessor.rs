@@ -79,6 +79,8 @@ impl Document {
                 .malformed(format!("{owner}: accessor {index} should be {wanted} but is {kind}")));
         }
         let component = self.component(accessor.component_type, index)?;
+        let bytes = (accessor.count as u64).saturating_mul(size_of::<[f64; N]>() as u64);
+        self.fits(format_args!("accessor {index} of {owner}"), bytes)?;
         let mut values = match accessor.buffer_view {
             Some(_) => self.dense(accessor, index, component, owner)?,
             None if accessor.count > LARGEST_COUNT => {

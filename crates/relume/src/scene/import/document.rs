@@ -6,8 +6,7 @@ use std::cell::OnceCell;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::base64;
-use super::json;
+use super::{ImportOptions, base64, json};
 use crate::scene::SceneError;
 
 /// Extensions that may be required: handled, or without effect on diffuse light.
@@ -42,7 +41,7 @@ pub(super) struct Document {
     /// As the user named it.
     pub(super) file: String,
     directory: PathBuf,
-    allow_outside: bool,
+    options: ImportOptions,
     pub(super) root: json::Root,
     binary: Option<Vec<u8>>,
     buffers: Vec<OnceCell<Vec<u8>>>,
@@ -50,8 +49,11 @@ pub(super) struct Document {
 
 impl Document {
     /// Reads the file and checks that it is glTF 2.0 and needs nothing that is not supported.
-    pub(super) fn open(path: &Path, allow_outside: bool) -> Result<Document, SceneError> {
+    pub(super) fn open(path: &Path, options: &ImportOptions) -> Result<Document, SceneError> {
         let file = path.display().to_string();
+        // What cannot be measured cannot be read either.
+        let length = std::fs::metadata(path).map_or(0, |m| m.len());
+        SceneError::unless_fits(&file, "the file", length, options.max_memory_bytes)?;
         let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
             file: file.clone(),
             source,
@@ -61,7 +63,8 @@ impl Document {
         let root = parse(&file, &text)?;
         let buffers = root.buffers.iter().map(|_| OnceCell::new()).collect();
         let directory = path.parent().unwrap_or(Path::new("")).to_owned();
-        let document = Document { file, directory, allow_outside, root, binary, buffers };
+        let options = options.clone();
+        let document = Document { file, directory, options, root, binary, buffers };
         document.check_version()?;
         document.check_extensions()?;
         Ok(document)
@@ -70,6 +73,15 @@ impl Document {
     /// An error about the content of the file.
     pub(super) fn malformed(&self, what: impl Into<String>) -> SceneError {
         format_error(&self.file, what.into(), "repair the file or export it again")
+    }
+
+    /// An error if something needs more memory by itself than is allowed.
+    pub(super) fn fits(
+        &self,
+        what: impl std::fmt::Display,
+        needs_bytes: u64,
+    ) -> Result<(), SceneError> {
+        SceneError::unless_fits(&self.file, what, needs_bytes, self.options.max_memory_bytes)
     }
 
     fn check_version(&self) -> Result<(), SceneError> {
@@ -187,10 +199,12 @@ impl Document {
             remedy: format!("it is {owner} of `{}`: put it beside that file", self.file),
         };
         // Before it is opened: opening a pipe waits for whoever writes to it.
-        let kind = std::fs::metadata(&path).map_err(failed)?.file_type();
-        if !(kind.is_file() || kind.is_dir() || self.allow_outside) {
+        let known = std::fs::metadata(&path).map_err(failed)?;
+        let kind = known.file_type();
+        if !(kind.is_file() || kind.is_dir() || self.options.allow_outside) {
             return Err(self.outside(format!("{owner} is a device or a pipe ({name})")));
         }
+        self.fits(format_args!("{owner} ({name})"), known.len().min(at_most as u64))?;
         let mut bytes = Vec::new();
         let file = std::fs::File::open(&path).map_err(failed)?;
         file.take(at_most as u64).read_to_end(&mut bytes).map_err(failed)?;
@@ -207,7 +221,7 @@ impl Document {
             ));
         }
         let name = percent_decoded(uri);
-        if leaves_folder(&name) && !self.allow_outside {
+        if leaves_folder(&name) && !self.options.allow_outside {
             let what = format!("{owner} is outside the folder of the file ({name})");
             return Err(self.outside(what));
         }

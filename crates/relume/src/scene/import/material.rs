@@ -4,6 +4,7 @@
 //! and layers (specular, clearcoat, sheen and so on) are ignored quietly.
 
 use std::f64::consts::PI;
+use std::io::Cursor;
 
 use super::animation::GlowKeys;
 use super::document::Document;
@@ -126,10 +127,19 @@ fn note_what_is_ignored(material: &json::Material, name: &str, notes: &mut Vec<N
     }
 }
 
+/// Why an image has no mean.
+#[derive(Clone)]
+enum NoMean {
+    /// It cannot be read.
+    Unreadable(String),
+    /// Its pixels need so many bytes, more than are allowed.
+    TooLarge(u64),
+}
+
 /// Mean linear colours of images, each decoded once.
 struct Means<'a> {
     document: &'a Document,
-    of_image: Vec<Option<Result<[f64; 3], String>>>,
+    of_image: Vec<Option<Result<[f64; 3], NoMean>>>,
 }
 
 impl Means<'_> {
@@ -158,7 +168,15 @@ impl Means<'_> {
                     self.document.inside(uri, &format!("image {image}"))?;
                 }
                 let read = || mean_of_image(self.document, image);
-                self.of_image[image].get_or_insert_with(read).clone()
+                match self.of_image[image].get_or_insert_with(read).clone() {
+                    Ok(mean) => Ok(mean),
+                    Err(NoMean::Unreadable(why)) => Err(why),
+                    // White instead would be another scene with less memory.
+                    Err(NoMean::TooLarge(bytes)) => {
+                        self.document.fits(format_args!("image {image}"), bytes)?;
+                        Err("it is too large".to_owned())
+                    }
+                }
             }
             None => Err("it has no PNG or JPEG image".to_owned()),
         };
@@ -183,19 +201,33 @@ impl Means<'_> {
 }
 
 /// The mean linear colour of an image, or why there is none.
-fn mean_of_image(document: &Document, index: usize) -> Result<[f64; 3], String> {
+fn mean_of_image(document: &Document, index: usize) -> Result<[f64; 3], NoMean> {
+    let unreadable = |why: &dyn std::fmt::Display| NoMean::Unreadable(why.to_string());
+    let of_scene = |error: SceneError| match error {
+        SceneError::TooLarge { needs_bytes, .. } => NoMean::TooLarge(needs_bytes),
+        other => unreadable(&other),
+    };
     let image = &document.root.images[index];
     let bytes = match (&image.uri, image.buffer_view) {
         (Some(uri), _) => {
-            document.uri(uri, &format!("image {index}"), IMAGE_MAX).map_err(|e| e.to_string())?
+            document.uri(uri, &format!("image {index}"), IMAGE_MAX).map_err(of_scene)?
         }
-        (None, Some(view)) => document.view(view).map_err(|e| e.to_string())?.0.to_vec(),
+        (None, Some(view)) => document.view(view).map_err(of_scene)?.0.to_vec(),
         (None, None) => {
-            return Err(format!("image {index} names neither a file nor a buffer view"));
+            return Err(unreadable(&format!(
+                "image {index} names neither a file nor a buffer view"
+            )));
         }
     };
-    let pixels = image::load_from_memory(&bytes).map_err(|e| e.to_string())?.to_rgb8();
-    Ok(mean_linear(pixels.as_raw()).ok_or("the image is empty")?)
+    let format = image::guess_format(&bytes).map_err(|e| unreadable(&e))?;
+    let size = image::ImageReader::with_format(Cursor::new(&bytes), format).into_dimensions();
+    let (width, height) = size.map_err(|e| unreadable(&e))?;
+    // Three bytes a pixel at least.
+    let needs = 3 * u64::from(width) * u64::from(height);
+    document.fits("an image", needs).map_err(of_scene)?;
+    let pixels = image::load_from_memory_with_format(&bytes, format);
+    let pixels = pixels.map_err(|e| unreadable(&e))?.into_rgb8();
+    mean_linear(pixels.as_raw()).ok_or_else(|| unreadable(&"the image is empty"))
 }
 
 /// The mean of 8-bit sRGB pixels, decoded to linear first (IEC 61966-2-1). Exact up to rounding

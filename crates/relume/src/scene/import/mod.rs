@@ -30,6 +30,9 @@ pub struct ImportOptions {
     pub animation: Option<String>,
     /// Whether buffers and images may be anywhere: outside the file's folder, and devices or pipes.
     pub allow_outside: bool,
+    /// Bytes that a file, an image or a list of numbers may need, each by itself: what needs more is refused
+    /// before memory is asked for. `None` for no limit.
+    pub max_memory_bytes: Option<u64>,
 }
 
 /// Reads a scene from a .glb or .gltf file (glTF 2.0; external and embedded buffers), or a .vs3 file
@@ -53,7 +56,7 @@ pub struct ImportOptions {
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError> {
     if view3d::is_view3d(path) {
         return match &options.animation {
-            None => view3d::import(path),
+            None => view3d::import(path, options.max_memory_bytes),
             Some(name) => Err(SceneError::Animation {
                 animation: name.clone(),
                 what: "files of View3D have no animation".into(),
@@ -61,7 +64,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError>
             }),
         };
     }
-    let document = Document::open(path, options.allow_outside)?;
+    let document = Document::open(path, options)?;
     let mut draft = tree::draft(&document, options)?;
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned());
     draft.name = stem.unwrap_or_else(|| document.file.clone());

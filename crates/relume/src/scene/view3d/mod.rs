@@ -36,8 +36,11 @@ pub(super) fn is_view3d(path: &Path) -> bool {
 ///
 /// # Errors
 /// What View3D would not take either, and masking surfaces: with the line and the remedy.
-pub(super) fn import(path: &Path) -> Result<Scene, SceneError> {
+pub(super) fn import(path: &Path, max_memory_bytes: Option<u64>) -> Result<Scene, SceneError> {
     let file = path.display().to_string();
+    // What cannot be measured cannot be read either.
+    let length = std::fs::metadata(path).map_or(0, |m| m.len());
+    SceneError::unless_fits(&file, "the file", length, max_memory_bytes)?;
     let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
         file: file.clone(),
         source,

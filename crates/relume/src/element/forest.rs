@@ -147,6 +147,8 @@ struct Fixed {
     normals: Vec<Aabb>,
     /// Whether a patch emits light at any time, by patch.
     glows: Vec<bool>,
+    /// Area of what hangs together with a patch, by patch, m2.
+    connected_m2: Vec<f64>,
 }
 
 /// Where elements went when the forest was put together: those that stayed keep their order.
@@ -224,6 +226,7 @@ impl Forest {
             .iter()
             .map(|patch| scene.materials[patch.material.0 as usize].emits())
             .collect();
+        forest.fixed_mut().connected_m2 = scene.connected_areas_m2();
         forest
     }
 
@@ -563,6 +566,11 @@ impl Forest {
     /// Whether a patch emits light at any time.
     pub fn glows(&self, patch: PatchId) -> bool {
         self.fixed.glows[patch.0 as usize]
+    }
+
+    /// Area of the patches that hang together with a patch by common corners, m2.
+    pub fn connected_m2(&self, patch: PatchId) -> f64 {
+        self.fixed.connected_m2[patch.0 as usize]
     }
 
     /// Whether a node may hold a patch with a normal opposed to `normal`, which is in the frame of the node's

@@ -348,8 +348,11 @@ impl Placed<'_> {
     ) -> Judgement {
         let key = pair_key(self.forest.key(a), self.forest.key(b));
         let in_contact = met == Meeting::Coplanar;
-        let end =
-            |brightness: &Brightness, id, area| End { area, light: brightness.of(self.forest, id) };
+        let end = |brightness: &Brightness, id, area| End {
+            area,
+            reference_area: self.reference_area(brightness, id),
+            light: brightness.of(self.forest, id),
+        };
         let mut x = match in_contact {
             true => contact_exchange(place_a, place_b, shaft.contact_m2(blockers)),
             false => exchange_by_points(self.simd, place_a, place_b, met),
@@ -368,7 +371,7 @@ impl Placed<'_> {
                 let (clear, open) = (Visibility::CLEAR, (f64::INFINITY, f64::INFINITY));
                 let ends = (end(brightness, a, place_a.area), end(brightness, b, place_b.area));
                 let scale = (brightness.reference_area_m2(), threshold);
-                let e = estimate(&x, &clear, (&ends.0, &ends.1), open, f64::INFINITY, scale);
+                let e = estimate(&x, &clear, (&ends.0, &ends.1), open, open, scale);
                 let wish = self.wish((a, b), &ends, &e);
                 if let Some(refined) = refined(&e, wish, threshold, Margin::ENDLESS, 0) {
                     return refined;
@@ -444,7 +447,8 @@ impl Placed<'_> {
         let ends = (end(brightness, a, place_a.area), end(brightness, b, place_b.area));
         let shone = shaft.shone_on(blockers);
         let scale = (brightness.reference_area_m2(), threshold);
-        let e = estimate(&x, &v, (&ends.0, &ends.1), shone, shaft.least_m2(blockers), scale);
+        let areas = shaft.blocker_areas_m2(blockers);
+        let e = estimate(&x, &v, (&ends.0, &ends.1), shone, areas, scale);
         let stake = factor / threshold.max(FINEST);
         let both_ways = way != Margin::ENDLESS;
         let wish = self.wish((a, b), &ends, &e);
@@ -482,9 +486,17 @@ impl Placed<'_> {
         let one_way = |(receiver, area): (ElementId, f64), source: ElementId| {
             let arrives = brightness.of(self.forest, source).radiosity * exchange_area_m2;
             let known = brightness.of(self.forest, receiver).irradiance;
-            arrives / known / (area * brightness.reference_area_m2()).sqrt()
+            arrives / known / (area * self.reference_area(brightness, receiver)).sqrt()
         };
         one_way(a, b.0).max(one_way(b, a.0))
+    }
+
+    /// Area at which an element weighs 1 in the error norm, m2: of the scene, or of the thing that it is a part of where
+    /// that is small.
+    fn reference_area(&self, brightness: &Brightness, id: ElementId) -> f64 {
+        let of_scene = brightness.reference_area_m2();
+        let of_thing = |patch| THING_SHARE * self.forest.connected_m2(patch);
+        self.forest.patch(id).map_or(of_scene, |patch| of_scene.min(of_thing(patch)))
     }
 
     /// Whether an end is above the level at which the coarse solution links.
@@ -583,13 +595,21 @@ impl Placed<'_> {
             (Stage::Coarse, _) => Verdict::Hold,
             (Stage::Fine(brightness), Oracle::Error { threshold }) => {
                 let ends = (
-                    End { area: e.area, light: brightness.of(self.forest, element) },
-                    End { area: 0.0, light: brightness.of(self.forest, light) },
+                    End {
+                        area: e.area,
+                        reference_area: self.reference_area(brightness, element),
+                        light: brightness.of(self.forest, element),
+                    },
+                    End {
+                        area: 0.0,
+                        reference_area: f64::INFINITY,
+                        light: brightness.of(self.forest, light),
+                    },
                 );
                 let ends = (&ends.0, &ends.1);
                 let scale = (brightness.reference_area_m2(), threshold);
-                let est =
-                    estimate(&x, &v, ends, (f64::INFINITY, f64::INFINITY), f64::INFINITY, scale);
+                let nothing = (f64::INFINITY, f64::INFINITY);
+                let est = estimate(&x, &v, ends, nothing, nothing, scale);
                 let (error, may_split) = (est.on[0], self.forest.can_split(element));
                 let wanted = error > threshold;
                 if may_split && wanted {
@@ -672,6 +692,9 @@ const CLIPPED_MAX_REST: usize = 4;
 
 /// What segments that are all blocked may have overlooked of V.
 const SAMPLED_MAX: f64 = 0.15;
+
+/// Share of the area of what hangs together at which an element of it weighs 1 in the error norm: a face of a cube.
+const THING_SHARE: f64 = 1.0 / 6.0;
 
 /// Share of a receiver's light, over what a link may err by, that a pair may bring unseen.
 const OVERLOOKED_MAX: f64 = 0.25;

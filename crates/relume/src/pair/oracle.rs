@@ -36,6 +36,8 @@ pub enum Side {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct End {
     pub(super) area: f64,
+    /// Area at which an element of this surface weighs 1 in the error norm, m2.
+    pub(super) reference_area: f64,
     pub(super) light: Light,
 }
 
@@ -102,7 +104,7 @@ const SEEN: f64 = 1e-4;
 
 /// Elements of this many times the area of the smallest thing that stands between weigh 1 where its shadow's edge
 /// is concerned.
-const SMALL: f64 = 10.0;
+const SMALL: f64 = 5.0;
 
 /// Weight of the sampling error of V: it is independent from link to link and averages out.
 const NOISE: f64 = 0.2;
@@ -120,7 +122,7 @@ pub(super) fn estimate(
     v: &Visibility,
     (a, b): (&End, &End),
     (lamp_a_m, lamp_b_m): (f64, f64),
-    least_blocker: f64,
+    (least_blocker, blockers): (f64, f64),
     (reference_area, threshold): (f64, f64),
 ) -> Estimate {
     // Fewer than a bundle: clipped, without noise.
@@ -151,9 +153,14 @@ pub(super) fn estimate(
     };
     let over_a = over(&x.over_a, v.spread_a.max(least), hidden(v.spread_a, a, lamp_a_m));
     let over_b = over(&x.over_b, v.spread_b.max(least), hidden(v.spread_b, b, lamp_b_m));
-    let scale = reference_area.min(SMALL * least_blocker).max(f64::MIN_POSITIVE);
-    let finer = (reference_area / scale).sqrt();
-    let link = LinkSize { exchange: x.area_m2, noise, finer, reference_area, threshold };
+    let link = LinkSize {
+        exchange: x.area_m2,
+        noise,
+        least_shadow: SMALL * least_blocker,
+        shadow: SMALL * blockers,
+        reference_area,
+        threshold,
+    };
     let (on_a, by_a, by_b) = one_way(&link, (a, &over_a), (b, &over_b));
     let (on_b, cy_b, cy_a) = one_way(&link, (b, &over_b), (a, &over_a));
     Estimate { on: [on_a, on_b], mends: (by_a + cy_a, by_b + cy_b) }
@@ -168,8 +175,11 @@ fn length(x: f64, y: f64) -> f64 {
 struct LinkSize {
     exchange: f64,
     noise: f64,
-    /// How much more the edges of shadows weigh than the rest: those of small things by their own size.
-    finer: f64,
+    /// Area that weighs 1 where the edges of shadows are concerned, if that of the receiver is not smaller: that of the
+    /// smallest thing's between.
+    least_shadow: f64,
+    /// Area within which neighbouring sources are hidden alike: that of the shadow of all between.
+    shadow: f64,
     reference_area: f64,
     threshold: f64,
 }
@@ -196,23 +206,29 @@ fn one_way(
     if receiver.area <= 0.0 {
         return (0.0, 0.0, 0.0);
     }
-    let by_area = (receiver.area / link.reference_area).sqrt();
+    let by_area = (receiver.area / receiver.reference_area).sqrt();
+    let scale = receiver.reference_area.min(link.least_shadow).max(f64::MIN_POSITIVE);
+    let finer = (receiver.reference_area / scale).sqrt();
     let weight = by_area / receiver.light.irradiance;
     let per_radiosity = link.exchange / receiver.area * weight;
     let Light { radiosity, reflected, .. } = source.light;
     let varies = SOURCE_VARIATION * (source.area / link.reference_area).min(4.0);
     // What a small source does unevenly its neighbours do too, in the same sense: splitting the
     // source does not mend it, so it counts as if the source were as large as the receiver.
-    let whole = if source.area > 0.0 { (receiver.area / source.area).max(1.0) } else { 1.0 };
+    let whole = |area: f64| if source.area > 0.0 { (area / source.area).max(1.0) } else { 1.0 };
+    let (whole, in_shadow) = (whole(receiver.area), whole(receiver.area.min(link.shadow)));
     let edge = EDGE_EMITTED * (radiosity - reflected) + EDGE_REFLECTED * reflected;
-    let uneven = length(radiosity * over_receiver.bend, edge * over_receiver.edge * link.finer);
-    let by_receiver = per_radiosity * uneven * whole;
+    let uneven = length(
+        radiosity * over_receiver.bend * whole,
+        edge * over_receiver.edge * finer * in_shadow,
+    );
+    let by_receiver = per_radiosity * uneven;
     // The edges of what is hidden run through as many sources as it is long: all err in the same sense.
     let sends = (varies * over_source.sends).max(over_source.hidden * whole.sqrt());
     let by_source = per_radiosity * reflected * sends;
     let by_noise = per_radiosity * radiosity * link.noise;
     // Relative to what the link itself brings, which no light changes: close to a lamp that is the most of what arrives.
-    let alone = length(over_receiver.bend, EDGE_REFLECTED * over_receiver.edge * link.finer);
+    let alone = length(over_receiver.bend, EDGE_REFLECTED * over_receiver.edge * finer);
     let alone = by_area * length(length(alone, sends), link.noise);
     let error = match alone <= link.threshold {
         true => 0.0,

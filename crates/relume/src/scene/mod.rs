@@ -13,6 +13,7 @@ use crate::geometry::Pose;
 mod assemble;
 mod builder;
 mod check;
+mod connected;
 mod dark;
 mod draft;
 mod drift;

@@ -247,10 +247,12 @@ impl<'a> Shaft<'a> {
         widths
     }
 
-    /// Area of the smallest of some blockers, m2; infinite if there is none.
-    pub fn least_m2(&self, blockers: &[PatchId]) -> f64 {
+    /// Areas of the smallest of some blockers and of all together, m2; infinite if there is none.
+    pub fn blocker_areas_m2(&self, blockers: &[PatchId]) -> (f64, f64) {
         let area = |&patch: &PatchId| self.forest.area_m2(self.forest.patch_root(patch));
-        blockers.iter().map(area).fold(f64::INFINITY, f64::min)
+        let least = blockers.iter().map(area).fold(f64::INFINITY, f64::min);
+        let all: f64 = blockers.iter().map(area).sum();
+        if blockers.is_empty() { (f64::INFINITY, f64::INFINITY) } else { (least, all) }
     }
 
     /// Whether both ends lie in one plane and touch.

@@ -126,6 +126,13 @@ impl Case {
         self.panels.last_mut().expect("just added")
     }
 
+    /// Makes panels the faces of one body, which stays where it is.
+    pub(crate) fn one_body(&mut self, panels: std::ops::Range<usize>) {
+        let mover = Some(self.movers.len());
+        self.movers.push(Mover { place: [DVec3::ZERO; 2], turn: DQuat::IDENTITY });
+        self.panels[panels].iter_mut().for_each(|panel| panel.mover = mover);
+    }
+
     /// Adds the sides of a box, `NAME-x0` to `NAME-z1`, and returns the range of their numbers.
     pub(crate) fn cuboid(
         &mut self,

@@ -312,12 +312,14 @@ pub(crate) fn device(r: &mut Random, case: &mut Case) {
     let lamp = case.panel("lamp", &lamp, false);
     (lamp.exitance, lamp.reflectance) = (150.0, 0.0);
     let table = v(size.x * 0.45, size.y * 0.45, 0.7);
-    case.cuboid("table", table, table + v(1.0, 1.0, 0.05), false);
+    let top = case.cuboid("table", table, table + v(1.0, 1.0, 0.05), false);
+    case.one_body(top);
     let half = DVec3::splat(log_between(r, 0.005, 0.05)) * r.point(DVec3::splat(0.6), DVec3::ONE);
     let gap = if chance(r, 0.5) { 0.0 } else { log_between(r, 0.01, 0.2) * half.z };
     let middle = table + v(0.5, 0.5, 0.05 + gap + half.z);
     let sides = case.cuboid("device", middle - half, middle + half, false);
-    case.panels[sides].iter_mut().for_each(|p| p.reflectance = 0.3);
+    case.panels[sides.clone()].iter_mut().for_each(|p| p.reflectance = 0.3);
+    case.one_body(sides);
     for _ in 0..2 {
         let beside = log_between(r, 0.05, 2.0) * half.x;
         let at =

@@ -266,9 +266,11 @@ fn device_in_a_hall() -> Case {
     let z = 4.99;
     let lamp = case.panel("lamp", &[v(1., 1., z), v(1., 2., z), v(2., 2., z), v(2., 1., z)], false);
     (lamp.reflectance, lamp.exitance) = (0.0, 50.0 * PI);
-    case.cuboid("table", v(4.5, 4.5, 0.7), v(5.5, 5.5, 0.75), false);
+    let table = case.cuboid("table", v(4.5, 4.5, 0.7), v(5.5, 5.5, 0.75), false);
     let sides = case.cuboid("device", v(5.0, 5.0, 0.751), v(5.02, 5.02, 0.771), false);
-    case.panels[sides].iter_mut().for_each(|side| side.reflectance = 0.3);
+    case.panels[sides.clone()].iter_mut().for_each(|side| side.reflectance = 0.3);
+    case.one_body(table);
+    case.one_body(sides);
     let on_table = |x, y| (v(x, y, 0.7501), DVec3::Z);
     let sensors = [
         on_table(5.01, 5.022),
@@ -283,12 +285,12 @@ fn device_in_a_hall() -> Case {
 }
 
 #[test]
-fn light_beside_a_small_device() {
+fn light_beside_a_small_device_is_within_the_tolerance() {
     // Path tracing, +-0.15 %.
     let right = [0.12889, 0.45822, 0.45882, 0.78683, 0.20631, 0.25828];
     let case = device_in_a_hall();
-    // As found, 2.4, 2.2 and 1.0 %: more than was asked for at the last two. (As a file of four bodies 2.2, 1.3 and 0.2 %.)
-    for (tolerance, most) in [(0.1, 0.03), (0.02, 0.025), (0.005, 0.012)] {
+    // As found, 1.9, 1.2 and 0.3 %.
+    for tolerance in [0.1, 0.02, 0.005] {
         let mut session = session(&case, tolerance, true);
         session.step(0, 0.0).unwrap();
         let found = session.irradiances_at(&case.world_sensors());
@@ -296,7 +298,7 @@ fn light_beside_a_small_device() {
         let mean = found.iter().zip(&right).map(off).sum::<f64>() / right.len() as f64;
         let rms = mean.sqrt();
         println!("{rms:.4} at {tolerance}");
-        assert!(rms <= most, "{rms} at {tolerance}: {found:?}");
+        assert!(rms <= tolerance, "{rms} at {tolerance}: {found:?}");
     }
 }
 

@@ -147,7 +147,7 @@ struct Fixed {
     normals: Vec<Aabb>,
     /// Whether a patch emits light at any time, by patch.
     glows: Vec<bool>,
-    /// Area of what hangs together with a patch, by patch, m2.
+    /// Area of the patches connected with each patch, itself among them, by patch, m2.
     connected_m2: Vec<f64>,
 }
 
@@ -568,7 +568,7 @@ impl Forest {
         self.fixed.glows[patch.0 as usize]
     }
 
-    /// Area of the patches that hang together with a patch by common corners, m2.
+    /// Area of the patches that are connected with a patch by common corners, itself among them, m2.
     pub fn connected_m2(&self, patch: PatchId) -> f64 {
         self.fixed.connected_m2[patch.0 as usize]
     }

@@ -118,7 +118,7 @@ pub fn shaft_meets_box(a: &Aabb, b: &Aabb, o: &Aabb) -> bool {
 
 /// The shaft of two boxes made ready for many questions: [`shaft_meets_box`] without divisions.
 #[derive(Clone, Copy, Debug)]
-pub struct Sweep {
+pub struct ShaftOfBoxes {
     lo: DVec3,
     hi: DVec3,
     /// One over how fast the lower faces go from the first box to the second; 0 where they rest.
@@ -127,12 +127,17 @@ pub struct Sweep {
     hi_pace: DVec3,
 }
 
-impl Sweep {
+impl ShaftOfBoxes {
     /// From one box to the other.
-    pub fn new(a: &Aabb, b: &Aabb) -> Sweep {
+    pub fn new(a: &Aabb, b: &Aabb) -> ShaftOfBoxes {
         let pace = |way: f64| if way == 0.0 { 0.0 } else { 1.0 / way };
         let paces = |way: DVec3| DVec3::new(pace(way.x), pace(way.y), pace(way.z));
-        Sweep { lo: a.lo, hi: a.hi, lo_pace: paces(b.lo - a.lo), hi_pace: paces(a.hi - b.hi) }
+        ShaftOfBoxes {
+            lo: a.lo,
+            hi: a.hi,
+            lo_pace: paces(b.lo - a.lo),
+            hi_pace: paces(a.hi - b.hi),
+        }
     }
 
     /// Whether a box, grown by a margin, meets the shaft; exact up to rounding. Some 3 ns.
@@ -188,14 +193,14 @@ mod tests {
                 x.cmpge(o.lo).all() && x.cmple(o.hi).all()
             });
             prop_assert!(!hit || shaft_meets_box(&a, &b, &o));
-            prop_assert!(!hit || Sweep::new(&a, &b).meets(&o, 1e-12));
+            prop_assert!(!hit || ShaftOfBoxes::new(&a, &b).meets(&o, 1e-12));
         }
     }
 
     proptest! {
         /// Boxes on a grid, so that faces rest, are flush and touch.
         #[test]
-        fn a_sweep_says_what_the_shaft_says(
+        fn a_shaft_made_ready_says_the_same(
             at in prop::array::uniform9(-2..3_i32), size in prop::array::uniform9(0..2_i32),
         ) {
             let box_at = |k: usize| {
@@ -205,9 +210,9 @@ mod tests {
                 Aabb { lo: of(&at), hi: of(&at) + of(&size) }
             };
             let (a, b, o) = (box_at(0), box_at(3), box_at(6));
-            let sweep = Sweep::new(&a, &b);
-            prop_assert_eq!(shaft_meets_box(&a, &b, &o.grown(1e-9)), sweep.meets(&o, 1e-9));
-            prop_assert_eq!(shaft_meets_box(&a, &b, &o.grown(-1e-9)), sweep.meets(&o, -1e-9));
+            let shaft = ShaftOfBoxes::new(&a, &b);
+            prop_assert_eq!(shaft_meets_box(&a, &b, &o.grown(1e-9)), shaft.meets(&o, 1e-9));
+            prop_assert_eq!(shaft_meets_box(&a, &b, &o.grown(-1e-9)), shaft.meets(&o, -1e-9));
         }
     }
 

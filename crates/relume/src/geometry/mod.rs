@@ -6,7 +6,7 @@ mod bounds;
 mod convex;
 mod pose;
 
-pub use bounds::{Aabb, Sweep, shaft_meets_box};
+pub use bounds::{Aabb, ShaftOfBoxes, shaft_meets_box};
 pub use convex::{ConvexPolygon, Plane, split_convex};
 pub use pose::Pose;
 

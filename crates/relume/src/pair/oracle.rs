@@ -1,7 +1,7 @@
 //! Oracles: whether a pair of elements is good enough as a link, and if not which side to refine.
 
 use crate::geometry::no_smaller;
-use crate::transport::{Exchange, SEGMENTS, Variation, Visibility};
+use crate::transport::{BlockerSizes, Exchange, SEGMENTS, Variation, Visibility};
 
 use super::brightness::Light;
 use super::margin::Margin;
@@ -102,8 +102,8 @@ const STEEP: f64 = 0.3;
 /// V from which the end is seen, and not a sliver that rounding leaves between what covers it and its plane.
 const SEEN: f64 = 1e-4;
 
-/// Elements of this many times the area of the smallest thing that stands between weigh 1 where its shadow's edge
-/// is concerned.
+/// Area of a shadow, in areas of the blockers that throw it: elements as large as that of the smallest weigh 1 where its
+/// edge is concerned, and sources within that of all are hidden alike.
 const SMALL: f64 = 5.0;
 
 /// Weight of the sampling error of V: it is independent from link to link and averages out.
@@ -121,8 +121,7 @@ pub(super) fn estimate(
     x: &Exchange,
     v: &Visibility,
     (a, b): (&End, &End),
-    (lamp_a_m, lamp_b_m): (f64, f64),
-    (least_blocker, blockers): (f64, f64),
+    blockers: &BlockerSizes,
     (reference_area, threshold): (f64, f64),
 ) -> Estimate {
     // Fewer than a bundle: clipped, without noise.
@@ -151,13 +150,13 @@ pub(super) fn estimate(
         true => STEEP * (v.value / SEEN).min(1.0),
         false => 0.0,
     };
-    let over_a = over(&x.over_a, v.spread_a.max(least), hidden(v.spread_a, a, lamp_a_m));
-    let over_b = over(&x.over_b, v.spread_b.max(least), hidden(v.spread_b, b, lamp_b_m));
+    let over_a = over(&x.over_a, v.spread_a.max(least), hidden(v.spread_a, a, blockers.lamps_m.0));
+    let over_b = over(&x.over_b, v.spread_b.max(least), hidden(v.spread_b, b, blockers.lamps_m.1));
     let link = LinkSize {
         exchange: x.area_m2,
         noise,
-        least_shadow: SMALL * least_blocker,
-        shadow: SMALL * blockers,
+        least_shadow: SMALL * blockers.least_m2,
+        shadow: SMALL * blockers.all_m2,
         reference_area,
         threshold,
     };

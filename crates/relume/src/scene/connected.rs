@@ -1,14 +1,12 @@
-//! Which patches hang together. Pure geometry in the bodies' own frames.
+//! Which patches are connected. Pure geometry in the bodies' own frames.
 
-use super::weld::Weld;
+use super::weld::{Sets, Weld};
 use super::{BodyId, PatchId, Scene};
 
-/// Corners closer together than this share of the coordinates are one.
-const WELDED: f64 = 1e-6;
-
 impl Scene {
-    /// For each patch, the area of all patches that hang together with it by common corners, m2: of all bodies that never move, or
-    /// of the one that moves.
+    /// Area of the patches that are connected with each patch by common corners, itself among them, m2. Bodies that never move
+    /// are connected with each other, a body that moves only within itself. Exact up to rounding; both sides of a double-sided
+    /// polygon count.
     pub fn connected_areas_m2(&self) -> Vec<f64> {
         let mut out = vec![0.0; self.patches.len()];
         let bodies = (0..self.bodies.len() as u32).map(BodyId);
@@ -22,37 +20,23 @@ impl Scene {
     /// Adds the areas of the patches of some bodies that share a frame.
     fn connect(&self, bodies: &[BodyId], out: &mut [f64]) {
         let patches = || bodies.iter().flat_map(|&body| self.patches_of(body));
-        let corners = || patches().flat_map(|(_, patch)| patch.corners_in_body());
-        let reach = corners().fold(0.0_f64, |reach, p| reach.max(p.abs().max_element()));
-        let mut weld = Weld::new(WELDED * reach);
-        let mut parent: Vec<u32> = Vec::new();
+        let mut weld = Weld::of_corners(patches().flat_map(|(_, p)| p.corners_in_body()));
+        let mut sets = Sets::default();
         let mut firsts: Vec<(PatchId, u32)> = Vec::new();
         for (id, patch) in patches() {
             let numbers: Vec<u32> = patch.corners_in_body().map(|c| weld.vertex(c)).collect();
-            parent.extend(parent.len() as u32..weld.points.len() as u32);
-            for pair in numbers.windows(2) {
-                let (a, b) = (root(&mut parent, pair[0]), root(&mut parent, pair[1]));
-                parent[a.max(b) as usize] = a.min(b);
-            }
+            sets.extend(weld.points.len());
+            numbers.windows(2).for_each(|pair| sets.join(pair[0], pair[1]));
             firsts.push((id, numbers[0]));
         }
-        let mut areas = vec![0.0; parent.len()];
+        let mut areas = vec![0.0; weld.points.len()];
         for &(id, first) in &firsts {
-            areas[root(&mut parent, first) as usize] += self.patches[id.0 as usize].area_m2();
+            areas[sets.root(first) as usize] += self.patches[id.0 as usize].area_m2();
         }
         for (id, first) in firsts {
-            out[id.0 as usize] = areas[root(&mut parent, first) as usize];
+            out[id.0 as usize] = areas[sets.root(first) as usize];
         }
     }
-}
-
-/// The representative of a set, with the way to it made shorter.
-fn root(parent: &mut [u32], mut of: u32) -> u32 {
-    while parent[of as usize] != of {
-        parent[of as usize] = parent[parent[of as usize] as usize];
-        of = parent[of as usize];
-    }
-    of
 }
 
 #[cfg(test)]
@@ -64,7 +48,7 @@ mod tests {
     /// Three unit squares in a row, each with a body of its own; the first two touch, and the third touches the second
     /// but moves.
     #[test]
-    fn what_moves_does_not_hang_together_with_what_rests() {
+    fn what_moves_is_not_connected_with_what_rests() {
         let mut b = SceneBuilder::new("row");
         let grey = b.material("grey", [0.5; 3], [0.0; 3]);
         for k in 0..3 {

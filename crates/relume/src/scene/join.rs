@@ -31,10 +31,6 @@ pub struct Part {
     pub corners: Vec<DVec2>,
 }
 
-/// Corners closer together than this share of a group's coordinates are one: a few roundings of
-/// 32-bit numbers.
-const WELDED: f64 = 1e-6;
-
 impl Scene {
     /// Joins coplanar patches that share whole sides, face the same way and move together into
     /// convex polygons. A patch without such neighbours stays as it is, bit for bit.
@@ -79,8 +75,7 @@ impl Joins {
             .iter()
             .map(|id| scene.patches[id.0 as usize].corners_in_body().collect())
             .collect();
-        let reach = loops.iter().flatten().map(|p| p.abs().max_element()).fold(0.0, f64::max);
-        let mut weld = Weld::new(WELDED * reach);
+        let mut weld = Weld::of_corners(loops.iter().flatten().copied());
         let mut number = |corners: &Vec<DVec3>| corners.iter().map(|&c| weld.vertex(c)).collect();
         let welded: Vec<Vec<u32>> = loops.iter().map(&mut number).collect();
         let mut triangles: Vec<[u32; 3]> = Vec::new();

@@ -12,10 +12,6 @@ use super::weld::Weld;
 use super::{BodyId, PatchId, Scene};
 use crate::geometry::{Aabb, Plane};
 
-/// Corners closer together than this share of a body's coordinates are one: a few roundings of
-/// 32-bit numbers.
-const WELDED: f64 = 1e-6;
-
 /// Volume over area of a shell at least, in weld tolerances: two polygons back to back close nothing in.
 const THICK: f64 = 16.0;
 
@@ -82,9 +78,7 @@ impl Scene {
     /// single-sided one has to look outwards.
     pub(super) fn shells(&self, body: BodyId, effort: &mut Effort) -> Vec<Shell> {
         let firsts = || self.patches_of(body).filter(|(id, p)| p.twin.is_none_or(|t| t > *id));
-        let coordinates = |reach: f64, p: DVec3| reach.max(p.abs().max_element());
-        let reach = firsts().flat_map(|(_, p)| p.corners_in_body()).fold(0.0, coordinates);
-        let mut weld = Weld::new(WELDED * reach);
+        let mut weld = Weld::of_corners(firsts().flat_map(|(_, p)| p.corners_in_body()));
         let polygon = |(patch, p): (PatchId, &super::Patch)| {
             let mut corners: Vec<u32> = p.corners_in_body().map(|c| weld.vertex(c)).collect();
             corners.dedup();

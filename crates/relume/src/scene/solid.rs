@@ -65,10 +65,6 @@ pub struct Solids {
     pub list: Vec<Solid>,
 }
 
-/// Corners closer together than this share of a body's coordinates are one, and this much a corner may
-/// lie in front of a face: a few roundings of 32-bit numbers.
-const WELDED: f64 = 1e-6;
-
 /// How far behind each face of a solid its furthest corner is at least, in weld tolerances.
 const THICK: f64 = 16.0;
 
@@ -90,9 +86,7 @@ impl Scene {
 
     fn add_solids(&self, body: BodyId, out: &mut Solids) {
         let one_sided = || self.patches_of(body).filter(|(_, patch)| patch.twin.is_none());
-        let coordinates = |reach: f64, p: DVec3| reach.max(p.abs().max_element());
-        let reach = one_sided().flat_map(|(_, p)| p.corners_in_body()).fold(0.0, coordinates);
-        let mut weld = Weld::new(WELDED * reach);
+        let mut weld = Weld::of_corners(one_sided().flat_map(|(_, p)| p.corners_in_body()));
         let face = |(id, patch): (super::PatchId, &super::Patch)| {
             let mut corners: Vec<u32> = patch.corners_in_body().map(|c| weld.vertex(c)).collect();
             corners.dedup();

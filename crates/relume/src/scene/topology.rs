@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use super::weld::Weld;
+use super::weld::{Sets, Weld};
 use super::{BodyId, PatchId, Scene};
 
 /// Share of the scene's diagonal below which two corners are one.
@@ -135,21 +135,12 @@ fn widest_axis(points: impl Iterator<Item = DVec3>) -> usize {
 
 /// Numbers what hangs together along sides, in the order of the first polygon.
 pub(super) fn components(polygons: usize, sides: &[Vec<Side>]) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..polygons as u32).collect();
-    fn root(parent: &mut [u32], mut p: u32) -> u32 {
-        while parent[p as usize] != p {
-            parent[p as usize] = parent[parent[p as usize] as usize];
-            p = parent[p as usize];
-        }
-        p
+    let mut sets = Sets::default();
+    sets.extend(polygons);
+    for pair in sides.iter().flat_map(|group| group.windows(2)) {
+        sets.join(pair[0].polygon, pair[1].polygon);
     }
-    for group in sides {
-        for pair in group.windows(2) {
-            let (a, b) = (root(&mut parent, pair[0].polygon), root(&mut parent, pair[1].polygon));
-            parent[a.max(b) as usize] = a.min(b);
-        }
-    }
-    let roots: Vec<u32> = (0..polygons as u32).map(|p| root(&mut parent, p)).collect();
+    let roots: Vec<u32> = (0..polygons as u32).map(|p| sets.root(p)).collect();
     let mut numbers = vec![u32::MAX; polygons];
     let mut next = 0;
     for &r in &roots {

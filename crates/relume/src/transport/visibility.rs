@@ -2,7 +2,7 @@
 //! segments they block.
 
 use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldView};
-use crate::geometry::{Aabb, Plane, Pose, Sweep, shaft_meets_box};
+use crate::geometry::{Aabb, Plane, Pose, ShaftOfBoxes, shaft_meets_box};
 use crate::scene::{BodyId, PatchId};
 
 use super::clip::keep_in_front;
@@ -70,6 +70,27 @@ const COVER: f64 = 0.5;
 /// disregarded because it is close to an end.
 const LIFT: f64 = 8.0;
 
+/// Sizes of what stands between two ends; infinite where nothing does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BlockerSizes {
+    /// For each end the width (area over length, m) of the narrowest blocker that emits light at any time and shines
+    /// on the end.
+    pub lamps_m: (f64, f64),
+    /// Area of the smallest blocker, m2.
+    pub least_m2: f64,
+    /// Area of all blockers, m2.
+    pub all_m2: f64,
+}
+
+impl BlockerSizes {
+    /// Nothing stands between the ends.
+    pub const NOTHING: BlockerSizes = BlockerSizes {
+        lamps_m: (f64::INFINITY, f64::INFINITY),
+        least_m2: f64::INFINITY,
+        all_m2: f64::INFINITY,
+    };
+}
+
 /// How a patch stands to a shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Standing {
@@ -83,17 +104,17 @@ enum Standing {
 
 /// The two ends in the frame in which a body is looked at, and their boxes' shaft.
 #[derive(Clone, Copy)]
-struct Frame<'a> {
+struct SeenEnds<'a> {
     own: bool,
     a: &'a WorldElement,
     b: &'a WorldElement,
-    sweep: &'a Sweep,
+    shaft: &'a ShaftOfBoxes,
 }
 
 /// Shafts of the ends' boxes: in the world, and in the frame of the body that both ride on.
-struct Sweeps {
-    world: Sweep,
-    own: Option<Sweep>,
+struct ShaftsOfBoxes {
+    world: ShaftOfBoxes,
+    own: Option<ShaftOfBoxes>,
 }
 
 /// A polygon, moved.
@@ -148,26 +169,27 @@ impl<'a> Shaft<'a> {
         }
     }
 
-    fn sweeps(&self) -> Sweeps {
-        Sweeps {
-            world: Sweep::new(&self.a.bounds, &self.b.bounds),
-            own: self.own.map(|(_, a, b)| Sweep::new(&a.bounds, &b.bounds)),
+    fn shafts(&self) -> ShaftsOfBoxes {
+        ShaftsOfBoxes {
+            world: ShaftOfBoxes::new(&self.a.bounds, &self.b.bounds),
+            own: self.own.map(|(_, a, b)| ShaftOfBoxes::new(&a.bounds, &b.bounds)),
         }
     }
 
-    fn frame<'s>(&'s self, sweeps: &'s Sweeps, body: Option<BodyId>) -> Frame<'s> {
+    fn seen_ends<'s>(&'s self, shafts: &'s ShaftsOfBoxes, body: Option<BodyId>) -> SeenEnds<'s> {
         let (own, a, b) = self.seen_by(body);
-        let sweep = if own { sweeps.own.as_ref() } else { None }.unwrap_or(&sweeps.world);
-        Frame { own, a, b, sweep }
+        let shaft = if own { shafts.own.as_ref() } else { None }.unwrap_or(&shafts.world);
+        SeenEnds { own, a, b, shaft }
     }
 
-    /// Whether a patch could block any segment.
-    fn standing(&self, sweeps: &Sweeps, patch: PatchId) -> Standing {
+    /// How a patch stands to the shaft.
+    fn standing(&self, shafts: &ShaftsOfBoxes, patch: PatchId) -> Standing {
         if patch == self.patches.0 || patch == self.patches.1 || self.view.is_hidden_twin(patch) {
             return Standing::Out;
         }
         let root = self.forest.patch_root(patch);
-        let Frame { own, a, b, sweep } = self.frame(sweeps, Some(self.view.patch(patch).body));
+        let SeenEnds { own, a, b, shaft } =
+            self.seen_ends(shafts, Some(self.view.patch(patch).body));
         let (occluder, bounds) = if own {
             (self.view.occluder_in_body(patch), self.view.box_in_body(root))
         } else {
@@ -176,7 +198,7 @@ impl<'a> Shaft<'a> {
         let slack = self.slack();
         // The margins: what covers an end may lie a little behind it.
         let (margin, wide_margin) = (COVER * slack, 1.5 * COVER * slack);
-        if !sweep.meets(bounds, wide_margin) {
+        if !shaft.meets(bounds, wide_margin) {
             return Standing::Out;
         }
         let (above_a, above_b) = (span(&occluder, &a.plane), span(&occluder, &b.plane));
@@ -198,7 +220,7 @@ impl<'a> Shaft<'a> {
         if !passes_wide {
             return Standing::Out;
         }
-        match passes && sweep.meets(bounds, margin) {
+        match passes && shaft.meets(bounds, margin) {
             true => Standing::Between,
             false => Standing::Beside,
         }
@@ -224,7 +246,7 @@ impl<'a> Shaft<'a> {
 
     /// For each end the width (area over length, m) of the narrowest blocker that emits light at any time and shines
     /// on the end: what it hides of it is what it lights. Infinite if there is none.
-    pub fn shone_on(&self, blockers: &[PatchId]) -> (f64, f64) {
+    fn lamp_widths_m(&self, blockers: &[PatchId]) -> (f64, f64) {
         let mut widths = (f64::INFINITY, f64::INFINITY);
         for &patch in blockers.iter().filter(|&&patch| self.forest.glows(patch)) {
             let both = self.view.patch(patch).twin.is_some();
@@ -247,12 +269,17 @@ impl<'a> Shaft<'a> {
         widths
     }
 
-    /// Areas of the smallest of some blockers and of all together, m2; infinite if there is none.
-    pub fn blocker_areas_m2(&self, blockers: &[PatchId]) -> (f64, f64) {
+    /// The sizes of some blockers.
+    pub fn sizes_of(&self, blockers: &[PatchId]) -> BlockerSizes {
+        if blockers.is_empty() {
+            return BlockerSizes::NOTHING;
+        }
         let area = |&patch: &PatchId| self.forest.area_m2(self.forest.patch_root(patch));
-        let least = blockers.iter().map(area).fold(f64::INFINITY, f64::min);
-        let all: f64 = blockers.iter().map(area).sum();
-        if blockers.is_empty() { (f64::INFINITY, f64::INFINITY) } else { (least, all) }
+        BlockerSizes {
+            lamps_m: self.lamp_widths_m(blockers),
+            least_m2: blockers.iter().map(area).fold(f64::INFINITY, f64::min),
+            all_m2: blockers.iter().map(area).sum(),
+        }
     }
 
     /// Whether both ends lie in one plane and touch.
@@ -315,9 +342,9 @@ impl<'a> Shaft<'a> {
     /// Which of `parents` (candidates of a pair above) remain candidates here, appended to `out`;
     /// clusters large against the shaft are opened.
     pub fn narrow(&self, parents: &Candidates, out: &mut Vec<u32>) {
-        let (sweeps, keep_m) = (self.sweeps(), self.keep_m());
+        let (shafts, keep_m) = (self.shafts(), self.keep_m());
         for &parent in parents {
-            self.walk(&sweeps, ElementId(parent), keep_m, &mut |id, _| {
+            self.walk(&shafts, ElementId(parent), keep_m, &mut |id, _| {
                 out.push(id.0);
                 true
             });
@@ -332,9 +359,9 @@ impl<'a> Shaft<'a> {
     /// The patches among and below `candidates` that may block segments of this very pair, in the
     /// forest's order. Which they are depends on the pair alone, not on how `candidates` were found.
     pub fn blockers(&self, candidates: &Candidates) -> Vec<PatchId> {
-        let (sweeps, mut out) = (self.sweeps(), Vec::new());
+        let (shafts, mut out) = (self.shafts(), Vec::new());
         for &candidate in candidates {
-            self.walk(&sweeps, ElementId(candidate), -1.0, &mut |id, standing| {
+            self.walk(&shafts, ElementId(candidate), -1.0, &mut |id, standing| {
                 out.extend(self.forest.patch(id).filter(|_| standing == Standing::Between));
                 true
             });
@@ -344,16 +371,16 @@ impl<'a> Shaft<'a> {
 
     /// [`Shaft::narrow`] and [`Shaft::blockers`] in one walk.
     pub fn narrow_to_blockers(&self, parents: &Candidates, out: &mut Vec<u32>) -> Vec<PatchId> {
-        let (sweeps, keep_m) = (self.sweeps(), self.keep_m());
+        let (shafts, keep_m) = (self.shafts(), self.keep_m());
         let mut blockers = Vec::new();
         for &parent in parents {
-            self.walk(&sweeps, ElementId(parent), keep_m, &mut |id, standing| {
+            self.walk(&shafts, ElementId(parent), keep_m, &mut |id, standing| {
                 out.push(id.0);
                 match self.forest.patch(id) {
                     Some(patch) if standing == Standing::Between => blockers.push(patch),
                     Some(_) => {}
                     None => {
-                        self.walk(&sweeps, id, -1.0, &mut |id, standing| {
+                        self.walk(&shafts, id, -1.0, &mut |id, standing| {
                             let blocks = standing == Standing::Between;
                             blockers.extend(self.forest.patch(id).filter(|_| blocks));
                             true
@@ -368,8 +395,8 @@ impl<'a> Shaft<'a> {
 
     /// Those of the blockers of a pair above that may block segments of this one.
     pub fn those_that_block(&self, blockers: &[PatchId]) -> Vec<PatchId> {
-        let sweeps = self.sweeps();
-        let blocks = |patch: &PatchId| self.standing(&sweeps, *patch) == Standing::Between;
+        let shafts = self.shafts();
+        let blocks = |patch: &PatchId| self.standing(&shafts, *patch) == Standing::Between;
         blockers.iter().copied().filter(blocks).collect()
     }
 
@@ -406,10 +433,10 @@ impl<'a> Shaft<'a> {
     /// Whether anything at or below `id` may block segments of this pair or of one below it,
     /// what rides on `except` aside.
     pub fn is_entered_by(&self, id: ElementId, except: Option<BodyId>) -> bool {
-        self.enters(&self.sweeps(), id, except)
+        self.enters(&self.shafts(), id, except)
     }
 
-    fn enters(&self, sweeps: &Sweeps, id: ElementId, except: Option<BodyId>) -> bool {
+    fn enters(&self, shafts: &ShaftsOfBoxes, id: ElementId, except: Option<BodyId>) -> bool {
         if except.is_some() && self.forest.cluster_body(id) == except {
             return false;
         }
@@ -417,11 +444,11 @@ impl<'a> Shaft<'a> {
             // Groups of bodies are opened one by one, so that the excepted one is met.
             let bounds = self.view.fixed_box(id);
             return self.forest.kind(id) == Kind::Cluster
-                && sweeps.world.meets(bounds, self.slack())
-                && self.forest.children(id).any(|c| self.enters(sweeps, ElementId(c), except));
+                && shafts.world.meets(bounds, self.slack())
+                && self.forest.children(id).any(|c| self.enters(shafts, ElementId(c), except));
         }
         let mut entered = false;
-        self.walk(sweeps, id, -1.0, &mut |_, _| {
+        self.walk(shafts, id, -1.0, &mut |_, _| {
             entered = true;
             false
         });
@@ -432,7 +459,7 @@ impl<'a> Shaft<'a> {
     /// ends and returns false as soon as `visit` does.
     fn walk(
         &self,
-        sweeps: &Sweeps,
+        shafts: &ShaftsOfBoxes,
         id: ElementId,
         keep_m: f64,
         visit: &mut dyn FnMut(ElementId, Standing) -> bool,
@@ -442,20 +469,20 @@ impl<'a> Shaft<'a> {
             return true;
         }
         if let Some(patch) = self.forest.patch(id) {
-            let standing = self.standing(sweeps, patch);
+            let standing = self.standing(shafts, patch);
             return standing == Standing::Out || visit(id, standing);
         }
         let body = self.forest.cluster_body(id);
-        let Frame { own, sweep, .. } = self.frame(sweeps, body);
+        let SeenEnds { own, shaft, .. } = self.seen_ends(shafts, body);
         let bounds = if own { self.view.box_in_body(id) } else { world };
-        if !sweep.meets(bounds, self.slack()) {
+        if !shaft.meets(bounds, self.slack()) {
             return true;
         }
         // Groups of bodies are never kept: their boxes mix frames.
         if body.is_some() && bounds.diagonal() <= keep_m {
             return visit(id, Standing::Beside);
         }
-        self.forest.children(id).all(|c| self.walk(sweeps, ElementId(c), keep_m, visit))
+        self.forest.children(id).all(|c| self.walk(shafts, ElementId(c), keep_m, visit))
     }
 
     /// Blockers in one frame: that of the pair's body if it has one of its own.

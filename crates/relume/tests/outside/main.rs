@@ -132,7 +132,7 @@ a_few! {
     bodies_through_each_other_in_motion: "motion", 0..3;
     white_closets: "closet", 2..4;
     white_tables: "table", 0..2;
-    small_devices: "device", 6..10;
+    small_devices: "device", 1..5;
     lamps_let_into_a_ceiling: "downlight", 0..2;
 }
 

@@ -258,7 +258,6 @@ fn f2_egg_crate() {
     misses.none();
 }
 
-/// The louvre under a lamp of 1 m2.
 /// A 2 cm device, 1 mm above a table in a hall of 10 m.
 fn device_in_a_hall() -> Case {
     let mut case = Case::new(0.02);
@@ -302,6 +301,7 @@ fn light_beside_a_small_device_is_within_the_tolerance() {
     }
 }
 
+/// The louvre under a lamp of 1 m2.
 fn lit_egg_crate() -> Case {
     let mut case = egg_crate(2.2);
     let z = 2.35;

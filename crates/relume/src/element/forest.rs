@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 
 use super::clusters::{Branch, binary_tree};
 use super::split::{Chart, Extent, Place, Shape};
-use crate::geometry::{Aabb, split_convex};
+use crate::geometry::{Aabb, Segment, cut_along, polygon_area, split_convex};
 use crate::scene::{BodyId, Enclosure, PatchId, Scene, Solid, Solids};
 
 /// Index of a node in a [`Forest`].
@@ -262,17 +262,18 @@ impl Forest {
     }
 
     fn plant_bodies(&mut self, scene: &Scene, at: u32) {
+        let cuts = Cuts::new(scene);
         let bodies: Vec<u32> = (0..scene.bodies.len() as u32)
             .filter(|&b| !scene.bodies[b as usize].patches.is_empty())
             .collect();
         let boxes: Vec<Aabb> = bodies.iter().map(|&b| box_at_start(scene, BodyId(b))).collect();
         let tree = binary_tree(&boxes);
         self.plant(&tree, 0, at, NONE, &mut |forest, leaf, id| {
-            forest.plant_body(scene, bodies[leaf as usize], id);
+            forest.plant_body((scene, &cuts), bodies[leaf as usize], id);
         });
     }
 
-    fn plant_body(&mut self, scene: &Scene, body: u32, at: u32) {
+    fn plant_body(&mut self, (scene, cuts): (&Scene, &Cuts), body: u32, at: u32) {
         self.fixed_mut().body_roots[body as usize] = ElementId(at);
         let range = scene.bodies[body as usize].patches.clone();
         let boxes: Vec<Aabb> =
@@ -283,7 +284,8 @@ impl Forest {
         self.plant(&tree, 0, child, body, &mut |forest, leaf, id| {
             let patch = range.start + leaf;
             forest.fixed_mut().patch_roots[patch as usize] = ElementId(id);
-            forest.plant_polygon(patch, &scene.patches[patch as usize].corners, id);
+            let corners = &scene.patches[patch as usize].corners;
+            forest.plant_polygon((patch, &cuts.of(patch)), corners, id);
         });
     }
 
@@ -306,25 +308,30 @@ impl Forest {
         }
     }
 
-    fn plant_polygon(&mut self, patch: u32, corners: &[DVec2], at: u32) {
-        if corners.len() <= 4 {
-            self.set(at, Kind::Element, patch);
-            let shape = Shape::new(corners);
-            let fixed = self.fixed_mut();
-            fixed.charts[at as usize] = Chart::of(&shape);
-            fixed.facets.push(ElementId(at));
-            self.nodes[at as usize].place = Place::whole(shape.len);
-            let twins = &mut self.twins[at as usize];
-            (twins.facet, twins.path) = (at, 1);
-            self.counts.elements += 1;
-            self.counts.leaves += 1;
-            return;
-        }
+    /// A polygon as a facet, or as a group of facets where lines cut it or it has too many corners.
+    fn plant_polygon(&mut self, (patch, cuts): (u32, &PatchCuts<'_>), corners: &[DVec2], at: u32) {
+        let parts =
+            cuts.apply(corners).or_else(|| (corners.len() > 4).then(|| split_convex(corners)));
+        let Some((one, two)) = parts else {
+            return self.plant_facet(patch, corners, at);
+        };
         self.set(at, Kind::Polygon, patch);
-        let (one, two) = split_convex(corners);
         let child = self.add_children(at, 2);
-        self.plant_polygon(patch, &one, child);
-        self.plant_polygon(patch, &two, child + 1);
+        self.plant_polygon((patch, cuts), &one, child);
+        self.plant_polygon((patch, cuts), &two, child + 1);
+    }
+
+    fn plant_facet(&mut self, patch: u32, corners: &[DVec2], at: u32) {
+        self.set(at, Kind::Element, patch);
+        let shape = Shape::new(corners);
+        let fixed = self.fixed_mut();
+        fixed.charts[at as usize] = Chart::of(&shape);
+        fixed.facets.push(ElementId(at));
+        self.nodes[at as usize].place = Place::whole(shape.len);
+        let twins = &mut self.twins[at as usize];
+        (twins.facet, twins.path) = (at, 1);
+        self.counts.elements += 1;
+        self.counts.leaves += 1;
     }
 
     fn set(&mut self, at: u32, kind: Kind, subject: u32) {
@@ -753,6 +760,49 @@ impl Forest {
         self.nodes.shrink_to(self.nodes.len() + self.nodes.len() / SLACK);
         self.twins.shrink_to(self.twins.len() + self.twins.len() / SLACK);
         self.vacant.iter_mut().for_each(|list| list.shrink_to(2 * list.len()));
+    }
+}
+
+/// The lines that patches are cut along before anything else, so that no element lies on both sides of a wall's foot.
+struct Cuts {
+    lines: Vec<Vec<Segment>>,
+    /// Smaller polygons are left whole, m2.
+    least_m2: f64,
+}
+
+/// Those of one patch.
+struct PatchCuts<'a> {
+    lines: &'a [Segment],
+    least_m2: f64,
+    slack_m: f64,
+}
+
+/// Share of a polygon's chord along a line that must be covered by the lines of contact on it.
+const CUT_SHARE: f64 = 0.25;
+
+/// Polygons of a smaller share of the scene's area are not cut: light jumps from one to the next anyway.
+const CUT_LEAST: f64 = 1.0 / 512.0;
+
+impl Cuts {
+    fn new(scene: &Scene) -> Cuts {
+        Cuts { lines: scene.discontinuities(), least_m2: CUT_LEAST * scene.area_m2() }
+    }
+
+    fn of(&self, patch: u32) -> PatchCuts<'_> {
+        let lines = &self.lines[patch as usize][..];
+        let ends = lines.iter().flatten();
+        let reach = ends.fold(0.0_f64, |reach, p| reach.max(p.abs().max_element()));
+        PatchCuts { lines, least_m2: self.least_m2, slack_m: 1e-6 * reach }
+    }
+}
+
+impl PatchCuts<'_> {
+    /// Both parts of a polygon that is to be cut.
+    fn apply(&self, corners: &[DVec2]) -> Option<(Vec<DVec2>, Vec<DVec2>)> {
+        if self.lines.is_empty() || polygon_area(corners) < self.least_m2 {
+            return None;
+        }
+        cut_along(corners, self.lines, CUT_SHARE, self.slack_m)
     }
 }
 

@@ -45,6 +45,11 @@ impl Aabb {
         !self.lo.cmple(self.hi).all()
     }
 
+    /// Whether two boxes have a point in common.
+    pub fn meets(&self, other: &Aabb) -> bool {
+        self.lo.cmple(other.hi).all() && other.lo.cmple(self.hi).all()
+    }
+
     /// Middle of the box.
     #[inline]
     pub fn centre(&self) -> DVec3 {

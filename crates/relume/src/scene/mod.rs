@@ -15,6 +15,7 @@ mod builder;
 mod check;
 mod connected;
 mod dark;
+mod discontinuity;
 mod draft;
 mod drift;
 mod error;

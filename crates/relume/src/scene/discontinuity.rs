@@ -1,0 +1,113 @@
+//! Where radiosity jumps: lines along which other patches meet or cross a patch. Pure geometry.
+//!
+//! On either side of the foot of a wall a floor may receive quite different light (a discontinuity of order zero;
+//! Heckbert 1992). An element across it would carry the mean of both, and send it to both sides.
+
+use glam::{DVec2, DVec3};
+
+use super::{BodyId, PatchId, Scene};
+use crate::geometry::{Aabb, Plane, Segment, segment_within};
+
+/// What lies this close to a plane, as a share of the largest coordinate, lies in it: a few roundings of 32-bit numbers.
+const IN_PLANE: f64 = 1e-6;
+
+impl Scene {
+    /// For each patch, where others meet its plane within it. Bodies that never move meet each other, a body that moves
+    /// only itself: lines of contact that move are not found. Outer edges of the patch are left out.
+    pub fn discontinuities(&self) -> Vec<Vec<Segment>> {
+        let mut out = vec![Vec::new(); self.patches.len()];
+        let bodies = (0..self.bodies.len() as u32).map(BodyId);
+        let (moving, at_rest): (Vec<BodyId>, Vec<BodyId>) =
+            bodies.partition(|&body| self.moves(body));
+        self.meet(&at_rest, &mut out);
+        moving.into_iter().for_each(|body| self.meet(&[body], &mut out));
+        out
+    }
+
+    /// Adds where patches of some bodies that share a frame meet.
+    fn meet(&self, bodies: &[BodyId], out: &mut [Vec<Segment>]) {
+        let mut placed: Vec<Placed> = bodies
+            .iter()
+            .flat_map(|&body| self.patches_of(body))
+            // The back of a polygon lies where its front does.
+            .map(|(id, _)| Placed::new(self, id))
+            .collect();
+        let reach = |p: &Placed| p.bounds.lo.abs().max(p.bounds.hi.abs()).max_element();
+        let slack_m = IN_PLANE * placed.iter().map(reach).fold(0.0, f64::max);
+        placed.iter_mut().for_each(|p| p.bounds = p.bounds.grown(slack_m));
+        placed.sort_by(|p, q| p.bounds.lo.x.total_cmp(&q.bounds.lo.x).then(p.id.cmp(&q.id)));
+        for (k, one) in placed.iter().enumerate() {
+            let beside = placed[k + 1..].iter().take_while(|q| q.bounds.lo.x <= one.bounds.hi.x);
+            for other in beside.filter(|q| q.bounds.meets(&one.bounds)) {
+                for (of, by) in [(one, other), (other, one)] {
+                    let twin = self.patches[by.id.0 as usize].twin;
+                    let is_back = twin.is_some_and(|twin| twin < by.id);
+                    if twin != Some(of.id) && !is_back {
+                        out[of.id.0 as usize].extend(self.met(of, by, slack_m));
+                    }
+                }
+            }
+        }
+        // In an order that does not depend on how they were found.
+        for Placed { id, .. } in placed {
+            out[id.0 as usize].sort_by(|p, q| {
+                let number = |s: &Segment| [s[0].x, s[0].y, s[1].x, s[1].y];
+                let pairs = number(p).into_iter().zip(number(q));
+                pairs
+                    .map(|(x, y)| x.total_cmp(&y))
+                    .find(|o| o.is_ne())
+                    .unwrap_or(std::cmp::Ordering::Equal)
+            });
+        }
+    }
+
+    /// Where the polygon `by` meets the plane of `of` within that patch.
+    fn met(&self, of: &Placed, by: &Placed, slack_m: f64) -> Vec<Segment> {
+        let patch = &self.patches[of.id.0 as usize];
+        let frame = patch.frame;
+        let plane = Plane::through(frame.origin, frame.normal);
+        let in_frame = |p: DVec3| {
+            let d = p - frame.origin;
+            DVec2::new(d.dot(frame.u), d.dot(frame.v))
+        };
+        let n = by.corners.len();
+        let above: Vec<f64> = by.corners.iter().map(|&c| plane.distance(c)).collect();
+        let is_on = |k: usize| above[k].abs() <= slack_m;
+        let lines: Vec<Segment> = if (0..n).all(is_on) {
+            (0..n).map(|k| [in_frame(by.corners[k]), in_frame(by.corners[(k + 1) % n])]).collect()
+        } else {
+            let on = (0..n).filter(|&k| is_on(k)).map(|k| by.corners[k]);
+            let through = (0..n).filter_map(|k| {
+                let l = (k + 1) % n;
+                let crosses = !is_on(k) && !is_on(l) && (above[k] > 0.0) != (above[l] > 0.0);
+                let at = above[k] / (above[k] - above[l]);
+                crosses.then(|| by.corners[k] + (by.corners[l] - by.corners[k]) * at)
+            });
+            let points: Vec<DVec2> = on.chain(through).map(in_frame).collect();
+            farthest(&points).into_iter().collect()
+        };
+        lines.iter().filter_map(|&line| segment_within(&patch.corners, line, slack_m)).collect()
+    }
+}
+
+/// The two points farthest from each other, if there are two.
+fn farthest(points: &[DVec2]) -> Option<Segment> {
+    let pairs =
+        points.iter().enumerate().flat_map(|(k, &p)| points[..k].iter().map(move |&q| [q, p]));
+    pairs.max_by(|p, q| p[0].distance_squared(p[1]).total_cmp(&q[0].distance_squared(q[1])))
+}
+
+/// A patch in the frame of its group.
+struct Placed {
+    id: PatchId,
+    corners: Vec<DVec3>,
+    bounds: Aabb,
+}
+
+impl Placed {
+    fn new(scene: &Scene, id: PatchId) -> Placed {
+        let corners: Vec<DVec3> = scene.patches[id.0 as usize].corners_in_body().collect();
+        let bounds = Aabb::of(corners.iter().copied());
+        Placed { id, corners, bounds }
+    }
+}

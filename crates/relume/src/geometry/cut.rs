@@ -161,7 +161,9 @@ mod tests {
     fn segments_on_one_line_count_together() {
         let wall = [across(2.0, 0.0, 1.5), across(2.0, 2.4, 4.0), across(2.0, 2.4, 4.0)];
         let (one, two) = cut_along(&rectangle(), &wall, 0.6, SLACK_M).unwrap();
-        assert!((polygon_area(&one) - 8.0).abs() < 1e-12 && (area(&two) - 16.0).abs() < 1e-12);
+        assert!(
+            (polygon_area(&one) - 8.0).abs() < 1e-12 && (polygon_area(&two) - 16.0).abs() < 1e-12
+        );
         assert_eq!(cut_along(&rectangle(), &wall, 0.8, SLACK_M), None);
         assert_eq!(cut_along(&rectangle(), &wall[..1], 0.6, SLACK_M), None);
     }

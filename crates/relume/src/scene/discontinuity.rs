@@ -111,3 +111,47 @@ impl Placed {
         Placed { id, corners, bounds }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, DVec2, DVec3};
+
+    use crate::scene::{Interpolation, SceneBuilder, Track};
+
+    /// A floor of 4 x 4 m with a wall across it, on a body of its own; where the wall is, and whether it moves.
+    fn lines(at: DVec3, moves: bool) -> Vec<Vec<[DVec2; 2]>> {
+        let mut b = SceneBuilder::new("floor and wall");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let floor = b.node("floor", None, DVec3::ZERO, DQuat::IDENTITY);
+        let corners = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)];
+        b.polygon(floor, "floor", grey, &corners.map(|(x, y)| DVec3::new(x, y, 0.0)));
+        let wall = b.node("wall", None, at, DQuat::IDENTITY);
+        let corners = [(1.0, 0.0), (3.0, 0.0), (3.0, 2.0), (1.0, 2.0)];
+        b.polygon(wall, "wall", grey, &corners.map(|(x, z)| DVec3::new(x, 1.5, z)));
+        if moves {
+            let values = vec![at, at + DVec3::Z];
+            let interpolation = Interpolation::Linear;
+            b.animate_translation(wall, Track { times_s: vec![0.0, 1.0], values, interpolation });
+        }
+        b.build().unwrap().discontinuities()
+    }
+
+    #[test]
+    fn a_wall_at_rest_meets_the_floor_where_it_stands_or_sinks_in() {
+        for depth in [0.0, 0.5] {
+            let found = lines(DVec3::Z * -depth, false);
+            let length = |s: &[DVec2; 2]| s[0].distance(s[1]);
+            assert_eq!(found[0].len(), 1, "{depth}: {found:?}");
+            assert!((length(&found[0][0]) - 2.0).abs() < 1e-12);
+            // Along the wall's own lower edge nothing is cut; where the floor crosses the wall, it is.
+            assert_eq!(found[1].len(), usize::from(depth > 0.0));
+        }
+    }
+
+    #[test]
+    fn what_moves_or_stays_above_meets_nothing() {
+        let none = |found: Vec<Vec<_>>| found.iter().all(Vec::is_empty);
+        assert!(none(lines(DVec3::Z * 0.01, false)));
+        assert!(none(lines(DVec3::ZERO, true)));
+    }
+}

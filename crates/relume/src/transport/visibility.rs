@@ -733,6 +733,7 @@ fn crosses(view: &WorldView, patch: PatchId, p: DVec3, q: DVec3, slack_m: f64) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::element::Shape;
     use crate::scene::SceneBuilder;
     use glam::DQuat;
 
@@ -764,7 +765,9 @@ mod tests {
             (0..scene.patches.len() as u32).map(PatchId).find(is).unwrap()
         };
         let patches = (inner(0.0, 1.0), inner(1.0, -1.0));
-        let place = |p| WorldElement::new(&view, &forest, forest.patch_root(p), false);
+        // Whole, whatever stands on them.
+        let whole = |p: PatchId| Shape::new(&scene.patches[p.0 as usize].corners);
+        let place = |p| WorldElement::of_shape(view.patch(p), &whole(p), false);
         let (a, b) = (place(patches.0), place(patches.1));
         let shaft = Shaft { forest: &forest, view: &view, a: &a, b: &b, own: None, patches };
         let blockers = shaft.blockers(&[Forest::ROOT.0]);
@@ -820,8 +823,8 @@ mod tests {
         let mut forest = Forest::new(&scene);
         let view = WorldView::new(&scene, &forest, 0.0);
         let patches = || (0..scene.patches.len() as u32).map(PatchId);
-        // Of every seventh patch one part besides.
-        let roots: Vec<ElementId> = patches().map(|p| forest.patch_root(p)).collect();
+        // Of every seventh facet its parts besides.
+        let roots: Vec<ElementId> = forest.facets().to_vec();
         let mut ends: Vec<(ElementId, ElementId)> = roots.iter().map(|&id| (id, id)).collect();
         for &root in roots.iter().step_by(7) {
             ends.extend(forest.split(root).0.map(|part| (ElementId(part), root)));

@@ -15,7 +15,7 @@ use super::names::Names;
 use super::rigid::{check_track, without_scales};
 use super::{
     Body, BodyId, Frame, Glow, Interpolation, Material, MaterialId, Motion, NodeId, Note, Patch,
-    PatchId, Scene, SceneError, Severity, Surface, SurfaceId,
+    PatchId, Scene, SceneError, Severity, Surface, SurfaceId, TintId,
 };
 use crate::geometry::Pose;
 
@@ -68,6 +68,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
         obstructions: BTreeSet::new(),
         patches: parts.patches,
         materials: draft.materials,
+        tints: draft.tints,
         lights: draft.lights,
         cameras: draft.cameras,
         motion,
@@ -117,7 +118,8 @@ impl Parts {
         let before = self.patches.len();
         let mut degenerate = 0;
         let double_sided = materials[surface.material.0 as usize].double_sided;
-        for polygon in &surface.polygons {
+        for (number, polygon) in surface.polygons.iter().enumerate() {
+            let tint = surface.tints.get(number).copied().flatten();
             let points = place.place(polygon);
             if let Some(bad) = points.iter().find(|p| !is_place(&p.to_array())) {
                 return Err(no_place(name, object, *bad));
@@ -125,7 +127,8 @@ impl Parts {
             for piece in flat_pieces(&points) {
                 match piece {
                     Ok((frame, corners)) => {
-                        self.add_patch(body, id, surface.material, double_sided, frame, corners)
+                        let of = (body, id, surface.material, tint);
+                        self.add_patch(of, double_sided, frame, corners);
                     }
                     Err(_) => degenerate += 1,
                 }
@@ -230,9 +233,7 @@ impl Parts {
 
     fn add_patch(
         &mut self,
-        body: BodyId,
-        surface: SurfaceId,
-        material: MaterialId,
+        (body, surface, material, tint): (BodyId, SurfaceId, MaterialId, Option<TintId>),
         double_sided: bool,
         frame: Frame,
         corners: Vec<DVec2>,
@@ -241,13 +242,14 @@ impl Parts {
         let back = PatchId(front.0 + 1);
         let (behind, behind_corners) = seen_from_behind(&frame, &corners);
         let twin = double_sided.then_some(back);
-        self.patches.push(Patch { body, surface, material, frame, corners, twin });
+        self.patches.push(Patch { body, surface, material, tint, frame, corners, twin });
         if double_sided {
             let twin = Some(front);
             self.patches.push(Patch {
                 body,
                 surface,
                 material,
+                tint,
                 frame: behind,
                 corners: behind_corners,
                 twin,

@@ -169,6 +169,7 @@ impl SceneBuilder {
                     name: Some(surface_name.to_owned()),
                     material,
                     polygons: vec![polygon],
+                    tints: Vec::new(),
                 }),
             }
         });

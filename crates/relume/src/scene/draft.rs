@@ -5,7 +5,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::{Camera, Light, Material, MaterialId, Note, RotationTrack, Track};
+use super::{Camera, Light, Material, MaterialId, Note, RotationTrack, Tint, TintId, Track};
 
 /// Everything of a scene, unchecked.
 #[derive(Default)]
@@ -14,6 +14,7 @@ pub(super) struct Draft {
     /// Parents before children.
     pub(super) nodes: Vec<DraftNode>,
     pub(super) materials: Vec<Material>,
+    pub(super) tints: Vec<Tint>,
     pub(super) lights: Vec<Light>,
     pub(super) cameras: Vec<Camera>,
     pub(super) animation: Option<String>,
@@ -43,6 +44,8 @@ pub(super) struct DraftSurface {
     pub(super) material: MaterialId,
     /// Loops, counter-clockwise from the front, in the node's own (scaled) frame.
     pub(super) polygons: Vec<Vec<DVec3>>,
+    /// Tints of the polygons, where they have any; shorter where the last ones have none.
+    pub(super) tints: Vec<Option<TintId>>,
 }
 
 impl DraftNode {

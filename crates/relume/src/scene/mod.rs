@@ -30,6 +30,7 @@ mod names;
 mod rigid;
 mod shell;
 mod solid;
+mod tint;
 mod topology;
 mod view3d;
 mod weld;
@@ -43,6 +44,7 @@ pub use import::{ImportOptions, import};
 pub use join::{Joined, Part};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
 pub use solid::{Enclosure, Solid, SolidEdge, SolidFace, Solids};
+pub use tint::Tint;
 
 /// Index of a [`Body`] in [`Scene::bodies`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -60,6 +62,10 @@ pub struct MaterialId(pub u32);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SurfaceId(pub u32);
 
+/// Index of a [`Tint`] in [`Scene::tints`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TintId(pub u32);
+
 /// Everything that is lit, as read and validated. Immutable.
 #[derive(Clone, Debug)]
 pub struct Scene {
@@ -76,6 +82,9 @@ pub struct Scene {
     pub patches: Vec<Patch>,
     /// Materials; every patch names one.
     pub materials: Vec<Material>,
+    /// What textures and vertex colours make of materials, one entry for each distinct value: ask
+    /// [`Scene::reflectance`] and [`Scene::exitance_at`], which know them.
+    pub tints: Vec<Tint>,
     /// Punctual lights (KHR_lights_punctual).
     pub lights: Vec<Light>,
     /// Cameras, in file order.
@@ -125,6 +134,8 @@ pub struct Patch {
     pub surface: SurfaceId,
     /// Its material.
     pub material: MaterialId,
+    /// Where its reflectance or emission differ from the material's, what they are.
+    pub tint: Option<TintId>,
     /// Its plane's frame in the body's frame.
     pub frame: Frame,
     /// Corners in the plane's frame, counter-clockwise seen from the front, convex, three or
@@ -154,7 +165,7 @@ impl Frame {
     }
 }
 
-/// A diffuse material; linear RGB.
+/// A diffuse material; linear RGB. Textures and vertex colours are not in it: see [`Tint`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Unique name.

@@ -261,7 +261,12 @@ impl Tree<'_> {
             }
             let polygons = primitive.loops;
             let material = MaterialId(material as u32);
-            self.draft.nodes[me].surfaces.push(DraftSurface { name: None, material, polygons });
+            self.draft.nodes[me].surfaces.push(DraftSurface {
+                name: None,
+                material,
+                polygons,
+                tints: Vec::new(),
+            });
         }
         Ok(())
     }

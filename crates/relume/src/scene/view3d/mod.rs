@@ -94,7 +94,12 @@ fn scene(name: &str, text: &str) -> Result<Scene, Refused> {
                     obstructions.push(name.clone());
                 }
                 let material = materials.of(raw, &mut notes);
-                surfaces.push(DraftSurface { name: Some(name), material, polygons: Vec::new() });
+                surfaces.push(DraftSurface {
+                    name: Some(name),
+                    material,
+                    polygons: Vec::new(),
+                    tints: Vec::new(),
+                });
                 surfaces.len() - 1
             }
         };

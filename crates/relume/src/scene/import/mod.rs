@@ -10,11 +10,17 @@ mod accessor;
 mod animation;
 mod base64;
 mod clock;
+mod coverage;
 mod document;
+mod facet;
+mod images;
 mod json;
 mod light;
+mod look;
 mod material;
 mod mesh;
+mod parts;
+mod pyramid;
 mod tree;
 
 use document::Document;

@@ -1,0 +1,280 @@
+//! What textures and vertex colours make of triangles and polygons of a primitive.
+//!
+//! Means over surfaces; must not know files, or which polygons are made of the triangles.
+
+use std::rc::Rc;
+
+use glam::DVec2;
+
+use super::coverage::{Cover, Wrap, for_each_third};
+use super::parts::Field;
+use super::pyramid::{Pyramid, Sums};
+
+/// An image on a primitive.
+pub(super) struct Layer {
+    pub(super) pyramid: Rc<Pyramid>,
+    pub(super) wrap: [Wrap; 2],
+    /// Texture coordinates of each vertex; without any the whole image counts everywhere.
+    pub(super) places: Option<Vec<DVec2>>,
+    /// See [`Cover::resolution`].
+    pub(super) resolution: f64,
+}
+
+/// All that varies over a primitive.
+#[derive(Default)]
+pub(super) struct Look {
+    pub(super) base: Option<Layer>,
+    pub(super) emission: Option<Layer>,
+    /// Vertex colours, linear, with alpha (COLOR_0).
+    pub(super) colours: Option<Vec<[f64; 4]>>,
+    /// Alpha of the vertices, factor included, from which on a primitive without image that lets light pass blocks it.
+    pub(super) least_vertex_alpha: Option<f64>,
+}
+
+/// Means over a triangle or a polygon.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Facet {
+    /// Texture times vertex colour, over what is there of it.
+    pub(super) colour: [f64; 3],
+    /// How much of it is there: where the image's alpha is high enough.
+    pub(super) covered: f64,
+    /// Standard deviation of the brightness of the image over what is there.
+    spread: f64,
+    pub(super) emission: [f64; 3],
+    emission_spread: f64,
+    /// The mean of the squares of the brightness of the emission.
+    pub(super) emission_squared: f64,
+}
+
+/// Parts along the sides of a triangle on which image and vertex colours both vary.
+const THIRDS: usize = 8;
+
+/// Differences of colours that count as none, and relative ones of emissions.
+const ALIKE: f64 = 1.0 / 32.0;
+
+/// By how much texture coordinates may leave a plane that they share, relative to their extent.
+const ON_PLANE: f64 = 1e-3;
+
+impl Layer {
+    fn cover(&self) -> Cover<'_> {
+        Cover { pyramid: &self.pyramid, wrap: self.wrap, resolution: self.resolution }
+    }
+
+    fn mean(&self, triangle: [u32; 3]) -> Sums {
+        match self.places_of(triangle) {
+            Some(places) => self.cover().mean(places),
+            None => self.pyramid.mean(),
+        }
+    }
+
+    pub(super) fn places_of(&self, triangle: [u32; 3]) -> Option<[DVec2; 3]> {
+        self.places.as_ref().map(|places| triangle.map(|v| places[v as usize]))
+    }
+
+    /// The mean over a convex polygon of texture coordinates.
+    pub(super) fn mean_over(&self, corners: &[DVec2]) -> Sums {
+        let (area, sums) = self.cover().integral(corners);
+        if area > 0.0 { sums.map(|s| s / area) } else { self.pyramid.mean() }
+    }
+}
+
+impl Look {
+    /// The layer along which polygons are cut into parts.
+    pub(super) fn divided(&self, is_see_through: bool) -> Option<&Layer> {
+        let layer = if is_see_through { &self.base } else { &self.emission };
+        layer.as_ref().filter(|layer| layer.places.is_some())
+    }
+
+    /// The means over a triangle.
+    pub(super) fn facet(&self, triangle: [u32; 3]) -> Facet {
+        let (colour, there) = self.colour(triangle);
+        let emission = self.emission.as_ref().map_or([1.0; 5], |layer| layer.mean(triangle));
+        let mut facet = Facet::default().emitting(emission);
+        facet.set_colour(colour, there);
+        facet
+    }
+
+    /// What the image of the base colour sums to over a triangle, times the colours of its vertices; and without them.
+    fn colour(&self, triangle: [u32; 3]) -> (Sums, Sums) {
+        let vertex = self.colours.as_ref().map(|c| triangle.map(|v| c[v as usize]));
+        match (&self.base, vertex) {
+            (None, None) => ([1.0; 5], [1.0; 5]),
+            (Some(layer), None) => {
+                let mean = layer.mean(triangle);
+                (mean, mean)
+            }
+            (None, Some(v)) => {
+                let mean = [0, 1, 2, 3].map(|c| (v[0][c] + v[1][c] + v[2][c]) / 3.0);
+                let there = self.least_vertex_alpha.is_none_or(|least| mean[3] >= least);
+                let there = if there { 1.0 } else { 0.0 };
+                ([mean[0] * there, mean[1] * there, mean[2] * there, there, 0.0], [0.0; 5])
+            }
+            (Some(layer), Some(v)) => {
+                let whole = layer.mean(triangle);
+                match layer.places_of(triangle).filter(|_| v[0] != v[1] || v[0] != v[2]) {
+                    None => (times(whole, mix(v, [1.0 / 3.0; 3])), whole),
+                    Some(places) => (products(layer, places, v), whole),
+                }
+            }
+        }
+    }
+
+    /// Whether two triangles may be merged into one polygon.
+    pub(super) fn alike(&self, one: &Facet, other: &Facet) -> bool {
+        let near =
+            |a: [f64; 3], b: [f64; 3], least: f64| (0..3).all(|c| (a[c] - b[c]).abs() <= least);
+        let brightest = one.emission.iter().chain(&other.emission).fold(0.0, |m: f64, &e| m.max(e));
+        let emission = (ALIKE * brightest).max(one.emission_spread).max(other.emission_spread);
+        let spread = ALIKE.max(one.spread).max(other.spread);
+        let partly = |f: &Facet| (f.covered * (1.0 - f.covered)).max(0.0).sqrt();
+        near(one.colour, other.colour, spread)
+            && near(one.emission, other.emission, emission)
+            && (one.covered - other.covered).abs() <= ALIKE.max(partly(one)).max(partly(other))
+    }
+}
+
+/// The mean of an image times vertex colours that vary linearly: over equal parts, each with its mean and its middle.
+fn products(layer: &Layer, places: [DVec2; 3], vertex: [[f64; 4]; 3]) -> Sums {
+    let cover = layer.cover();
+    let at = |w: [f64; 3]| places[0] * w[0] + places[1] * w[1] + places[2] * w[2];
+    let mut sums = [0.0; 5];
+    for_each_third(THIRDS, |middle| {
+        // A part has the shape of the whole, or is that turned round: both have the same middle and area.
+        let about = |k: usize| {
+            let own = places[k] - at([1.0 / 3.0; 3]);
+            at(middle) + own / THIRDS as f64
+        };
+        let part = times(cover.mean([about(0), about(1), about(2)]), mix(vertex, middle));
+        (0..5).for_each(|c| sums[c] += part[c]);
+    });
+    sums.map(|s| s / (THIRDS * THIRDS) as f64)
+}
+
+fn mix(vertex: [[f64; 4]; 3], weights: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|c| (0..3).map(|k| weights[k] * vertex[k][c]).sum())
+}
+
+fn times(sums: Sums, colour: [f64; 3]) -> Sums {
+    [sums[0] * colour[0], sums[1] * colour[1], sums[2] * colour[2], sums[3], sums[4]]
+}
+
+/// The standard deviation of brightness over what is there.
+fn spread_of(sums: Sums) -> f64 {
+    let mean = (sums[0] + sums[1] + sums[2]) / (3.0 * sums[3].max(f64::MIN_POSITIVE));
+    (sums[4] / sums[3].max(f64::MIN_POSITIVE) - mean * mean).max(0.0).sqrt()
+}
+
+impl Facet {
+    /// With these means of the emission's image.
+    pub(super) fn emitting(self, sums: Sums) -> Facet {
+        Facet {
+            emission: [sums[0], sums[1], sums[2]],
+            emission_spread: spread_of(sums),
+            emission_squared: sums[4],
+            ..self
+        }
+    }
+
+    fn set_colour(&mut self, colour: Sums, image: Sums) {
+        self.covered = colour[3];
+        if colour[3] > 0.0 {
+            self.colour = [0, 1, 2].map(|c| colour[c] / colour[3]);
+        }
+        self.spread = spread_of(image);
+    }
+
+    /// The mean colour of the vertices where the image alone has these means.
+    pub(super) fn vertex_colour(&self, image: &Sums) -> [f64; 3] {
+        let of = |c: usize| if image[c] > 0.0 { self.colour[c] * image[3] / image[c] } else { 1.0 };
+        [0, 1, 2].map(of)
+    }
+
+    /// With these means of the base colour's image, times a vertex colour.
+    pub(super) fn coloured(mut self, sums: Sums, vertex: [f64; 3]) -> Facet {
+        self.set_colour(times(sums, vertex), sums);
+        self
+    }
+
+    /// The mean of several, weighed with their areas.
+    pub(super) fn mean(of: &[(Facet, f64)]) -> Facet {
+        let area: f64 = of.iter().map(|(_, area)| area).sum();
+        let covered: f64 = of.iter().map(|(f, area)| f.covered * area).sum();
+        let mut mean = Facet { covered: covered / area, ..Facet::default() };
+        for (facet, part) in of {
+            let there = if covered > 0.0 { facet.covered * part / covered } else { 0.0 };
+            (0..3).for_each(|c| mean.colour[c] += facet.colour[c] * there);
+            (0..3).for_each(|c| mean.emission[c] += facet.emission[c] * part / area);
+            mean.emission_squared += facet.emission_squared * part / area;
+        }
+        mean
+    }
+}
+
+/// How the places of a plane in space and in an image belong together.
+pub(super) struct Chart {
+    origin: glam::DVec3,
+    /// Space per unit of each texture coordinate.
+    along: [glam::DVec3; 2],
+    /// Texture coordinate per unit of space, and that of the origin.
+    across: [glam::DVec3; 2],
+    at_origin: DVec2,
+    extent: f64,
+}
+
+impl Chart {
+    /// The chart of a triangle; `None` where its texture coordinates have no area, or it has none.
+    pub(super) fn new(points: [glam::DVec3; 3], places: [DVec2; 3]) -> Option<Chart> {
+        let (p, q) = (points[1] - points[0], points[2] - points[0]);
+        let (s, t) = (places[1] - places[0], places[2] - places[0]);
+        let turn = s.perp_dot(t);
+        let extent = s.abs().max(t.abs()).max_element();
+        let normal = p.cross(q);
+        if !(turn.abs() > 1e-9 * extent * extent) || !(normal.length_squared() > 0.0) {
+            return None;
+        }
+        let along = [(p * t.y - q * s.y) / turn, (q * s.x - p * t.x) / turn];
+        // The dual basis within the plane.
+        let (one, other) = (q.cross(normal), normal.cross(p));
+        let (one, other) = (one / one.dot(p), other / other.dot(q));
+        let across = [one * s.x + other * t.x, one * s.y + other * t.y];
+        Some(Chart { origin: points[0], along, across, at_origin: places[0], extent })
+    }
+
+    pub(super) fn place(&self, point: glam::DVec3) -> DVec2 {
+        let d = point - self.origin;
+        self.at_origin + DVec2::new(self.across[0].dot(d), self.across[1].dot(d))
+    }
+
+    pub(super) fn point(&self, place: DVec2) -> glam::DVec3 {
+        let d = place - self.at_origin;
+        self.origin + self.along[0] * d.x + self.along[1] * d.y
+    }
+
+    /// Whether a corner with this texture coordinate goes on in the same way.
+    pub(super) fn holds(&self, point: glam::DVec3, place: DVec2) -> bool {
+        (self.place(point) - place).abs().max_element() <= ON_PLANE * self.extent
+    }
+}
+
+/// A layer as what polygons are cut by.
+pub(super) struct Divided<'a> {
+    pub(super) layer: &'a Layer,
+    /// By how much of the image is there, not by its brightness.
+    pub(super) by_alpha: bool,
+}
+
+/// See [`Cover::resolution`]: for the search of cuts.
+const COARSE: f64 = 64.0;
+
+impl Field for Divided<'_> {
+    fn integral(&self, corners: &[DVec2]) -> (f64, f64) {
+        let cover = Cover { resolution: COARSE, ..self.layer.cover() };
+        let (area, sums) = cover.integral(corners);
+        let bright = (sums[0] + sums[1] + sums[2]) / 3.0;
+        (area, if self.by_alpha { sums[3] } else { bright })
+    }
+
+    fn texels(&self) -> [f64; 2] {
+        self.layer.pyramid.size.map(|n| n as f64)
+    }
+}

@@ -52,6 +52,10 @@ const THIRDS: usize = 8;
 /// Differences of colours that count as none, and relative ones of emissions.
 const ALIKE: f64 = 1.0 / 32.0;
 
+/// Differences are none, too, up to so many standard deviations of the image within the triangles: the halves of a
+/// square on an even ramp differ by 1.41.
+const WITHIN: f64 = 2.0;
+
 /// By how much texture coordinates may leave a plane that they share, relative to their extent.
 const ON_PLANE: f64 = 1e-3;
 
@@ -124,8 +128,9 @@ impl Look {
         let near =
             |a: [f64; 3], b: [f64; 3], least: f64| (0..3).all(|c| (a[c] - b[c]).abs() <= least);
         let brightest = one.emission.iter().chain(&other.emission).fold(0.0, |m: f64, &e| m.max(e));
-        let emission = (ALIKE * brightest).max(one.emission_spread).max(other.emission_spread);
-        let spread = ALIKE.max(one.spread).max(other.spread);
+        let within = one.emission_spread.max(other.emission_spread);
+        let emission = (ALIKE * brightest).max(WITHIN * within);
+        let spread = ALIKE.max(WITHIN * one.spread.max(other.spread));
         let partly = |f: &Facet| (f.covered * (1.0 - f.covered)).max(0.0).sqrt();
         near(one.colour, other.colour, spread)
             && near(one.emission, other.emission, emission)

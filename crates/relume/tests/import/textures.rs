@@ -47,6 +47,14 @@ impl Sheet {
     }
 }
 
+/// Embeds an image of another format, by the extension that it needs.
+fn paint_as(g: &mut Gltf, bytes: &[u8], extension: &str) {
+    let view = g.view(bytes);
+    g.json["images"] = json!([{"bufferView": view}]);
+    g.json["textures"] = json!([{"extensions": {extension: {"source": 0}}}]);
+    g.json["extensionsRequired"] = json!([extension]);
+}
+
 /// Embeds an image, rows from the top, as texture 0 with these wrap modes.
 fn paint(g: &mut Gltf, size: [u32; 2], rgba: &[[u8; 4]], wrap: u32) {
     let image = image::RgbaImage::from_raw(size[0], size[1], rgba.concat()).unwrap();
@@ -403,4 +411,19 @@ fn emission_that_changes_keeps_its_pattern() {
     let near = |m: [f64; 3], r: f64| (m[0] - r).abs() < 1e-6 && m[1] == 0.0;
     assert!(lit.iter().any(|&m| near(m, PI)) && lit.iter().any(|&m| near(m, 0.0)), "{lit:?}");
     assert_eq!(scene.most_exitance(&scene.patches[0])[1], 0.0);
+}
+
+#[test]
+fn webp_images_are_read_and_of_ktx2_the_tool_is_named() {
+    let mut g = Sheet::new(1, |_, _| [0.75, 0.5]).gltf(base(json!({})));
+    let image = image::RgbaImage::from_raw(2, 1, [RED, GREEN].concat()).unwrap();
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut bytes, image::ImageFormat::WebP).unwrap();
+    paint_as(&mut g, &bytes.into_inner(), "EXT_texture_webp");
+    assert_eq!(colours(&scene_of(&g).unwrap()), [[0.0, 0.5, 0.0]]);
+    paint_as(&mut g, b"\xABKTX 20\xBB\r\n\x1A\n and more", "KHR_texture_basisu");
+    let scene = scene_of(&g).unwrap();
+    assert_eq!(colours(&scene), [[0.5; 3]]);
+    let said = &with_code(&scene.notes, "texture")[0].message;
+    assert!(said.contains("base colour") && said.contains("ktx extract"), "{said}");
 }

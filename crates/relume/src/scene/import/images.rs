@@ -5,6 +5,8 @@
 use std::io::Cursor;
 use std::rc::Rc;
 
+use image::{DynamicImage, ImageDecoder};
+
 use super::document::Document;
 use super::pyramid::{BYTES_A_PIXEL, Pyramid};
 use crate::scene::SceneError;
@@ -106,14 +108,16 @@ impl<'a> Images<'a> {
             Ok(format) => format,
             Err(error) => return Ok(Err(error.to_string())),
         };
-        let reader = || image::ImageReader::with_format(Cursor::new(bytes), format);
-        let (width, height) = match reader().into_dimensions() {
-            Ok(size) => size,
+        let reader = image::ImageReader::with_format(Cursor::new(bytes), format);
+        let decoder = match reader.into_decoder() {
+            Ok(decoder) => decoder,
             Err(error) => return Ok(Err(error.to_string())),
         };
-        let needs = BYTES_A_PIXEL * u64::from(width) * u64::from(height);
-        self.document.fits(owner, needs)?;
-        Ok(match reader().decode() {
+        // As it is decoded, and as it is kept.
+        let ((width, height), as_decoded) = (decoder.dimensions(), decoder.total_bytes());
+        let kept = BYTES_A_PIXEL.saturating_mul(u64::from(width) * u64::from(height));
+        self.document.fits(owner, as_decoded.saturating_add(kept))?;
+        Ok(match DynamicImage::from_decoder(decoder) {
             Ok(pixels) => {
                 let rgba = pixels.into_rgba8().into_raw();
                 Pyramid::new([width as usize, height as usize], rgba, least_alpha)

@@ -9,15 +9,15 @@ pub(super) type Sums = [f64; 5];
 /// Texels along a side of the smallest blocks whose means are kept.
 pub(super) const BLOCK: usize = 4;
 
-/// Bytes that an image of so many pixels needs at most: as it is decoded, as it is kept, and its means.
-pub(super) const BYTES_A_PIXEL: u64 = 10;
+/// Bytes that each pixel of an image needs while it is kept; its means need less than what it was decoded to.
+pub(super) const BYTES_A_PIXEL: u64 = 4;
 
 /// Texels of an image, and means of square blocks of 4, 8, 16 ... of them up to the whole.
 pub(super) struct Pyramid {
     /// Width and height, texels.
     pub(super) size: [usize; 2],
-    /// Rows from the top: sRGB colour and alpha.
-    texels: Vec<[u8; 4]>,
+    /// Rows from the top: sRGB colour and alpha, four bytes a texel.
+    texels: Vec<u8>,
     /// Texels of less alpha are not there.
     least_alpha: u16,
     linear: Vec<f64>,
@@ -32,9 +32,8 @@ struct Level {
 
 impl Pyramid {
     /// `None` for an image without pixels. `rgba` holds `size[0]` x `size[1]` texels by rows.
-    pub(super) fn new(size: [usize; 2], rgba: Vec<u8>, least_alpha: u16) -> Option<Pyramid> {
-        let texels: Vec<[u8; 4]> = rgba.chunks_exact(4).map(|t| [t[0], t[1], t[2], t[3]]).collect();
-        if texels.is_empty() || texels.len() != size[0] * size[1] {
+    pub(super) fn new(size: [usize; 2], texels: Vec<u8>, least_alpha: u16) -> Option<Pyramid> {
+        if texels.is_empty() || texels.len() != 4 * size[0] * size[1] {
             return None;
         }
         let linear = (0..256).map(linear).collect();
@@ -94,7 +93,9 @@ impl Pyramid {
 
     /// One texel.
     pub(super) fn texel(&self, x: usize, y: usize) -> Sums {
-        let [r, g, b, alpha] = self.texels[y * self.size[0] + x];
+        let at = 4 * (y * self.size[0] + x);
+        let texel = &self.texels[at..at + 4];
+        let (r, g, b, alpha) = (texel[0], texel[1], texel[2], texel[3]);
         if u16::from(alpha) < self.least_alpha {
             return [0.0; 5];
         }
@@ -126,7 +127,7 @@ impl Pyramid {
 
     /// Bytes that it holds, about.
     pub(super) fn bytes(&self) -> usize {
-        6 * self.texels.len()
+        self.texels.len() * 3 / 2
     }
 }
 

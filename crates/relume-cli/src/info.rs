@@ -14,7 +14,7 @@ use crate::scene_file;
 
 /// Runs the command.
 pub(crate) fn info(args: &InfoArgs) -> Result<(), Failure> {
-    let scene = scene_file::load(&args.scene, &args.animation)?;
+    let scene = scene_file::load(&args.scene, &args.animation, false)?;
     let text = describe(&scene, args.fps)?;
     output::print(&text)
 }

@@ -103,7 +103,8 @@ impl Job {
                 "give the directory of the earlier run with -o, or its report with --report",
             ));
         }
-        let clip = Clip::of_file(&self.scene, &self.solve.clip, self.tolerance)?;
+        let read = if self.picture.is_some() { Clip::for_pictures } else { Clip::of_file };
+        let clip = read(&self.scene, &self.solve.clip, self.tolerance)?;
         clip.warn();
         clip.warn_of(self.solve.update);
         let clip = clip.without_dark_sides();

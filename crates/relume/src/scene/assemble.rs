@@ -5,6 +5,7 @@
 
 use std::collections::BTreeSet;
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -15,7 +16,7 @@ use super::names::Names;
 use super::rigid::{check_track, without_scales};
 use super::{
     Body, BodyId, Frame, Glow, Interpolation, Material, MaterialId, Motion, NodeId, Note, Patch,
-    PatchId, Scene, SceneError, Severity, Surface, SurfaceId, TintId,
+    PatchId, Print, Scene, SceneError, Severity, Surface, SurfaceId, TintId,
 };
 use crate::geometry::Pose;
 
@@ -92,7 +93,19 @@ struct Placement {
     shape: DMat3,
 }
 
+/// What a patch belongs to, and how it differs from its material.
+type Of = (BodyId, SurfaceId, MaterialId, Option<TintId>, Option<Arc<Print>>);
+
 impl Placement {
+    /// An image on a polygon in the body's frame.
+    fn print(&self, print: &Print) -> Print {
+        let mut placed = print.clone();
+        for triangle in &mut placed.triangles {
+            triangle.corners = triangle.corners.map(|p| self.pose.point(self.shape * p));
+        }
+        placed
+    }
+
     /// The loop in the body's frame; a mirroring shape turns it round, so that the front stays the
     /// front (glTF 2.0, section 3.7.4: a negative determinant flips the winding).
     fn place(&self, polygon: &[DVec3]) -> Vec<DVec3> {
@@ -120,6 +133,8 @@ impl Parts {
         let double_sided = materials[surface.material.0 as usize].double_sided;
         for (number, polygon) in surface.polygons.iter().enumerate() {
             let tint = surface.tints.get(number).copied().flatten();
+            let print = surface.prints.get(number).cloned().flatten();
+            let print = print.map(|print| Arc::new(place.print(&print)));
             let points = place.place(polygon);
             if let Some(bad) = points.iter().find(|p| !is_place(&p.to_array())) {
                 return Err(no_place(name, object, *bad));
@@ -127,7 +142,7 @@ impl Parts {
             for piece in flat_pieces(&points) {
                 match piece {
                     Ok((frame, corners)) => {
-                        let of = (body, id, surface.material, tint);
+                        let of = (body, id, surface.material, tint, print.clone());
                         self.add_patch(of, double_sided, frame, corners);
                     }
                     Err(_) => degenerate += 1,
@@ -233,7 +248,7 @@ impl Parts {
 
     fn add_patch(
         &mut self,
-        (body, surface, material, tint): (BodyId, SurfaceId, MaterialId, Option<TintId>),
+        (body, surface, material, tint, print): Of,
         double_sided: bool,
         frame: Frame,
         corners: Vec<DVec2>,
@@ -242,7 +257,16 @@ impl Parts {
         let back = PatchId(front.0 + 1);
         let (behind, behind_corners) = seen_from_behind(&frame, &corners);
         let twin = double_sided.then_some(back);
-        self.patches.push(Patch { body, surface, material, tint, frame, corners, twin });
+        self.patches.push(Patch {
+            body,
+            surface,
+            material,
+            tint,
+            print: print.clone(),
+            frame,
+            corners,
+            twin,
+        });
         if double_sided {
             let twin = Some(front);
             self.patches.push(Patch {
@@ -250,6 +274,7 @@ impl Parts {
                 surface,
                 material,
                 tint,
+                print,
                 frame: behind,
                 corners: behind_corners,
                 twin,

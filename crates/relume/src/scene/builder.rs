@@ -170,6 +170,7 @@ impl SceneBuilder {
                     material,
                     polygons: vec![polygon],
                     tints: Vec::new(),
+                    prints: Vec::new(),
                 }),
             }
         });

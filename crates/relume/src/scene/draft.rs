@@ -3,9 +3,11 @@
 //! Nodes still carry scales, polygons are loops of points in their node's own frame, and names
 //! may repeat. Must not know where any of it came from.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DQuat, DVec3};
 
-use super::{Camera, Light, Material, MaterialId, Note, RotationTrack, Tint, TintId, Track};
+use super::{Camera, Light, Material, MaterialId, Note, Print, RotationTrack, Tint, TintId, Track};
 
 /// Everything of a scene, unchecked.
 #[derive(Default)]
@@ -46,6 +48,8 @@ pub(super) struct DraftSurface {
     pub(super) polygons: Vec<Vec<DVec3>>,
     /// Tints of the polygons, where they have any; shorter where the last ones have none.
     pub(super) tints: Vec<Option<TintId>>,
+    /// Images on the polygons in the node's own frame, likewise.
+    pub(super) prints: Vec<Option<Arc<Print>>>,
 }
 
 impl DraftNode {

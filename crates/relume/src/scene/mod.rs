@@ -5,6 +5,7 @@
 //! pairs or light transport.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
@@ -14,6 +15,7 @@ mod assemble;
 mod builder;
 mod check;
 mod connected;
+mod coverage;
 mod dark;
 mod draft;
 mod drift;
@@ -27,6 +29,8 @@ pub mod limits;
 mod merge;
 mod motion;
 mod names;
+mod print;
+mod pyramid;
 mod rigid;
 mod shell;
 mod solid;
@@ -43,6 +47,7 @@ pub use glow::Glow;
 pub use import::{ImportOptions, import};
 pub use join::{Joined, Part};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
+pub use print::{Print, Printed};
 pub use solid::{Enclosure, Solid, SolidEdge, SolidFace, Solids};
 pub use tint::Tint;
 
@@ -136,6 +141,8 @@ pub struct Patch {
     pub material: MaterialId,
     /// Where its reflectance or emission differ from the material's, what they are.
     pub tint: Option<TintId>,
+    /// Images that vary over it, if they were kept for pictures ([`ImportOptions::pictures`]).
+    pub print: Option<Arc<Print>>,
     /// Its plane's frame in the body's frame.
     pub frame: Frame,
     /// Corners in the plane's frame, counter-clockwise seen from the front, convex, three or

@@ -2,17 +2,18 @@
 //!
 //! Means over surfaces; must not know files, or which polygons are made of the triangles.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use glam::DVec2;
 
-use super::coverage::{Cover, Wrap, for_each_third};
 use super::parts::Field;
-use super::pyramid::{Pyramid, Sums};
+use crate::scene::coverage::{Cover, Wrap, for_each_third};
+use crate::scene::print::{Print, PrintedTriangle, Sheet};
+use crate::scene::pyramid::{Pyramid, Sums};
 
 /// An image on a primitive.
 pub(super) struct Layer {
-    pub(super) pyramid: Rc<Pyramid>,
+    pub(super) pyramid: Arc<Pyramid>,
     pub(super) wrap: [Wrap; 2],
     /// Texture coordinates of each vertex; without any the whole image counts everywhere.
     pub(super) places: Option<Vec<DVec2>>,
@@ -29,6 +30,8 @@ pub(super) struct Look {
     pub(super) colours: Option<Vec<[f64; 4]>>,
     /// Alpha of the vertices, factor included, from which on a primitive without image that lets light pass blocks it.
     pub(super) least_vertex_alpha: Option<f64>,
+    /// The factor of the base colour, where pictures are to show what varies.
+    pub(super) pictured: Option<[f64; 3]>,
 }
 
 /// Means over a triangle or a polygon.
@@ -55,6 +58,9 @@ const ALIKE: f64 = 1.0 / 32.0;
 /// Differences are none, too, up to so many standard deviations of the image within the triangles: the halves of a
 /// square on an even ramp differ by 1.41.
 const WITHIN: f64 = 2.0;
+
+/// Differences that a picture shows.
+const SEEN: f64 = 1.0 / 128.0;
 
 /// By how much texture coordinates may leave a plane that they share, relative to their extent.
 const ON_PLANE: f64 = 1e-3;
@@ -123,11 +129,45 @@ impl Look {
         }
     }
 
+    /// What pictures show on a polygon of these triangles, if that is not the same everywhere.
+    pub(super) fn print(
+        &self,
+        triangles: &[([u32; 3], [glam::DVec3; 3])],
+        facets: &[(Facet, f64)],
+    ) -> Option<Print> {
+        let factor = self.pictured?;
+        let varies = |f: &Facet| f.spread > SEEN || f.emission_spread > SEEN * f.emission_max();
+        let colours = |v: [u32; 3]| match &self.colours {
+            Some(colours) => v.map(|v| colours[v as usize]).map(|[r, g, b, _]| [r, g, b]),
+            None => [[1.0; 3]; 3],
+        };
+        let first = colours(triangles.first()?.0)[0];
+        let differs = |c: &[f64; 3]| (0..3).any(|k| (c[k] - first[k]).abs() > SEEN);
+        let fades = triangles.iter().any(|t| colours(t.0).iter().any(differs));
+        if !fades && !facets.iter().any(|(facet, _)| varies(facet)) {
+            return None;
+        }
+        let sheet = |layer: &Option<Layer>| {
+            let layer = layer.as_ref().filter(|layer| layer.places.is_some())?;
+            Some(Sheet { pyramid: layer.pyramid.clone(), wrap: layer.wrap })
+        };
+        let places = |layer: &Option<Layer>, v: [u32; 3]| {
+            layer.as_ref().and_then(|layer| layer.places_of(v)).unwrap_or_default()
+        };
+        let triangle = |&(v, corners): &([u32; 3], [glam::DVec3; 3])| PrintedTriangle {
+            corners,
+            places: [places(&self.base, v), places(&self.emission, v)],
+            colours: colours(v),
+        };
+        let triangles = triangles.iter().map(triangle).collect();
+        Some(Print { factor, base: sheet(&self.base), emission: sheet(&self.emission), triangles })
+    }
+
     /// Whether two triangles may be merged into one polygon.
     pub(super) fn alike(&self, one: &Facet, other: &Facet) -> bool {
         let near =
             |a: [f64; 3], b: [f64; 3], least: f64| (0..3).all(|c| (a[c] - b[c]).abs() <= least);
-        let brightest = one.emission.iter().chain(&other.emission).fold(0.0, |m: f64, &e| m.max(e));
+        let brightest = one.emission_max().max(other.emission_max());
         let within = one.emission_spread.max(other.emission_spread);
         let emission = (ALIKE * brightest).max(WITHIN * within);
         let spread = ALIKE.max(WITHIN * one.spread.max(other.spread));
@@ -170,6 +210,10 @@ fn spread_of(sums: Sums) -> f64 {
 }
 
 impl Facet {
+    fn emission_max(&self) -> f64 {
+        self.emission.into_iter().fold(0.0, f64::max)
+    }
+
     /// With these means of the emission's image.
     pub(super) fn emitting(self, sums: Sums) -> Facet {
         Facet {

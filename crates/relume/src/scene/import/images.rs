@@ -3,13 +3,13 @@
 //! Must not know what an image is used for.
 
 use std::io::Cursor;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use image::{DynamicImage, ImageDecoder};
 
 use super::document::Document;
-use super::pyramid::{BYTES_A_PIXEL, Pyramid};
 use crate::scene::SceneError;
+use crate::scene::pyramid::{BYTES_A_PIXEL, Pyramid};
 
 /// Bytes of the largest image file that is read.
 const IMAGE_MAX: usize = 1 << 28;
@@ -23,7 +23,7 @@ pub(super) type Key = (usize, u16);
 /// Images by what they were asked for, those used last at the end.
 pub(super) struct Images<'a> {
     document: &'a Document,
-    kept: Vec<(Key, Rc<Pyramid>)>,
+    kept: Vec<(Key, Arc<Pyramid>)>,
     /// Images that cannot be read, and why.
     unreadable: Vec<(usize, String)>,
 }
@@ -38,7 +38,7 @@ impl<'a> Images<'a> {
     /// # Errors
     /// Where it does not exist, may not be opened, or needs more memory than is allowed (white instead would be another
     /// scene with less memory).
-    pub(super) fn get(&mut self, key: Key) -> Result<Result<Rc<Pyramid>, String>, SceneError> {
+    pub(super) fn get(&mut self, key: Key) -> Result<Result<Arc<Pyramid>, String>, SceneError> {
         if let Some((_, why)) = self.unreadable.iter().find(|(image, _)| *image == key.0) {
             return Ok(Err(why.clone()));
         }
@@ -49,7 +49,7 @@ impl<'a> Images<'a> {
         }
         match self.read(key)? {
             Ok(pyramid) => {
-                let pyramid = Rc::new(pyramid);
+                let pyramid = Arc::new(pyramid);
                 self.keep(key, pyramid.clone());
                 Ok(Ok(pyramid))
             }
@@ -60,7 +60,7 @@ impl<'a> Images<'a> {
         }
     }
 
-    fn keep(&mut self, key: Key, pyramid: Rc<Pyramid>) {
+    fn keep(&mut self, key: Key, pyramid: Arc<Pyramid>) {
         self.kept.push((key, pyramid));
         let mut bytes: usize = self.kept.iter().map(|(_, p)| p.bytes()).sum();
         while bytes > KEPT_MAX && self.kept.len() > 1 {

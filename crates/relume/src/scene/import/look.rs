@@ -3,19 +3,19 @@
 //! Reads what it needs of the file; must not know nodes or placements.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::coverage::Wrap;
 use super::document::Document;
-use super::facet::{Chart, Divided, Facet, Layer, Look};
-use super::images::Images;
+use super::facet::{Facet, Layer, Look};
+use super::images::{Images, Key};
 use super::material::{Paint, REFLECTANCE_MAX};
-use super::parts::{GAIN, parts};
+use super::pieces::{Pieces, blocking, pieces};
 use super::{json, note};
-use crate::scene::flatten::area_vector;
-use crate::scene::merge::{Merged, merge, merge_alike};
-use crate::scene::{Note, SceneError, Severity, Tint, TintId};
+use crate::scene::coverage::Wrap;
+use crate::scene::merge::{Merged, merge};
+use crate::scene::{Note, Print, SceneError, Severity, Tint, TintId};
 
 /// Polygons with what they are made of.
 #[derive(Default)]
@@ -23,6 +23,8 @@ pub(super) struct Painted {
     pub(super) loops: Vec<Vec<DVec3>>,
     /// As many as `loops`.
     pub(super) tints: Vec<Option<TintId>>,
+    /// Images to be shown on the polygons; likewise.
+    pub(super) prints: Vec<Option<Arc<Print>>>,
     /// Triangles left out because they have no area.
     pub(super) degenerate: usize,
 }
@@ -36,9 +38,14 @@ pub(super) struct Triangles<'a> {
     pub(super) owner: &'a str,
 }
 
+/// Bytes of images that pictures show at most: primitives that come after show their means.
+const SHOWN_MAX: usize = 512 << 20;
+
 /// How all surfaces of a file look.
 pub(super) struct Looks<'a> {
     document: &'a Document,
+    /// Whether images are kept for pictures.
+    pictures: bool,
     /// By material; the last one is for primitives without any.
     paints: Vec<Paint>,
     images: Images<'a>,
@@ -49,6 +56,8 @@ pub(super) struct Looks<'a> {
     /// Materials with textures or vertex colours.
     varied: BTreeSet<usize>,
     see_through: SeenThrough,
+    /// Images kept for pictures, and their bytes.
+    shown: (BTreeSet<Key>, usize),
     /// What was said of a texture already: material and which one.
     said: BTreeSet<(usize, &'static str)>,
 }
@@ -61,18 +70,16 @@ struct SeenThrough {
     left_out: usize,
 }
 
-/// Shares of a polygon that count as nothing and as all of it.
-const COVERED: (f64, f64) = (1.0 / 64.0, 63.0 / 64.0);
-
-/// Steps across a triangle for its means ([`super::coverage::Cover::resolution`]), at most and at least, and how many all
+/// Steps across a triangle for its means ([`crate::scene::coverage::Cover::resolution`]), at most and at least, and how many all
 /// triangles of a primitive share.
 const STEPS: (f64, f64) = (64.0, 4096.0);
 const STEPS_SHARED: f64 = 4e6;
 
 impl<'a> Looks<'a> {
-    pub(super) fn new(document: &'a Document, paints: Vec<Paint>) -> Looks<'a> {
+    pub(super) fn new(document: &'a Document, paints: Vec<Paint>, pictures: bool) -> Looks<'a> {
         Looks {
             document,
+            pictures,
             paints,
             images: Images::new(document),
             tints: Vec::new(),
@@ -80,6 +87,7 @@ impl<'a> Looks<'a> {
             lowered: Default::default(),
             varied: BTreeSet::new(),
             see_through: SeenThrough::default(),
+            shown: Default::default(),
             said: BTreeSet::new(),
         }
     }
@@ -114,7 +122,8 @@ impl<'a> Looks<'a> {
                 return Painted { degenerate, ..Painted::default() };
             }
         }
-        Painted { tints: vec![None; loops.len()], loops, degenerate }
+        let count = loops.len();
+        Painted { tints: vec![None; count], prints: vec![None; count], loops, degenerate }
     }
 
     fn finished(&mut self, material: usize, pieces: Pieces) -> Painted {
@@ -131,8 +140,9 @@ impl<'a> Looks<'a> {
             None => vec![true; all],
         };
         for (piece, _) in pieces.pieces.into_iter().zip(kept).filter(|(_, kept)| *kept) {
-            painted.loops.push(piece.corners);
             painted.tints.push(Some(self.tint(material, &piece.facet)));
+            painted.loops.push(piece.corners);
+            painted.prints.push(piece.print);
         }
         painted
     }
@@ -186,7 +196,9 @@ impl<'a> Looks<'a> {
         };
         let base = layer(paint.base, "base colour", least_alpha)?;
         let emission = layer(paint.emission, "emission", 0)?;
-        Ok(Look { base, emission, colours, least_vertex_alpha })
+        let pictured = (self.shown.1 <= SHOWN_MAX).then_some(paint.base_factor);
+        let pictured = pictured.filter(|_| self.pictures);
+        Ok(Look { base, emission, colours, least_vertex_alpha, pictured })
     }
 
     /// An image on a primitive; none, and a note, where it cannot be read.
@@ -227,6 +239,9 @@ impl<'a> Looks<'a> {
             notes.push(note(Severity::Warning, "texture", name, 1, message));
         }
         let Ok(pyramid) = pyramid else { return Ok(None) };
+        if source.is_some_and(|image| self.shown.0.insert((image, least_alpha))) {
+            self.shown.1 += pyramid.bytes();
+        }
         let sampler = entry.sampler.and_then(|s| root.samplers.get(s));
         let wrap = [sampler.and_then(|s| s.wrap_s), sampler.and_then(|s| s.wrap_t)].map(wrap);
         let steps = STEPS_SHARED / of.triangles.len().max(1) as f64;
@@ -362,120 +377,4 @@ fn wrap(code: Option<u32>) -> Wrap {
 fn least(cutoff: f64, factor: f64) -> u16 {
     let needed = (cutoff * 255.0 / factor.max(f64::MIN_POSITIVE) - 1e-9).ceil();
     needed.clamp(0.0, 256.0) as u16
-}
-
-/// A polygon or a part of one.
-struct Piece {
-    corners: Vec<DVec3>,
-    facet: Facet,
-    area: f64,
-}
-
-struct Pieces {
-    pieces: Vec<Piece>,
-    degenerate: usize,
-}
-
-/// Merged and divided polygons of a primitive.
-fn pieces(look: &Look, of: &Triangles<'_>, is_see_through: bool) -> Pieces {
-    let facets: Vec<Facet> = of.triangles.iter().map(|&t| look.facet(t)).collect();
-    let points = |t: usize| of.triangles[t].map(|v| of.points[v as usize]);
-    let divided = look.divided(is_see_through);
-    let chart = |t: usize| Chart::new(points(t), divided?.places_of(of.triangles[t])?);
-    let goes_on = |seed: usize, other: usize| match divided {
-        None => true,
-        Some(layer) => chart(seed).is_some_and(|chart| {
-            let places = layer.places_of(of.triangles[other]).expect("it has places");
-            points(other).iter().zip(places).all(|(&point, place)| chart.holds(point, place))
-        }),
-    };
-    let alike = |seed: usize, other: usize| {
-        look.alike(&facets[seed], &facets[other]) && goes_on(seed, other)
-    };
-    let merged = merge_alike(of.points, of.triangles, &alike);
-    let mut members: Vec<Vec<usize>> = vec![Vec::new(); merged.polygons.len()];
-    for (t, polygon) in merged.polygon_of.iter().enumerate() {
-        if let Some(polygon) = polygon {
-            members[*polygon as usize].push(t);
-        }
-    }
-    let area = |t: usize| area_vector(&points(t)).length() / 2.0;
-    let mut all = Vec::new();
-    for (corners, members) in merged.polygons.into_iter().zip(&members) {
-        let weighed: Vec<(Facet, f64)> = members.iter().map(|&t| (facets[t], area(t))).collect();
-        let largest = members.iter().copied().reduce(|a, b| if area(b) > area(a) { b } else { a });
-        let facet = Facet::mean(&weighed);
-        let whole = Piece { corners, facet, area: weighed.iter().map(|w| w.1).sum() };
-        all.push((whole, largest.and_then(chart)));
-    }
-    Pieces { pieces: divide(look, is_see_through, all), degenerate: merged.degenerate }
-}
-
-/// Polygons cut into parts where what they emit or cover varies.
-fn divide(look: &Look, by_alpha: bool, all: Vec<(Piece, Option<Chart>)>) -> Vec<Piece> {
-    let Some(layer) = look.divided(by_alpha) else {
-        return all.into_iter().map(|(piece, _)| piece).collect();
-    };
-    let bright = |f: &Facet| f.emission.iter().sum::<f64>() / 3.0;
-    // The squares of all texels, and what the mean of the polygon tells of them.
-    let squares = |f: &Facet| match by_alpha {
-        true => (f.covered, f.covered * f.covered),
-        false => (f.emission_squared, bright(f) * bright(f)),
-    };
-    let total: f64 = all.iter().map(|(piece, _)| squares(&piece.facet).0 * piece.area).sum();
-    let field = Divided { layer, by_alpha };
-    let mut out = Vec::new();
-    for (piece, chart) in all {
-        let (square, told) = squares(&piece.facet);
-        let is_even = (square - told) * piece.area < GAIN * total;
-        match chart.filter(|_| !is_even) {
-            Some(chart) => out.extend(cut(look, &field, &piece, &chart, GAIN * total)),
-            None => out.push(piece),
-        }
-    }
-    out
-}
-
-/// The parts of one polygon.
-fn cut(look: &Look, field: &Divided<'_>, piece: &Piece, chart: &Chart, least: f64) -> Vec<Piece> {
-    let places: Vec<DVec2> = piece.corners.iter().map(|&c| chart.place(c)).collect();
-    let (texels, _) = super::parts::Field::integral(field, &places);
-    if !(texels > 0.0) {
-        return vec![Piece { corners: piece.corners.clone(), ..*piece }];
-    }
-    // Corners stay where they are, bit for bit.
-    let point = |place: &DVec2| match places.iter().position(|p| p == place) {
-        Some(corner) => piece.corners[corner],
-        None => chart.point(*place),
-    };
-    let shares_places = |layer: &&Layer| layer.places == field.layer.places;
-    let found = parts(field, places.clone(), least * texels / piece.area);
-    let part = |part: super::parts::Part| {
-        let mut facet = piece.facet;
-        if let Some(layer) = look.emission.as_ref().filter(shares_places) {
-            facet = facet.emitting(layer.mean_over(&part.corners));
-        }
-        if let Some(layer) = look.base.as_ref().filter(shares_places) {
-            let vertex = piece.facet.vertex_colour(&layer.mean_over(&places));
-            facet = facet.coloured(layer.mean_over(&part.corners), vertex);
-        }
-        let area = part.area * piece.area / texels;
-        Piece { corners: part.corners.iter().map(point).collect(), facet, area }
-    };
-    found.into_iter().map(part).collect()
-}
-
-/// Which of these block light: as many, those that cover most first, as cover the same area in all.
-fn blocking(pieces: &[Piece]) -> Vec<bool> {
-    let mut kept: Vec<bool> = pieces.iter().map(|p| p.facet.covered >= COVERED.1).collect();
-    let is_partly = |p: &Piece| p.facet.covered > COVERED.0 && p.facet.covered < COVERED.1;
-    let mut partly: Vec<usize> = (0..pieces.len()).filter(|&k| is_partly(&pieces[k])).collect();
-    let covered = |k: usize| pieces[k].facet.covered;
-    partly.sort_by(|&a, &b| covered(b).total_cmp(&covered(a)).then(a.cmp(&b)));
-    let mut left: f64 = partly.iter().map(|&k| covered(k) * pieces[k].area).sum();
-    for k in partly {
-        kept[k] = left > 0.5 * pieces[k].area;
-        left -= if kept[k] { pieces[k].area } else { 0.0 };
-    }
-    kept
 }

@@ -3,13 +3,14 @@
 //! Must not know where meshes are placed.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::document::Document;
 use super::look::{Looks, Triangles};
 use super::{json, note};
-use crate::scene::{Note, SceneError, Severity, TintId};
+use crate::scene::{Note, Print, SceneError, Severity, TintId};
 
 /// A primitive: its polygons, counter-clockwise from the front, with their tints, and the material's index.
 #[derive(Clone)]
@@ -17,6 +18,7 @@ pub(super) struct Polygons {
     pub(super) material: Option<usize>,
     pub(super) loops: Vec<Vec<DVec3>>,
     pub(super) tints: Vec<Option<TintId>>,
+    pub(super) prints: Vec<Option<Arc<Print>>>,
 }
 
 /// A primitive before its triangles are merged.
@@ -183,7 +185,7 @@ impl Soup<'_> {
             notes.push(note(Severity::Info, "degenerate", mesh, merged.degenerate, message));
         }
         let material = self.primitive.material;
-        Ok(Polygons { material, loops: merged.loops, tints: merged.tints })
+        Ok(Polygons { material, loops: merged.loops, tints: merged.tints, prints: merged.prints })
     }
 }
 

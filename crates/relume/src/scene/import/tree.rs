@@ -26,7 +26,7 @@ pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draf
         document,
         moves: played.moves,
         lights: played.lights,
-        looks: Looks::new(document, paints),
+        looks: Looks::new(document, paints, options.pictures),
         meshes: BTreeMap::new(),
         places: document.root.nodes.iter().map(|_| None).collect(),
         skinned: Vec::new(),
@@ -264,13 +264,14 @@ impl Tree<'_> {
                     remedy: "leave out objects or instances, or simplify their meshes".into(),
                 });
             }
-            let (polygons, tints) = (primitive.loops, primitive.tints);
+            let Polygons { loops: polygons, tints, prints, .. } = primitive;
             let material = MaterialId(material as u32);
             self.draft.nodes[me].surfaces.push(DraftSurface {
                 name: None,
                 material,
                 polygons,
                 tints,
+                prints,
             });
         }
         Ok(())

@@ -99,6 +99,7 @@ fn scene(name: &str, text: &str) -> Result<Scene, Refused> {
                     material,
                     polygons: Vec::new(),
                     tints: Vec::new(),
+                    prints: Vec::new(),
                 });
                 surfaces.len() - 1
             }

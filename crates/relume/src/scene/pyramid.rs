@@ -13,6 +13,7 @@ pub(super) const BLOCK: usize = 4;
 pub(super) const BYTES_A_PIXEL: u64 = 4;
 
 /// Texels of an image, and means of square blocks of 4, 8, 16 ... of them up to the whole.
+#[derive(Debug)]
 pub(super) struct Pyramid {
     /// Width and height, texels.
     pub(super) size: [usize; 2],
@@ -25,6 +26,7 @@ pub(super) struct Pyramid {
 }
 
 /// Means of the blocks of one size; those along the right and lower edges are what is left of blocks.
+#[derive(Debug)]
 struct Level {
     size: [usize; 2],
     means: Vec<[f32; 5]>,

@@ -99,6 +99,7 @@ pub(crate) fn body(scene: &mut Scene, polygons: &[(Vec<DVec3>, MaterialId)]) -> 
             surface,
             material: *material,
             tint: None,
+            print: None,
             frame,
             corners,
             twin: None,

@@ -62,9 +62,6 @@ const WITHIN: f64 = 2.0;
 /// Differences that a picture shows.
 const SEEN: f64 = 1.0 / 128.0;
 
-/// By how much texture coordinates may leave a plane that they share, relative to their extent.
-const ON_PLANE: f64 = 1e-3;
-
 impl Layer {
     fn cover(&self) -> Cover<'_> {
         Cover { pyramid: &self.pyramid, wrap: self.wrap, resolution: self.resolution }
@@ -256,52 +253,6 @@ impl Facet {
             mean.emission_squared += facet.emission_squared * part / area;
         }
         mean
-    }
-}
-
-/// How the places of a plane in space and in an image belong together.
-pub(super) struct Chart {
-    origin: glam::DVec3,
-    /// Space per unit of each texture coordinate.
-    along: [glam::DVec3; 2],
-    /// Texture coordinate per unit of space, and that of the origin.
-    across: [glam::DVec3; 2],
-    at_origin: DVec2,
-    extent: f64,
-}
-
-impl Chart {
-    /// The chart of a triangle; `None` where its texture coordinates have no area, or it has none.
-    pub(super) fn new(points: [glam::DVec3; 3], places: [DVec2; 3]) -> Option<Chart> {
-        let (p, q) = (points[1] - points[0], points[2] - points[0]);
-        let (s, t) = (places[1] - places[0], places[2] - places[0]);
-        let turn = s.perp_dot(t);
-        let extent = s.abs().max(t.abs()).max_element();
-        let normal = p.cross(q);
-        if !(turn.abs() > 1e-9 * extent * extent) || !(normal.length_squared() > 0.0) {
-            return None;
-        }
-        let along = [(p * t.y - q * s.y) / turn, (q * s.x - p * t.x) / turn];
-        // The dual basis within the plane.
-        let (one, other) = (q.cross(normal), normal.cross(p));
-        let (one, other) = (one / one.dot(p), other / other.dot(q));
-        let across = [one * s.x + other * t.x, one * s.y + other * t.y];
-        Some(Chart { origin: points[0], along, across, at_origin: places[0], extent })
-    }
-
-    pub(super) fn place(&self, point: glam::DVec3) -> DVec2 {
-        let d = point - self.origin;
-        self.at_origin + DVec2::new(self.across[0].dot(d), self.across[1].dot(d))
-    }
-
-    pub(super) fn point(&self, place: DVec2) -> glam::DVec3 {
-        let d = place - self.at_origin;
-        self.origin + self.along[0] * d.x + self.along[1] * d.y
-    }
-
-    /// Whether a corner with this texture coordinate goes on in the same way.
-    pub(super) fn holds(&self, point: glam::DVec3, place: DVec2) -> bool {
-        (self.place(point) - place).abs().max_element() <= ON_PLANE * self.extent
     }
 }
 

@@ -9,6 +9,7 @@ use std::path::Path;
 mod accessor;
 mod animation;
 mod base64;
+mod chart;
 mod clock;
 mod document;
 mod facet;

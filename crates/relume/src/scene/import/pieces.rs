@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::facet::{Chart, Divided, Facet, Layer, Look};
+use super::chart::Chart;
+use super::facet::{Divided, Facet, Layer, Look};
 use super::look::Triangles;
 use super::parts::{Field, GAIN, Part, parts};
 use crate::scene::Print;
@@ -96,7 +97,7 @@ fn divide(look: &Look, by_alpha: bool, all: Vec<(Piece, Option<Chart>)>) -> Vec<
 fn cut(look: &Look, field: &Divided<'_>, piece: Piece, chart: &Chart, least: f64) -> Vec<Piece> {
     let places: Vec<DVec2> = piece.corners.iter().map(|&c| chart.place(c)).collect();
     let (texels, _) = field.integral(&places);
-    if !(texels > 0.0) {
+    if texels <= 0.0 {
         return vec![piece];
     }
     // Corners stay where they are, bit for bit.

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-use relume::scene::{BodyId, Light, MaterialId, Patch, Scene, TintId};
+use relume::scene::{BodyId, Light, MaterialId, Scene};
 use relume::session::{Energy, Options, Session, SessionError, Snapshot};
 use relume_picture::export::{probe, write_atomically, write_glb};
 use relume_picture::picture::{self, Exposure, Viewpoint};
@@ -521,26 +521,29 @@ fn ask_for_picture(flags: &PictureFlags) -> Result<(), Failure> {
 
 /// The first of the frames of the animation in which most is emitted; `None` if nothing ever is.
 ///
-/// Cost: one pose for each emitting body, kind of light and frame.
+/// Cost: one pose for each emitting body, material and frame.
 fn brightest_frame(scene: &Scene, fps: f64) -> Option<u32> {
     let count = frames::frame_count(scene.motion.duration_s, fps).ok()?;
-    let mut lamps: BTreeMap<(BodyId, MaterialId, Option<TintId>), (&Patch, f64)> = BTreeMap::new();
+    // The area that would emit as much if it were all white.
+    let mut lamps: BTreeMap<(BodyId, MaterialId), [f64; 3]> = BTreeMap::new();
     for patch in scene.patches.iter().filter(|p| scene.patch_emits(p)) {
-        let alike = (patch.body, patch.material, patch.tint);
-        lamps.entry(alike).or_insert((patch, 0.0)).1 += patch.area_m2();
+        let (share, area_m2) = (scene.emission_share(patch), patch.area_m2());
+        let area = lamps.entry((patch.body, patch.material)).or_default();
+        (0..3).for_each(|c| area[c] += share[c] * area_m2);
     }
     let sum = |emission: [f64; 3]| emission.iter().sum::<f64>();
     let emitted = |frame: u32| {
         let time_s = frames::time_of(frame, fps);
-        let of_lamp = |(patch, area): &(&Patch, f64)| {
-            let there = scene.pose(patch.body, time_s).is_some();
-            if there { area * sum(scene.exitance_at(patch, time_s)) } else { 0.0 }
+        let of_lamp = |(&(body, of), area): (&(BodyId, MaterialId), &[f64; 3])| {
+            let exitance = scene.materials[of.0 as usize].exitance_at(time_s);
+            let there = scene.pose(body, time_s).is_some();
+            if there { sum([0, 1, 2].map(|c| area[c] * exitance[c])) } else { 0.0 }
         };
         let of_light = |l: &Light| {
             let there = scene.motion.pose(l.node, time_s).is_some();
             if there { sum(l.intensity_at(time_s)) } else { 0.0 }
         };
-        lamps.values().map(of_lamp).chain(scene.lights.iter().map(of_light)).sum::<f64>()
+        lamps.iter().map(of_lamp).chain(scene.lights.iter().map(of_light)).sum::<f64>()
     };
     let brighter = |best: (Option<u32>, f64), frame: u32| {
         let now = emitted(frame);

@@ -50,9 +50,14 @@ impl Scene {
             };
             Tint {
                 reflectance: mean(&|patch| self.reflectance(patch)),
-                emission: mean(&|patch| self.tint(patch).map_or([1.0; 3], |tint| tint.emission)),
+                emission: mean(&|patch| self.emission_share(patch)),
             }
         })
+    }
+
+    /// Share of its material's exitance that a patch emits, by channel.
+    pub fn emission_share(&self, patch: &Patch) -> [f64; 3] {
+        self.tint(patch).map_or([1.0; 3], |tint| tint.emission)
     }
 
     fn material(&self, patch: &Patch) -> &Material {

@@ -1,6 +1,6 @@
 //! Textures, vertex colours and alpha of a file: what each patch reflects, emits and lets pass.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use relume::scene::{Patch, Scene};
 use serde_json::{Value, json};
@@ -203,6 +203,13 @@ fn an_even_glow_and_noise_are_not_cut() {
 }
 
 #[test]
+fn a_wall_of_many_small_triangles_is_one_polygon() {
+    let mut g = Sheet::new(200, |x, y| [x, y]).gltf(glowing());
+    paint(&mut g, [32, 32], &[WHITE; 1024], REPEAT);
+    assert_eq!(scene_of(&g).unwrap().patches.len(), 1);
+}
+
+#[test]
 fn texture_transforms_and_further_sets_of_coordinates_count() {
     let quarters = [RED, GREEN, BLUE, WHITE];
     let seen = |more: Value, place: [f32; 2]| {
@@ -221,11 +228,11 @@ fn texture_transforms_and_further_sets_of_coordinates_count() {
     assert_eq!(seen(moved(json!({"scale": [3.0, 1.0]})), [0.25, 0.25]), [0, 1, 0]);
     // The example of the extension: the lower left quarter, turned. Scale first, then rotation.
     let example =
-        || moved(json!({"offset": [0.0, 1.0], "rotation": 1.570_796_326_79, "scale": [0.5, 0.5]}));
+        || moved(json!({"offset": [0.0, 1.0], "rotation": FRAC_PI_2, "scale": [0.5, 0.5]}));
     for place in [[0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.9, 0.9]] {
         assert_eq!(seen(example(), place), [0, 0, 1]);
     }
-    let turned = moved(json!({"rotation": 1.570_796_326_79, "scale": [1.0, 3.0]}));
+    let turned = moved(json!({"rotation": FRAC_PI_2, "scale": [1.0, 3.0]}));
     // (0.25, 0.25) is scaled to (0.25, 0.75), turned to (0.75, -0.25): white.
     assert_eq!(seen(turned, [0.25, 0.25]), [1, 1, 1]);
 }

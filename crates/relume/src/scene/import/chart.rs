@@ -7,6 +7,9 @@ use glam::{DVec2, DVec3};
 /// By how much texture coordinates may leave a plane that they share, relative to their extent.
 const ON_PLANE: f64 = 1e-3;
 
+/// The same relative to how far away they are: what 32-bit corners of a small triangle leave.
+const ROUNDING: f64 = 1e-4;
+
 /// How the places of a plane in space and in an image belong together.
 pub(super) struct Chart {
     origin: DVec3,
@@ -50,6 +53,8 @@ impl Chart {
 
     /// Whether a corner with this texture coordinate goes on in the same way.
     pub(super) fn holds(&self, point: DVec3, place: DVec2) -> bool {
-        (self.place(point) - place).abs().max_element() <= ON_PLANE * self.extent
+        let far = (place - self.at_origin).abs().max_element();
+        let off = (self.place(point) - place).abs().max_element();
+        off <= ON_PLANE * self.extent + ROUNDING * far
     }
 }

@@ -72,7 +72,7 @@ struct SeenThrough {
 
 /// Steps across a triangle for its means ([`crate::scene::coverage::Cover::resolution`]), at most and at least, and how many all
 /// triangles of a primitive share.
-const STEPS: (f64, f64) = (64.0, 4096.0);
+const STEPS: (f64, f64) = (32.0, 4096.0);
 const STEPS_SHARED: f64 = 4e6;
 
 impl<'a> Looks<'a> {

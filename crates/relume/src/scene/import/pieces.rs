@@ -6,6 +6,8 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
+use rayon::prelude::*;
+
 use super::chart::Chart;
 use super::facet::{Divided, Facet, Layer, Look};
 use super::look::Triangles;
@@ -32,7 +34,7 @@ pub(super) struct Pieces {
 
 /// Merged and divided polygons of a primitive.
 pub(super) fn pieces(look: &Look, of: &Triangles<'_>, is_see_through: bool) -> Pieces {
-    let facets: Vec<Facet> = of.triangles.iter().map(|&t| look.facet(t)).collect();
+    let facets: Vec<Facet> = of.triangles.par_iter().map(|&t| look.facet(t)).collect();
     let points = |t: usize| of.triangles[t].map(|v| of.points[v as usize]);
     let divided = look.divided(is_see_through);
     let chart = |t: usize| Chart::new(points(t), divided?.places_of(of.triangles[t])?);

@@ -12,7 +12,7 @@ use crate::scene_file;
 
 /// Runs the command. An error among the findings is a failure; warnings are not.
 pub(crate) fn check(args: &CheckArgs) -> Result<(), Failure> {
-    let scene = scene_file::load(&args.scene, &args.animation)?;
+    let scene = scene_file::load(&args.scene, &args.animation, false)?;
     let mut notes = findings(&scene);
     if args.scene.extension().is_some_and(|e| e.eq_ignore_ascii_case("vs3")) {
         // Files of View3D have no light; they are there for their form factors.

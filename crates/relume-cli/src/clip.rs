@@ -48,8 +48,26 @@ impl Clip {
     ///
     /// Sets the threads of the process: before anything runs in parallel, as choosing a view does.
     pub(crate) fn of_file(path: &Path, flags: &ClipFlags, tolerance: f64) -> Result<Clip, Failure> {
+        Clip::read(path, flags, tolerance, false)
+    }
+
+    /// The same with the images that pictures show.
+    pub(crate) fn for_pictures(
+        path: &Path,
+        flags: &ClipFlags,
+        tolerance: f64,
+    ) -> Result<Clip, Failure> {
+        Clip::read(path, flags, tolerance, true)
+    }
+
+    fn read(
+        path: &Path,
+        flags: &ClipFlags,
+        tolerance: f64,
+        pictures: bool,
+    ) -> Result<Clip, Failure> {
         let threads = use_threads(flags.threads)?;
-        let scene = scene_file::load(path, &flags.animation)?;
+        let scene = scene_file::load(path, &flags.animation, pictures)?;
         Clip::of_scene(scene, flags, threads, tolerance)
     }
 

@@ -2,7 +2,9 @@
 
 use std::fmt::{self, Write};
 
-use relume::scene::{BodyId, Light, LightKind, Material, Projection, Scene};
+use relume::scene::{
+    BodyId, Light, LightKind, Material, MaterialId, Patch, Projection, Scene, Tint,
+};
 
 use crate::args::InfoArgs;
 use crate::failure::Failure;
@@ -12,7 +14,7 @@ use crate::scene_file;
 
 /// Runs the command.
 pub(crate) fn info(args: &InfoArgs) -> Result<(), Failure> {
-    let scene = scene_file::load(&args.scene, &args.animation)?;
+    let scene = scene_file::load(&args.scene, &args.animation, false)?;
     let text = describe(&scene, args.fps)?;
     output::print(&text)
 }
@@ -95,16 +97,22 @@ fn bodies(out: &mut String, scene: &Scene) -> fmt::Result {
 
 fn materials(out: &mut String, scene: &Scene) -> fmt::Result {
     writeln!(out, "\nmaterials (reflectance; exitance in W/m2; linear RGB)")?;
-    for material in &scene.materials {
-        let Material { name, reflectance, exitance, glow, double_sided } = material;
-        write!(out, "  {:<24} {}", output::name(name), triple(*reflectance))?;
+    for (id, material) in (0..).map(MaterialId).zip(&scene.materials) {
+        let Material { name, glow, double_sided, .. } = material;
+        let tint = scene.mean_tint(id);
+        let plain = Tint { reflectance: material.reflectance, emission: [1.0; 3] };
+        let Tint { reflectance, emission } = tint.unwrap_or(plain);
+        let part = |exitance: [f64; 3]| triple([0, 1, 2].map(|c| exitance[c] * emission[c]));
+        write!(out, "  {:<24} {}", output::name(name), triple(reflectance))?;
         if material.emits() {
-            write!(out, "  emits {}", triple(*exitance))?;
+            write!(out, "  emits {}", part(material.exitance))?;
         }
         if material.emits() && glow.is_some() {
-            write!(out, " at first, never above {}", triple(material.most_exitance()))?;
+            write!(out, " at first, never above {}", part(material.most_exitance()))?;
         }
-        writeln!(out, "{}", if *double_sided { "  both sides" } else { "" })?;
+        let varies =
+            if tint.is_some() { "  in the mean of its texture or vertex colours" } else { "" };
+        writeln!(out, "{varies}{}", if *double_sided { "  both sides" } else { "" })?;
     }
     Ok(())
 }
@@ -115,17 +123,17 @@ fn emitters(out: &mut String, scene: &Scene) -> fmt::Result {
     let mut none = scene.lights.is_empty();
     for (index, surface) in scene.surfaces.iter().enumerate() {
         let material = &scene.materials[surface.material.0 as usize];
-        if !material.emits() {
+        let of_it = |patch: &&Patch| patch.surface.0 as usize == index && scene.patch_emits(patch);
+        let (mut flux, mut area) = ([0.0; 3], 0.0);
+        for patch in scene.patches.iter().filter(of_it) {
+            let exitance = scene.most_exitance(patch);
+            area += patch.area_m2();
+            (0..3).for_each(|c| flux[c] += exitance[c] * patch.area_m2());
+        }
+        if area == 0.0 {
             continue;
         }
         none = false;
-        let area: f64 = scene
-            .patches
-            .iter()
-            .filter(|patch| patch.surface.0 as usize == index)
-            .map(|patch| patch.area_m2())
-            .sum();
-        let flux = material.most_exitance().map(|m| m * area);
         let most = if material.glow.is_some() { " at most" } else { "" };
         let sum = number(flux.iter().sum());
         writeln!(

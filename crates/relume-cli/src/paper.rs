@@ -137,7 +137,7 @@ fn flags((width, height): (u32, u32)) -> PictureFlags {
 
 /// The bodies that emit.
 fn lamps(scene: &Scene) -> BTreeSet<BodyId> {
-    let emits = |patch: &&relume::scene::Patch| scene.materials[patch.material.0 as usize].emits();
+    let emits = |patch: &&relume::scene::Patch| scene.patch_emits(patch);
     scene.patches.iter().filter(emits).map(|patch| patch.body).collect()
 }
 

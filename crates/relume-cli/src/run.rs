@@ -103,7 +103,8 @@ impl Job {
                 "give the directory of the earlier run with -o, or its report with --report",
             ));
         }
-        let clip = Clip::of_file(&self.scene, &self.solve.clip, self.tolerance)?;
+        let read = if self.picture.is_some() { Clip::for_pictures } else { Clip::of_file };
+        let clip = read(&self.scene, &self.solve.clip, self.tolerance)?;
         clip.warn();
         clip.warn_of(self.solve.update);
         let clip = clip.without_dark_sides();
@@ -523,17 +524,20 @@ fn ask_for_picture(flags: &PictureFlags) -> Result<(), Failure> {
 /// Cost: one pose for each emitting body, material and frame.
 fn brightest_frame(scene: &Scene, fps: f64) -> Option<u32> {
     let count = frames::frame_count(scene.motion.duration_s, fps).ok()?;
-    let material = |id: MaterialId| &scene.materials[id.0 as usize];
-    let mut lamps: BTreeMap<(BodyId, MaterialId), f64> = BTreeMap::new();
-    for patch in scene.patches.iter().filter(|p| material(p.material).emits()) {
-        *lamps.entry((patch.body, patch.material)).or_default() += patch.area_m2();
+    // The area that would emit as much if it were all white.
+    let mut lamps: BTreeMap<(BodyId, MaterialId), [f64; 3]> = BTreeMap::new();
+    for patch in scene.patches.iter().filter(|p| scene.patch_emits(p)) {
+        let (share, area_m2) = (scene.emission_share(patch), patch.area_m2());
+        let area = lamps.entry((patch.body, patch.material)).or_default();
+        (0..3).for_each(|c| area[c] += share[c] * area_m2);
     }
     let sum = |emission: [f64; 3]| emission.iter().sum::<f64>();
     let emitted = |frame: u32| {
         let time_s = frames::time_of(frame, fps);
-        let of_lamp = |(&(body, of), area): (&(BodyId, MaterialId), &f64)| {
+        let of_lamp = |(&(body, of), area): (&(BodyId, MaterialId), &[f64; 3])| {
+            let exitance = scene.materials[of.0 as usize].exitance_at(time_s);
             let there = scene.pose(body, time_s).is_some();
-            if there { area * sum(material(of).exitance_at(time_s)) } else { 0.0 }
+            if there { sum([0, 1, 2].map(|c| area[c] * exitance[c])) } else { 0.0 }
         };
         let of_light = |l: &Light| {
             let there = scene.motion.pose(l.node, time_s).is_some();

@@ -10,12 +10,16 @@ use crate::failure::Failure;
 use crate::memory;
 use crate::output;
 
-/// Reads a scene.
-pub(crate) fn load(path: &Path, animation: &AnimationFlag) -> Result<Scene, Failure> {
+/// Reads a scene; with its images, if it is for pictures.
+pub(crate) fn load(
+    path: &Path,
+    animation: &AnimationFlag,
+    pictures: bool,
+) -> Result<Scene, Failure> {
     let AnimationFlag { name, allow_outside } = animation.clone();
     memory::at(format_args!("reading {}", path.display()));
     let max_memory_bytes = memory::limit_bytes();
-    let options = ImportOptions { animation: name, allow_outside, max_memory_bytes };
+    let options = ImportOptions { animation: name, allow_outside, pictures, max_memory_bytes };
     let scene = import(path, &options).map_err(failure)?;
     memory::at(format_args!("preparing {}", path.display()));
     Ok(scene)

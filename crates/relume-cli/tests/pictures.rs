@@ -234,3 +234,58 @@ fn one_sigterm_ends_a_long_frame_within_seconds() {
         names_in(dir.path()).into_iter().filter(|name| name != ".relume.lock").collect();
     assert_eq!(left, ["corridor.glb"]);
 }
+
+/// A wall of 2 m x 2 m that is seen from the front, left half red and right half glowing, in a file of its own.
+fn painted_wall(dir: &Path) -> std::path::PathBuf {
+    let png = |name: &str, left: [u8; 3], right: [u8; 3]| {
+        let pixels = [left, right].concat();
+        image::RgbImage::from_raw(2, 1, pixels).unwrap().save(dir.join(name)).unwrap();
+    };
+    png("colour.png", [255, 0, 0], [0, 0, 0]);
+    png("glow.png", [0, 0, 0], [0, 255, 0]);
+    let points = [-1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 1.0, 1.0, 0.0, -1.0, 1.0, 0.0];
+    let places = [0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
+    let numbers: Vec<u8> =
+        points.iter().chain(&places).flat_map(|v: &f32| v.to_le_bytes()).collect();
+    fs::write(dir.join("wall.bin"), numbers).unwrap();
+    let json = serde_json::json!({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1, 2]}],
+        "extensionsUsed": ["KHR_lights_punctual"],
+        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "directional", "intensity": 683}]}},
+        "nodes": [{"mesh": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}},
+            {"camera": 0, "translation": [0, 0, 5]}],
+        "cameras": [{"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 9}}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "mode": 6, "material": 0}]}],
+        "materials": [{"emissiveFactor": [0.3, 0.3, 0.3], "emissiveTexture": {"index": 1}, "pbrMetallicRoughness":
+            {"baseColorFactor": [0.5, 0.5, 0.5, 1], "baseColorTexture": {"index": 0}, "metallicFactor": 0}}],
+        "textures": [{"source": 0}, {"source": 1}],
+        "images": [{"uri": "colour.png"}, {"uri": "glow.png"}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 32}],
+        "buffers": [{"uri": "wall.bin", "byteLength": 80}],
+    });
+    let path = dir.join("wall.gltf");
+    fs::write(&path, json.to_string()).unwrap();
+    path
+}
+
+#[test]
+fn images_are_seen_on_what_they_are_on() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = painted_wall(dir.path());
+    let out = dir.path().join("out");
+    let arguments =
+        ["render", scene.to_str().unwrap(), "-o", out.to_str().unwrap(), "--exposure", "0"];
+    succeeded(&relume(&arguments));
+    let picture = image::open(out.join("frame-0000.png")).unwrap().into_rgb8();
+    let at = |x: u32| picture.get_pixel(x, 20).0;
+    // A radiance of 0.5 / pi, and one of 0.3: (tone-mapped) sRGB.
+    for (x, lit) in [(12, 0), (28, 0), (36, 1), (50, 1)] {
+        let seen = at(x);
+        for c in 0..3 {
+            assert_eq!(seen[c] > 60, c == lit, "at {x}: {seen:?}");
+        }
+    }
+}

@@ -99,7 +99,7 @@ impl Packed {
     fn floats(&mut self, kind: &str, values: &[f32]) -> usize {
         let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
         let view = self.view(&bytes);
-        let parts = [("SCALAR", 1), ("VEC3", 3), ("VEC4", 4), ("MAT4", 16)];
+        let parts = [("SCALAR", 1), ("VEC2", 2), ("VEC3", 3), ("VEC4", 4), ("MAT4", 16)];
         let parts = parts.iter().find(|p| p.0 == kind).unwrap().1;
         let count = values.len() / parts;
         self.accessors
@@ -128,6 +128,16 @@ fn indices(inward: bool) -> Vec<u8> {
     (0..6).flat_map(|s| order.map(|k| 4 * s + k)).collect()
 }
 
+/// A small picture with alpha.
+fn picture() -> Vec<u8> {
+    let pixel =
+        |x: u32, y: u32| image::Rgba([(x * 40) as u8, (y * 50) as u8, 99, (x * y * 20) as u8]);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let picture = image::RgbaImage::from_fn(6, 5, pixel);
+    picture.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
 /// A room with a lamp and a box that use all that is read of glTF.
 fn room() -> (Value, Vec<u8>) {
     let mut p = Packed::default();
@@ -137,7 +147,12 @@ fn room() -> (Value, Vec<u8>) {
     let crate_ = p.floats("VEC3", &cuboid([0.5, 0.5, 0.5]));
     let lift = p.floats("VEC3", &[0.0, 0.25, 0.0].repeat(24));
     let lamp = p.floats("VEC3", &[0., 0., 0., 0.5, 0., 0., 0.5, 0., 0.5, 0., 0., 0.5]);
-    let fan = json!({"attributes": {"POSITION": lamp}, "mode": 6, "material": 1});
+    let places = p.floats("VEC2", &[0.1, 0.2, 2.5, 0.2, 2.5, -0.6, 0.1, 0.9]);
+    let fan =
+        json!({"attributes": {"POSITION": lamp, "TEXCOORD_1": places}, "mode": 6, "material": 1});
+    let sides = p.floats("VEC2", &[0., 0., 1., 0., 1., 1., 0., 1.].repeat(6));
+    let colours = p.floats("VEC4", &[1.0, 0.5, 0.2, 1.0, 0.3, 1.0, 0.9, 0.8].repeat(12));
+    let image = p.view(&picture());
     let joints = p.bytes("VEC4", 24, &[0; 96]);
     let weights = p.floats("VEC4", &[1.0, 0.0, 0.0, 0.0].repeat(24));
     let bind = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
@@ -158,6 +173,8 @@ fn room() -> (Value, Vec<u8>) {
     let sparse = p.accessors.len() - 1;
     let solid = |position: usize, indices: usize, material: usize| json!({"attributes": {"POSITION": position}, "indices": indices, "material": material});
     let mut morph = solid(crate_, outer, 2);
+    morph["attributes"]["TEXCOORD_0"] = json!(sides);
+    morph["attributes"]["COLOR_0"] = json!(colours);
     morph["targets"] = json!([{"POSITION": lift}]);
     let mut skin = solid(crate_, outer, 0);
     skin["attributes"]["JOINTS_0"] = json!(joints);
@@ -192,10 +209,14 @@ fn room() -> (Value, Vec<u8>) {
         ],
         "materials": [
             {"name": "wall", "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.6, 0.7, 1]}},
-            {"name": "light", "emissiveFactor": [1, 1, 1],
+            {"name": "light", "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0, "extensions":
+                {"KHR_texture_transform": {"offset": [0.2, 0.1], "rotation": 0.4, "scale": [2, 1], "texCoord": 1}}},
                 "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}}},
-            {"name": "red", "doubleSided": true, "pbrMetallicRoughness": {"baseColorFactor": [0.7, 0.1, 0.1, 1]}}
+            {"name": "red", "doubleSided": true, "alphaMode": "MASK", "alphaCutoff": 0.4, "pbrMetallicRoughness":
+                {"baseColorFactor": [0.7, 0.1, 0.1, 1], "baseColorTexture": {"index": 0, "texCoord": 0}}}
         ],
+        "textures": [{"source": 0, "sampler": 0}], "samplers": [{"wrapS": 33071, "wrapT": 33648}],
+        "images": [{"bufferView": image, "mimeType": "image/png"}],
         "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1, "aspectRatio": 1.5}}],
         "animations": [{"name": "all",
             "samplers": [

@@ -63,7 +63,7 @@ fn emittances(scene: &Scene, grouping: &Grouping) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); grouping.names.len()];
     for (patch, group) in scene.patches.iter().zip(&grouping.of_patch) {
         let Some(group) = group else { continue };
-        let rho = scene.materials[patch.material.0 as usize].reflectance;
+        let rho = scene.reflectance(patch);
         let (area, reflected) = &mut sums[*group as usize];
         *area += patch.area_m2();
         *reflected += patch.area_m2() * rho.iter().sum::<f64>() / 3.0;

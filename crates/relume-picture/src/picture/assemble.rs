@@ -5,12 +5,15 @@
 //! decides between equally near things: of surfaces in one plane the smaller is seen, as in the solution. It
 //! must not depend on threads.
 
+use std::collections::BTreeMap;
+
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use relume::scene::PatchId;
 use relume::session::{Leaf, Snapshot};
 
 use super::gouraud::{self, Triangle};
+use super::printed::Shown;
 use super::project::{Projector, SeenPlane, clip_to_pixels};
 use super::raster::{Grid, Primitive};
 use super::render::Shading;
@@ -55,6 +58,8 @@ pub(crate) struct Drawing {
     /// Which patch each primitive belongs to.
     pub(crate) patches: Vec<PatchId>,
     planes: Vec<SeenPlane>,
+    /// Patches with images.
+    shown: BTreeMap<PatchId, Shown>,
 }
 
 impl Drawing {
@@ -86,16 +91,27 @@ impl Drawing {
         for (i, patch) in seen {
             let plane = drawing.planes.len() as u32;
             drawing.planes.push(patch.plane);
+            let id = PatchId(i as u32);
+            drawing.shown.extend(Shown::new(snapshot, id, patch.plane).map(|shown| (id, shown)));
             for (primitive, mut fill) in patch.pieces {
                 if let Fill::Linear(linear) = &mut fill {
                     linear.plane = plane;
                 }
                 drawing.primitives.push(primitive);
                 drawing.fills.push(fill);
-                drawing.patches.push(PatchId(i as u32));
+                drawing.patches.push(id);
             }
         }
         drawing
+    }
+
+    /// What is seen of a primitive at a position in pixels, W/m2: its radiosity with the image that is on the patch.
+    pub(crate) fn seen(&self, primitive: usize, pixel: DVec2) -> [f32; 3] {
+        let radiosity = self.radiosity(primitive, pixel);
+        match (&self.fills[primitive], self.shown.get(&self.patches[primitive])) {
+            (Fill::Outline(_), _) | (_, None) => radiosity,
+            (_, Some(shown)) => shown.radiosity(pixel, radiosity),
+        }
     }
 
     /// Radiosity of a primitive at a position in pixels, W/m2.

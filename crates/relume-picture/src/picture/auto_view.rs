@@ -251,7 +251,7 @@ impl<'a> Stage<'a> {
     }
 
     fn emits(&self, patch: &Patch) -> bool {
-        self.scene.materials[patch.material.0 as usize].emits()
+        self.scene.patch_emits(patch)
     }
 
     fn score(&self, view: &View) -> f64 {

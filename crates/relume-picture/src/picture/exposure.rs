@@ -75,8 +75,7 @@ fn visible_radiances(snapshot: &Snapshot, view: &View) -> Vec<(f64, bool)> {
     let drawing = Drawing::new(snapshot, &projector, &grid, Shading::Flat, false);
     let emits = |patch: PatchId| {
         let scene = &snapshot.scene;
-        let material = scene.patches[patch.0 as usize].material;
-        let now = scene.materials[material.0 as usize].exitance_at(snapshot.time_s);
+        let now = scene.exitance_at(&scene.patches[patch.0 as usize], snapshot.time_s);
         now.iter().any(|&m| m > 0.0)
     };
     let pixels = rasterise(&grid, &drawing.primitives, |fragments| {

@@ -25,6 +25,7 @@ mod exposure;
 mod gouraud;
 mod image;
 mod outline;
+mod printed;
 mod project;
 mod raster;
 mod render;

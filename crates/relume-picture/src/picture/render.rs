@@ -104,7 +104,7 @@ impl Shader<'_> {
     /// Linear display values.
     fn display(&self, fragment: &Fragment) -> [f64; 3] {
         let Some(primitive) = fragment.primitive else { return self.background };
-        let radiosity = self.drawing.radiosity(primitive, fragment.position);
+        let radiosity = self.drawing.seen(primitive, fragment.position);
         let display = self.tone.map(self.exposure, radiosity);
         match self.drawing.fills[primitive] {
             Fill::Outline(_) => contrast(display),

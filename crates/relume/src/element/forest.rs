@@ -221,11 +221,8 @@ impl Forest {
         forest.kept_len = forest.fixed_len;
         forest.sum_areas();
         forest.fixed_mut().normals = forest.boxes_of_normals(scene);
-        forest.fixed_mut().glows = scene
-            .patches
-            .iter()
-            .map(|patch| scene.materials[patch.material.0 as usize].emits())
-            .collect();
+        forest.fixed_mut().glows =
+            scene.patches.iter().map(|patch| scene.patch_emits(patch)).collect();
         forest.fixed_mut().connected_m2 = scene.connected_areas_m2();
         forest
     }

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeSet;
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -15,7 +16,7 @@ use super::names::Names;
 use super::rigid::{check_track, without_scales};
 use super::{
     Body, BodyId, Frame, Glow, Interpolation, Material, MaterialId, Motion, NodeId, Note, Patch,
-    PatchId, Scene, SceneError, Severity, Surface, SurfaceId,
+    PatchId, Print, Scene, SceneError, Severity, Surface, SurfaceId, TintId,
 };
 use crate::geometry::Pose;
 
@@ -68,6 +69,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
         obstructions: BTreeSet::new(),
         patches: parts.patches,
         materials: draft.materials,
+        tints: draft.tints,
         lights: draft.lights,
         cameras: draft.cameras,
         motion,
@@ -91,7 +93,19 @@ struct Placement {
     shape: DMat3,
 }
 
+/// What a patch belongs to, and how it differs from its material.
+type Of = (BodyId, SurfaceId, MaterialId, Option<TintId>, Option<Arc<Print>>);
+
 impl Placement {
+    /// An image on a polygon in the body's frame.
+    fn print(&self, print: &Print) -> Print {
+        let mut placed = print.clone();
+        for triangle in &mut placed.triangles {
+            triangle.corners = triangle.corners.map(|p| self.pose.point(self.shape * p));
+        }
+        placed
+    }
+
     /// The loop in the body's frame; a mirroring shape turns it round, so that the front stays the
     /// front (glTF 2.0, section 3.7.4: a negative determinant flips the winding).
     fn place(&self, polygon: &[DVec3]) -> Vec<DVec3> {
@@ -117,7 +131,10 @@ impl Parts {
         let before = self.patches.len();
         let mut degenerate = 0;
         let double_sided = materials[surface.material.0 as usize].double_sided;
-        for polygon in &surface.polygons {
+        for (number, polygon) in surface.polygons.iter().enumerate() {
+            let tint = surface.tints.get(number).copied().flatten();
+            let print = surface.prints.get(number).cloned().flatten();
+            let print = print.map(|print| Arc::new(place.print(&print)));
             let points = place.place(polygon);
             if let Some(bad) = points.iter().find(|p| !is_place(&p.to_array())) {
                 return Err(no_place(name, object, *bad));
@@ -125,7 +142,8 @@ impl Parts {
             for piece in flat_pieces(&points) {
                 match piece {
                     Ok((frame, corners)) => {
-                        self.add_patch(body, id, surface.material, double_sided, frame, corners)
+                        let of = (body, id, surface.material, tint, print.clone());
+                        self.add_patch(of, double_sided, frame, corners);
                     }
                     Err(_) => degenerate += 1,
                 }
@@ -230,9 +248,7 @@ impl Parts {
 
     fn add_patch(
         &mut self,
-        body: BodyId,
-        surface: SurfaceId,
-        material: MaterialId,
+        (body, surface, material, tint, print): Of,
         double_sided: bool,
         frame: Frame,
         corners: Vec<DVec2>,
@@ -241,13 +257,24 @@ impl Parts {
         let back = PatchId(front.0 + 1);
         let (behind, behind_corners) = seen_from_behind(&frame, &corners);
         let twin = double_sided.then_some(back);
-        self.patches.push(Patch { body, surface, material, frame, corners, twin });
+        self.patches.push(Patch {
+            body,
+            surface,
+            material,
+            tint,
+            print: print.clone(),
+            frame,
+            corners,
+            twin,
+        });
         if double_sided {
             let twin = Some(front);
             self.patches.push(Patch {
                 body,
                 surface,
                 material,
+                tint,
+                print,
                 frame: behind,
                 corners: behind_corners,
                 twin,

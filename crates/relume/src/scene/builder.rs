@@ -169,6 +169,8 @@ impl SceneBuilder {
                     name: Some(surface_name.to_owned()),
                     material,
                     polygons: vec![polygon],
+                    tints: Vec::new(),
+                    prints: Vec::new(),
                 }),
             }
         });

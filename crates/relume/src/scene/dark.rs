@@ -79,7 +79,7 @@ impl Scene {
     }
 
     fn glows(&self, patch: PatchId) -> bool {
-        self.materials[self.patches[patch.0 as usize].material.0 as usize].emits()
+        self.patch_emits(&self.patches[patch.0 as usize])
     }
 
     /// Whether anything but a shell's own faces is ever inside it.

@@ -3,9 +3,11 @@
 //! Nodes still carry scales, polygons are loops of points in their node's own frame, and names
 //! may repeat. Must not know where any of it came from.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DQuat, DVec3};
 
-use super::{Camera, Light, Material, MaterialId, Note, RotationTrack, Track};
+use super::{Camera, Light, Material, MaterialId, Note, Print, RotationTrack, Tint, TintId, Track};
 
 /// Everything of a scene, unchecked.
 #[derive(Default)]
@@ -14,6 +16,7 @@ pub(super) struct Draft {
     /// Parents before children.
     pub(super) nodes: Vec<DraftNode>,
     pub(super) materials: Vec<Material>,
+    pub(super) tints: Vec<Tint>,
     pub(super) lights: Vec<Light>,
     pub(super) cameras: Vec<Camera>,
     pub(super) animation: Option<String>,
@@ -43,6 +46,10 @@ pub(super) struct DraftSurface {
     pub(super) material: MaterialId,
     /// Loops, counter-clockwise from the front, in the node's own (scaled) frame.
     pub(super) polygons: Vec<Vec<DVec3>>,
+    /// Tints of the polygons, where they have any; shorter where the last ones have none.
+    pub(super) tints: Vec<Option<TintId>>,
+    /// Images on the polygons in the node's own frame, likewise.
+    pub(super) prints: Vec<Option<Arc<Print>>>,
 }
 
 impl DraftNode {

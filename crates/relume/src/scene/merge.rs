@@ -24,13 +24,25 @@ pub(super) struct Merged {
 /// removing the longest sides first (Hertel and Mehlhorn 1983: at most four times the fewest).
 /// O(n log n).
 pub(super) fn merge(points: &[DVec3], triangles: &[[u32; 3]]) -> Merged {
+    merge_alike(points, triangles, &|_, _| true)
+}
+
+/// Merges only triangles that are alike: `alike(a, b)` of two of their numbers, of which the first is the larger one that
+/// a region grows from.
+pub(super) fn merge_alike(
+    points: &[DVec3],
+    triangles: &[[u32; 3]],
+    alike: &dyn Fn(usize, usize) -> bool,
+) -> Merged {
     let welded = weld(points);
     let is_flat = |t: &&[u32; 3]| has_area(t.map(|v| points[v as usize]));
+    let numbers: Vec<usize> = (0..triangles.len()).filter(|&k| is_flat(&&triangles[k])).collect();
     let kept: Vec<[u32; 3]> =
-        triangles.iter().filter(is_flat).map(|t| t.map(|v| welded[v as usize])).collect();
+        numbers.iter().map(|&k| triangles[k].map(|v| welded[v as usize])).collect();
     let degenerate = triangles.len() - kept.len();
     let mut mesh = Mesh::new(points, &kept);
-    let regions = mesh.regions();
+    let regions =
+        mesh.regions(&|seed, other| alike(numbers[seed as usize], numbers[other as usize]));
     let mut polygons: Vec<(u32, Vec<DVec3>)> = Vec::new();
     for (normal, region) in &regions {
         match mesh.convex_outline(region) {
@@ -138,7 +150,7 @@ impl<'a> Mesh<'a> {
     }
 
     /// Coplanar connected triangles, grown from the largest ones; each with its normal and sorted.
-    fn regions(&mut self) -> Vec<(DVec3, Vec<u32>)> {
+    fn regions(&mut self, alike: &dyn Fn(u32, u32) -> bool) -> Vec<(DVec3, Vec<u32>)> {
         let area: Vec<f64> =
             (0..self.region.len() as u32).map(|t| self.area_vector(t).length()).collect();
         let mut order: Vec<u32> = (0..area.len() as u32).collect();
@@ -147,14 +159,20 @@ impl<'a> Mesh<'a> {
         for seed in order {
             if self.region[seed as usize] == NONE {
                 let plane = Plane::of(self.corners(seed));
-                let members = self.grow(seed, &plane, regions.len() as u32);
+                let members = self.grow(seed, &plane, regions.len() as u32, alike);
                 regions.push((plane.normal, members));
             }
         }
         regions
     }
 
-    fn grow(&mut self, seed: u32, plane: &Plane, region: u32) -> Vec<u32> {
+    fn grow(
+        &mut self,
+        seed: u32,
+        plane: &Plane,
+        region: u32,
+        alike: &dyn Fn(u32, u32) -> bool,
+    ) -> Vec<u32> {
         let mut members = vec![seed];
         self.region[seed as usize] = region;
         let mut looked_at = 0;
@@ -167,6 +185,7 @@ impl<'a> Mesh<'a> {
                 if free
                     && self.area_vector(neighbour).dot(plane.normal) > 0.0
                     && self.corners(neighbour).iter().all(|&p| plane.holds(p))
+                    && alike(seed, neighbour)
                 {
                     self.region[neighbour as usize] = region;
                     members.push(neighbour);

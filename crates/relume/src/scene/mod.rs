@@ -5,6 +5,7 @@
 //! pairs or light transport.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
@@ -14,6 +15,7 @@ mod assemble;
 mod builder;
 mod check;
 mod connected;
+mod coverage;
 mod dark;
 mod discontinuity;
 mod draft;
@@ -28,9 +30,12 @@ pub mod limits;
 mod merge;
 mod motion;
 mod names;
+mod print;
+mod pyramid;
 mod rigid;
 mod shell;
 mod solid;
+mod tint;
 mod topology;
 mod view3d;
 mod weld;
@@ -43,7 +48,9 @@ pub use glow::Glow;
 pub use import::{ImportOptions, import};
 pub use join::{Joined, Part};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
+pub use print::{Print, Printed};
 pub use solid::{Enclosure, Solid, SolidEdge, SolidFace, Solids};
+pub use tint::Tint;
 
 /// Index of a [`Body`] in [`Scene::bodies`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -61,6 +68,10 @@ pub struct MaterialId(pub u32);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SurfaceId(pub u32);
 
+/// Index of a [`Tint`] in [`Scene::tints`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TintId(pub u32);
+
 /// Everything that is lit, as read and validated. Immutable.
 #[derive(Clone, Debug)]
 pub struct Scene {
@@ -77,6 +88,9 @@ pub struct Scene {
     pub patches: Vec<Patch>,
     /// Materials; every patch names one.
     pub materials: Vec<Material>,
+    /// What textures and vertex colours make of materials, one entry for each distinct value: ask
+    /// [`Scene::reflectance`] and [`Scene::exitance_at`], which know them.
+    pub tints: Vec<Tint>,
     /// Punctual lights (KHR_lights_punctual).
     pub lights: Vec<Light>,
     /// Cameras, in file order.
@@ -126,6 +140,10 @@ pub struct Patch {
     pub surface: SurfaceId,
     /// Its material.
     pub material: MaterialId,
+    /// Where its reflectance or emission differ from the material's, what they are.
+    pub tint: Option<TintId>,
+    /// Images that vary over it, if they were kept for pictures ([`ImportOptions::pictures`]).
+    pub print: Option<Arc<Print>>,
     /// Its plane's frame in the body's frame.
     pub frame: Frame,
     /// Corners in the plane's frame, counter-clockwise seen from the front, convex, three or
@@ -155,7 +173,7 @@ impl Frame {
     }
 }
 
-/// A diffuse material; linear RGB.
+/// A diffuse material; linear RGB. Textures and vertex colours are not in it: see [`Tint`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Unique name.

@@ -7,7 +7,7 @@ use crate::event::Ticks;
 use crate::pair::{
     Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Record, Since, Stage, update,
 };
-use crate::scene::{self, BodyId, LightKind, Material};
+use crate::scene::{self, BodyId, LightKind};
 use crate::solver::{Dirty, Links, Radiosity};
 
 use super::ahead::{Ahead, most_mean, while_extrapolated};
@@ -160,28 +160,27 @@ impl Session {
     /// A bound on the mean radiosity of the scene at any time: all that can be emitted, over what is
     /// absorbed at least.
     fn most_mean_w_m2(&self) -> f64 {
-        let rho = self.scene.materials.iter().flat_map(|m| m.reflectance).fold(0.0, f64::max);
-        let emitted_w = self.emitted_w(Material::most_exitance, scene::Light::most_intensity);
+        let scene = &self.scene;
+        let rho = scene.patches.iter().flat_map(|p| scene.reflectance(p)).fold(0.0, f64::max);
+        let emitted_w = self.emitted_w(|p| scene.most_exitance(p), scene::Light::most_intensity);
         emitted_w / self.scene.area_m2() / (1.0 - rho)
     }
 
     /// How many times as much the scene emits now as at another time, present or not.
     fn brightened(&self, since_s: f64, now_s: f64) -> f64 {
-        let at = |t: f64| self.emitted_w(|m| m.exitance_at(t), |l| l.intensity_at(t));
+        let at = |t: f64| self.emitted_w(|p| self.scene.exitance_at(p, t), |l| l.intensity_at(t));
         if self.scene.is_relit([since_s, now_s]) { at(now_s) / at(since_s) } else { 1.0 }
     }
 
     /// What all surfaces and lights emit, W, with given exitances and intensities.
     fn emitted_w(
         &self,
-        exitance: impl Fn(&Material) -> [f64; 3],
+        exitance: impl Fn(&scene::Patch) -> [f64; 3],
         intensity: impl Fn(&scene::Light) -> [f64; 3],
     ) -> f64 {
         let scene = &self.scene;
         let mean = |c: [f64; 3]| c.iter().sum::<f64>() / 3.0;
-        let of_patch = |p: &scene::Patch| {
-            p.area_m2() * mean(exitance(&scene.materials[p.material.0 as usize]))
-        };
+        let of_patch = |p: &scene::Patch| p.area_m2() * mean(exitance(p));
         let of_light = |light: &scene::Light| {
             let spread = match light.kind {
                 LightKind::Directional => scene.area_m2(),

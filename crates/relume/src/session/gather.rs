@@ -282,12 +282,12 @@ impl<'a> Look<'a> {
         let at = moment / factor;
         let b = if factor > LITTLE {
             let patch = self.forest.patch(id).expect("an element has a patch");
-            let material = self.session.scene.patches[patch.0 as usize].material;
-            let material = &self.session.scene.materials[material.0 as usize];
+            let scene = &self.session.scene;
+            let patch = &scene.patches[patch.0 as usize];
             let sensor = Sensor { at, normal: e.plane.normal };
             let h = Look::new((self.session, self.solved), &sensor, false).gather();
-            let m = material.exitance_at(self.solved.time_s);
-            [0, 1, 2].map(|c| m[c] + material.reflectance[c] * h[c])
+            let (m, rho) = (scene.exitance_at(patch, self.solved.time_s), scene.reflectance(patch));
+            [0, 1, 2].map(|c| m[c] + rho[c] * h[c])
         } else {
             let place = place_of(self.forest, id);
             let b = self.solved.radiosity.linear(id.0, &place, SQUARE_MOMENT);

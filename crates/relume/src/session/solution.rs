@@ -103,8 +103,7 @@ impl Solution for Session {
     }
 
     fn reflectance_max(&self) -> f64 {
-        let of = |material: u32| self.scene.materials[material as usize].reflectance;
-        let all = self.scene.patches.iter().flat_map(|patch| of(patch.material.0));
+        let all = self.scene.patches.iter().flat_map(|patch| self.scene.reflectance(patch));
         all.fold(0.0, f64::max)
     }
 

@@ -21,9 +21,8 @@ impl<'a> LitForest<'a> {
     pub(super) fn new(scene: &Scene, forest: &'a Forest, time_s: f64) -> LitForest<'a> {
         let single = |v: [f64; 3]| v.map(|x| x as f32);
         let of_patch = |patch: &crate::scene::Patch| {
-            let material = &scene.materials[patch.material.0 as usize];
-            let exitance = single(material.exitance_at(time_s));
-            Lit { reflectance: single(material.reflectance), exitance }
+            let exitance = single(scene.exitance_at(patch, time_s));
+            Lit { reflectance: single(scene.reflectance(patch)), exitance }
         };
         let patch_lit = scene.patches.iter().map(of_patch).collect();
         LitForest { forest, patch_lit, places: Vec::new() }

@@ -7,11 +7,10 @@ use relume_judge::Polygon;
 pub(crate) fn polygons(scene: &Scene, time_s: f64) -> Vec<Polygon> {
     let polygon = |patch: &relume::scene::Patch| {
         let pose = scene.pose(patch.body, time_s).expect("every body is present");
-        let material = &scene.materials[patch.material.0 as usize];
         Polygon {
             corners: patch.corners_in_body().map(|c| pose.point(c)).collect(),
-            reflectance: material.reflectance,
-            exitance: material.exitance,
+            reflectance: scene.reflectance(patch),
+            exitance: scene.exitance_at(patch, 0.0),
             twin: patch.twin.map(|PatchId(k)| k as usize),
         }
     };

@@ -59,6 +59,7 @@ impl Gltf {
     pub(crate) fn floats(&mut self, kind: &str, values: &[f32]) -> usize {
         let components = match kind {
             "SCALAR" => 1,
+            "VEC2" => 2,
             "VEC3" => 3,
             "MAT4" => 16,
             _ => 4,

@@ -10,6 +10,7 @@ mod gltf;
 mod motion;
 mod shipped;
 mod surfaces;
+mod textures;
 
 use std::path::{Path, PathBuf};
 

@@ -87,7 +87,7 @@ fn sources(scene: &Scene) -> Vec<Source<'_>> {
         lights.map(|l| Source { name: &l.name, kind: SourceKind::Light(l.kind, l.node) }).collect();
     let mut lamps: BTreeMap<&str, Vec<PatchId>> = BTreeMap::new();
     for (number, patch) in scene.patches.iter().enumerate() {
-        if scene.materials[patch.material.0 as usize].emits() {
+        if scene.patch_emits(patch) {
             let object = scene.surfaces[patch.surface.0 as usize].object.as_str();
             lamps.entry(object).or_default().push(PatchId(number as u32));
         }

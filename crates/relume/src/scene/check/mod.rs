@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Material, MaterialId, Note, Scene, Severity};
+use super::{Material, MaterialId, Note, Patch, Scene, Severity};
 
 mod blind;
 mod shape;
@@ -59,17 +59,22 @@ fn note(
     Note { severity, code, subject: subject.to_owned(), count, message }
 }
 
-/// The materials in use, each with its number of patches.
-fn used(scene: &Scene) -> Vec<(&Material, usize)> {
-    let mut counts: BTreeMap<MaterialId, usize> = BTreeMap::new();
+/// The largest channel of each material in use over its patches, and how many patches it has.
+fn highest(
+    scene: &Scene,
+    of: impl Fn(&Patch) -> [f64; 3],
+) -> impl Iterator<Item = (&Material, (f64, usize))> {
+    let mut highest: BTreeMap<MaterialId, (f64, usize)> = BTreeMap::new();
     for patch in &scene.patches {
-        *counts.entry(patch.material).or_default() += 1;
+        let (most, count) = highest.entry(patch.material).or_default();
+        *most = of(patch).into_iter().fold(*most, f64::max);
+        *count += 1;
     }
-    counts.into_iter().map(|(m, n)| (&scene.materials[m.0 as usize], n)).collect()
+    highest.into_iter().map(|(m, found)| (&scene.materials[m.0 as usize], found))
 }
 
 fn emission(scene: &Scene, notes: &mut Vec<Note>) {
-    let glows = used(scene).iter().any(|(m, _)| m.emits());
+    let glows = scene.patches.iter().any(|p| scene.patch_emits(p));
     let shines = scene.lights.iter().any(|l| l.most_intensity().iter().any(|&i| i > 0.0));
     if !glows && !shines {
         let message = "nothing emits light, so every picture is black; give a material an emission \
@@ -80,16 +85,20 @@ fn emission(scene: &Scene, notes: &mut Vec<Note>) {
 }
 
 fn reflectance(scene: &Scene, notes: &mut Vec<Note>) {
-    for (material, count) in used(scene) {
-        let highest = material.reflectance.iter().copied().fold(0.0, f64::max);
-        if highest >= REFLECTANCE_HIGH {
-            let message = format!(
-                "it reflects {highest:.3} of the light: the balance needs many sweeps and small errors grow; \
-                 real paints stay below 0.9, so lower the base colour"
-            );
-            notes.push(note(Severity::Warning, "reflectance", &material.name, count, message));
-        }
-    }
+    let all = highest(scene, |patch| scene.reflectance(patch));
+    let high: Vec<_> = all.filter(|(_, (most, _))| *most >= REFLECTANCE_HIGH).collect();
+    let Some((first, _)) = high.first() else { return };
+    let names: BTreeSet<&str> = high[1..].iter().map(|(m, _)| m.name.as_str()).collect();
+    let (most, count) = high.iter().fold((0.0, 0), |(most, n), (_, of)| (of.0.max(most), n + of.1));
+    let others = match names.is_empty() {
+        true => String::new(),
+        false => format!(" (so high, too: {})", listed(&names)),
+    };
+    let message = format!(
+        "it reflects up to {most:.3} of the light{others}: the balance needs many sweeps and small errors grow; \
+         real paints stay below 0.9, so lower the base colour"
+    );
+    notes.push(note(Severity::Warning, "reflectance", &first.name, count, message));
 }
 
 fn units(scene: &Scene, notes: &mut Vec<Note>) {
@@ -102,8 +111,7 @@ fn units(scene: &Scene, notes: &mut Vec<Note>) {
             notes.push(note(Severity::Warning, "units", &scene.name, 1, message));
         }
     }
-    for (material, count) in used(scene) {
-        let brightest = material.most_exitance().into_iter().fold(0.0, f64::max);
+    for (material, (brightest, count)) in highest(scene, |patch| scene.most_exitance(patch)) {
         if brightest > EXITANCE_HIGH {
             let message = format!(
                 "it emits {brightest:.3e} W/m2, more than a glowing filament; check the emission strength"

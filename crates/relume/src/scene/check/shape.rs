@@ -360,10 +360,7 @@ fn inside_out(scene: &Scene, topology: &Topology, parts: &[Part], notes: &mut Ve
 fn emits_nothing(scene: &Scene, topology: &Topology, part: usize) -> bool {
     let mut members =
         topology.polygons.iter().zip(&topology.component).filter(|(_, c)| **c as usize == part);
-    members.all(|(p, _)| {
-        let material = scene.patches[p.patch.0 as usize].material;
-        !scene.materials[material.0 as usize].emits()
-    })
+    members.all(|(p, _)| !scene.patch_emits(&scene.patches[p.patch.0 as usize]))
 }
 
 /// Polygons with the same corners that do not lie back to back.

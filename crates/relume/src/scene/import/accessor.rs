@@ -69,6 +69,7 @@ impl Document {
             self.root.accessors.get(index).ok_or_else(|| self.no_accessor(index, owner))?;
         let wanted = match N {
             1 => "SCALAR",
+            2 => "VEC2",
             3 => "VEC3",
             16 => "MAT4",
             _ => "VEC4",

@@ -20,6 +20,7 @@ pub(super) struct Root {
     pub(super) skins: Vec<Skin>,
     pub(super) materials: Vec<Material>,
     pub(super) textures: Vec<Texture>,
+    pub(super) samplers: Vec<TextureSampler>,
     pub(super) images: Vec<Image>,
     pub(super) accessors: Vec<Accessor>,
     pub(super) buffer_views: Vec<BufferView>,
@@ -157,6 +158,7 @@ pub(super) struct Material {
     pub(super) emissive_factor: Option<[f64; 3]>,
     pub(super) emissive_texture: Option<TextureRef>,
     pub(super) alpha_mode: Option<String>,
+    pub(super) alpha_cutoff: Option<f64>,
     pub(super) extensions: MaterialExtensions,
 }
 
@@ -168,7 +170,13 @@ pub(super) struct MaterialExtensions {
     #[serde(rename = "KHR_materials_pbrSpecularGlossiness")]
     pub(super) specular_glossiness: Option<SpecularGlossiness>,
     #[serde(rename = "KHR_materials_transmission")]
-    pub(super) transmission: Option<Value>,
+    pub(super) transmission: Option<Transmission>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct Transmission {
+    pub(super) transmission_factor: f64,
 }
 
 #[derive(Deserialize, Default)]
@@ -193,14 +201,58 @@ pub(super) struct Pbr {
 }
 
 #[derive(Deserialize, Clone, Copy)]
+#[serde(rename_all = "camelCase")]
 pub(super) struct TextureRef {
     pub(super) index: usize,
+    #[serde(default)]
+    pub(super) tex_coord: u32,
+    #[serde(default)]
+    pub(super) extensions: TextureRefExtensions,
+}
+
+#[derive(Deserialize, Default, Clone, Copy)]
+#[serde(default)]
+pub(super) struct TextureRefExtensions {
+    #[serde(rename = "KHR_texture_transform")]
+    pub(super) transform: Option<TextureTransform>,
+}
+
+#[derive(Deserialize, Default, Clone, Copy)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct TextureTransform {
+    pub(super) offset: Option<[f64; 2]>,
+    pub(super) rotation: f64,
+    pub(super) scale: Option<[f64; 2]>,
+    pub(super) tex_coord: Option<u32>,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(default)]
 pub(super) struct Texture {
     pub(super) source: Option<usize>,
+    pub(super) sampler: Option<usize>,
+    pub(super) extensions: TextureExtensions,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct TextureExtensions {
+    #[serde(rename = "EXT_texture_webp")]
+    pub(super) webp: Option<ImageSource>,
+    #[serde(rename = "KHR_texture_basisu")]
+    pub(super) basisu: Option<ImageSource>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct ImageSource {
+    pub(super) source: usize,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct TextureSampler {
+    pub(super) wrap_s: Option<u32>,
+    pub(super) wrap_t: Option<u32>,
 }
 
 #[derive(Deserialize, Default)]

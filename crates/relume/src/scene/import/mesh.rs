@@ -1,21 +1,24 @@
 //! Mesh primitives to convex polygons in the mesh's own frame.
 //!
-//! Must not know where meshes are placed or what they are made of.
+//! Must not know where meshes are placed.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::document::Document;
+use super::look::{Looks, Triangles};
 use super::{json, note};
-use crate::scene::merge::merge;
-use crate::scene::{Note, SceneError, Severity};
+use crate::scene::{Note, Print, SceneError, Severity, TintId};
 
-/// A primitive: its polygons, counter-clockwise from the front, and the material's index.
+/// A primitive: its polygons, counter-clockwise from the front, with their tints, and the material's index.
 #[derive(Clone)]
 pub(super) struct Polygons {
     pub(super) material: Option<usize>,
     pub(super) loops: Vec<Vec<DVec3>>,
+    pub(super) tints: Vec<Option<TintId>>,
+    pub(super) prints: Vec<Option<Arc<Print>>>,
 }
 
 /// A primitive before its triangles are merged.
@@ -28,13 +31,13 @@ struct Soup<'a> {
 
 /// All primitives of a mesh that have triangles, in the shape of these weights of its morph targets.
 pub(super) fn polygons(
-    document: &Document,
+    (document, looks): (&Document, &mut Looks<'_>),
     index: usize,
     weights: &[f64],
     notes: &mut Vec<Note>,
 ) -> Result<Vec<Polygons>, SceneError> {
     let (name, soups) = soups(document, index, weights, notes)?;
-    Ok(soups.iter().map(|soup| soup.merged(&soup.triangles, &name, notes)).collect())
+    soups.iter().map(|soup| soup.merged(&soup.triangles, &name, looks, notes)).collect()
 }
 
 /// The polygons of each joint of a skin, ascending; or how many triangles hang on several.
@@ -42,7 +45,7 @@ pub(super) type Jointed = Result<Vec<(usize, Vec<Polygons>)>, usize>;
 
 /// The polygons of each joint of a skin where every triangle hangs on one joint alone.
 pub(super) fn by_joint(
-    document: &Document,
+    (document, looks): (&Document, &mut Looks<'_>),
     index: usize,
     weights: &[f64],
     notes: &mut Vec<Note>,
@@ -63,7 +66,7 @@ pub(super) fn by_joint(
         }
         if bent == 0 {
             for (joint, triangles) in groups {
-                parts.entry(joint).or_default().push(soup.merged(&triangles, &name, notes));
+                parts.entry(joint).or_default().push(soup.merged(&triangles, &name, looks, notes)?);
             }
         }
     }
@@ -164,8 +167,15 @@ fn soup<'a>(
 
 impl Soup<'_> {
     /// These triangles as polygons.
-    fn merged(&self, triangles: &[[u32; 3]], mesh: &str, notes: &mut Vec<Note>) -> Polygons {
-        let merged = merge(&self.points, triangles);
+    fn merged(
+        &self,
+        triangles: &[[u32; 3]],
+        mesh: &str,
+        looks: &mut Looks<'_>,
+        notes: &mut Vec<Note>,
+    ) -> Result<Polygons, SceneError> {
+        let Soup { primitive, points, owner, .. } = self;
+        let merged = looks.polygons(&Triangles { primitive, points, triangles, owner }, notes)?;
         if merged.degenerate > 0 {
             let message = format!(
                 "{} of {} triangles have no area and were left out",
@@ -174,7 +184,8 @@ impl Soup<'_> {
             );
             notes.push(note(Severity::Info, "degenerate", mesh, merged.degenerate, message));
         }
-        Polygons { material: self.primitive.material, loops: merged.polygons }
+        let material = self.primitive.material;
+        Ok(Polygons { material, loops: merged.loops, tints: merged.tints, prints: merged.prints })
     }
 }
 

@@ -9,12 +9,18 @@ use std::path::Path;
 mod accessor;
 mod animation;
 mod base64;
+mod chart;
 mod clock;
 mod document;
+mod facet;
+mod images;
 mod json;
 mod light;
+mod look;
 mod material;
 mod mesh;
+mod parts;
+mod pieces;
 mod tree;
 
 use document::Document;
@@ -30,6 +36,8 @@ pub struct ImportOptions {
     pub animation: Option<String>,
     /// Whether buffers and images may be anywhere: outside the file's folder, and devices or pipes.
     pub allow_outside: bool,
+    /// Whether images are kept for pictures, as [`super::Patch::print`]; the solution does not need them.
+    pub pictures: bool,
     /// Bytes that a file, an image or a list of numbers may need, each by itself: what needs more is refused
     /// before memory is asked for. `None` for no limit.
     pub max_memory_bytes: Option<u64>,

@@ -6,6 +6,7 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::animation::{GlowKeys, Moves, played};
 use super::document::Document;
+use super::look::Looks;
 use super::mesh::{Polygons, by_joint, polygons};
 use super::{ImportOptions, json, light, material, node_name, note};
 use crate::scene::draft::{Draft, DraftNode, DraftSurface};
@@ -18,12 +19,14 @@ const SAME_SCALE: f64 = 1e-6;
 pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draft, SceneError> {
     let mut notes = Vec::new();
     let played = played(document, options.animation.as_deref(), &mut notes)?;
-    let materials = material::materials(document, &played.materials, &mut notes)?;
+    let (materials, paints) =
+        material::materials(document, &played.materials, &mut notes).into_iter().unzip();
     let roots = roots(document, &mut notes)?;
     let mut tree = Tree {
         document,
         moves: played.moves,
         lights: played.lights,
+        looks: Looks::new(document, paints, options.pictures),
         meshes: BTreeMap::new(),
         places: document.root.nodes.iter().map(|_| None).collect(),
         skinned: Vec::new(),
@@ -84,6 +87,7 @@ struct Tree<'a> {
     moves: Vec<Moves>,
     /// How the lights of the file change.
     lights: Vec<GlowKeys>,
+    looks: Looks<'a>,
     /// Polygons of the meshes read so far, by mesh and weights of its morph targets (as bits).
     meshes: BTreeMap<(usize, Vec<u64>), Vec<Polygons>>,
     /// Where each node of the file is in the draft.
@@ -234,7 +238,8 @@ impl Tree<'_> {
         let primitives = match self.meshes.get(&key) {
             Some(read) => read.clone(),
             None => {
-                let read = polygons(self.document, mesh, weights, &mut self.draft.notes)?;
+                let with = (self.document, &mut self.looks);
+                let read = polygons(with, mesh, weights, &mut self.draft.notes)?;
                 self.meshes.entry(key).or_insert(read).clone()
             }
         };
@@ -259,9 +264,15 @@ impl Tree<'_> {
                     remedy: "leave out objects or instances, or simplify their meshes".into(),
                 });
             }
-            let polygons = primitive.loops;
+            let Polygons { loops: polygons, tints, prints, .. } = primitive;
             let material = MaterialId(material as u32);
-            self.draft.nodes[me].surfaces.push(DraftSurface { name: None, material, polygons });
+            self.draft.nodes[me].surfaces.push(DraftSurface {
+                name: None,
+                material,
+                polygons,
+                tints,
+                prints,
+            });
         }
         Ok(())
     }
@@ -331,7 +342,8 @@ impl Tree<'_> {
             return Ok(Err(format!("skin {} does not exist", skinned.skin)));
         };
         let notes = &mut self.draft.notes;
-        let parts = match by_joint(document, skinned.mesh, &skinned.weights, notes)? {
+        let with = (document, &mut self.looks);
+        let parts = match by_joint(with, skinned.mesh, &skinned.weights, notes)? {
             Ok(parts) => parts,
             Err(bent) => return Ok(Err(format!("triangles that hang on several joints: {bent}"))),
         };
@@ -407,6 +419,7 @@ impl Tree<'_> {
                 message,
             ));
         }
+        self.draft.tints = self.looks.finish(&mut self.draft.notes);
         self.draft
     }
 }

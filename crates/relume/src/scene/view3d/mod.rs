@@ -94,7 +94,13 @@ fn scene(name: &str, text: &str) -> Result<Scene, Refused> {
                     obstructions.push(name.clone());
                 }
                 let material = materials.of(raw, &mut notes);
-                surfaces.push(DraftSurface { name: Some(name), material, polygons: Vec::new() });
+                surfaces.push(DraftSurface {
+                    name: Some(name),
+                    material,
+                    polygons: Vec::new(),
+                    tints: Vec::new(),
+                    prints: Vec::new(),
+                });
                 surfaces.len() - 1
             }
         };

@@ -1,0 +1,63 @@
+//! Images multiplied back onto patches whose light was found with their means.
+//!
+//! Must not know how light was found. Radiosity without emission is what arrives times the mean reflectance; what is seen
+//! at a place is the same times its own reflectance, and its own emission.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+use relume::scene::{Frame, PatchId, Print};
+use relume::session::Snapshot;
+
+use super::project::SeenPlane;
+
+/// A patch with an image, as it is seen.
+#[derive(Debug)]
+pub(super) struct Shown {
+    print: Arc<Print>,
+    plane: SeenPlane,
+    frame: Frame,
+    /// Means of the patch, as it was solved.
+    reflectance: [f64; 3],
+    exitance: [f64; 3],
+    /// Exitance where the image of the emission is white.
+    exitance_of_white: [f64; 3],
+}
+
+/// Mean reflectances below this tell nothing of the light that arrives.
+const BLACK: f64 = 1e-6;
+
+impl Shown {
+    /// `None` for a patch that looks the same everywhere.
+    pub(super) fn new(snapshot: &Snapshot, id: PatchId, plane: SeenPlane) -> Option<Shown> {
+        let scene = &snapshot.scene;
+        let patch = &scene.patches[id.0 as usize];
+        Some(Shown {
+            print: patch.print.clone()?,
+            plane,
+            frame: patch.frame,
+            reflectance: scene.reflectance(patch),
+            exitance: scene.exitance_at(patch, snapshot.time_s),
+            exitance_of_white: scene.materials[patch.material.0 as usize]
+                .exitance_at(snapshot.time_s),
+        })
+    }
+
+    /// What is seen at a pixel, W/m2, where the patch as it was solved has this radiosity.
+    pub(super) fn radiosity(&self, pixel: DVec2, solved: [f32; 3]) -> [f32; 3] {
+        let at = self.plane.unproject(pixel);
+        let side = |step: DVec2| -> DVec3 {
+            let d = self.plane.unproject(pixel + step) - at;
+            self.frame.u * d.x + self.frame.v * d.y
+        };
+        let seen = self.print.at(self.frame.point(at), [side(DVec2::X), side(DVec2::Y)]);
+        [0, 1, 2].map(|c| {
+            let reflected = (f64::from(solved[c]) - self.exitance[c]).max(0.0);
+            let share = match self.reflectance[c] > BLACK {
+                true => seen.reflectance[c].min(1.0) / self.reflectance[c],
+                false => 1.0,
+            };
+            (self.exitance_of_white[c] * seen.emission[c] + reflected * share) as f32
+        })
+    }
+}

@@ -6,11 +6,15 @@ use std::cell::OnceCell;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::draco::Streams;
 use super::{ImportOptions, base64, json};
 use crate::scene::SceneError;
 
 /// Extensions that may be required: handled, or without effect on diffuse light.
-const KNOWN: [&str; 23] = [
+const KNOWN: [&str; 26] = [
+    "EXT_meshopt_compression",
+    "KHR_draco_mesh_compression",
+    "KHR_meshopt_compression",
     "KHR_lights_punctual",
     "KHR_mesh_quantization",
     "KHR_node_visibility",
@@ -45,6 +49,9 @@ pub(super) struct Document {
     pub(super) root: json::Root,
     binary: Option<Vec<u8>>,
     buffers: Vec<OnceCell<Vec<u8>>>,
+    /// The plain bytes of compressed buffer views.
+    views: Vec<OnceCell<Vec<u8>>>,
+    pub(super) streams: Streams,
 }
 
 impl Document {
@@ -60,11 +67,14 @@ impl Document {
             remedy: "check the path; scenes are .glb or .gltf files".into(),
         })?;
         let (text, binary) = split_glb(&file, bytes)?;
-        let root = parse(&file, &text)?;
+        let mut root = parse(&file, &text)?;
+        let streams = Streams::of(&mut root);
         let buffers = root.buffers.iter().map(|_| OnceCell::new()).collect();
+        let views = root.buffer_views.iter().map(|_| OnceCell::new()).collect();
         let directory = path.parent().unwrap_or(Path::new("")).to_owned();
         let options = options.clone();
-        let document = Document { file, directory, options, root, binary, buffers };
+        let document =
+            Document { file, directory, options, root, binary, buffers, views, streams };
         document.check_version()?;
         document.check_extensions()?;
         Ok(document)
@@ -102,23 +112,19 @@ impl Document {
     }
 
     /// The error for an extension without which the file cannot be read.
-    pub(super) fn extension(&self, extension: &str) -> SceneError {
-        let remedy = match extension {
-            "KHR_draco_mesh_compression"
-            | "EXT_meshopt_compression"
-            | "KHR_meshopt_compression" => {
-                "it compresses the meshes and is not supported; export the scene again without mesh compression"
-            }
-            _ => {
-                "it is not supported, but the file says that nobody can read the scene without it; \
-                  export the scene again without it"
-            }
-        };
+    fn extension(&self, extension: &str) -> SceneError {
         SceneError::Extension {
             file: self.file.clone(),
             extension: extension.to_owned(),
-            remedy: remedy.to_owned(),
+            remedy: "it is not supported, but the file says that nobody can read the scene without it; \
+                     export the scene again without it"
+                .to_owned(),
         }
+    }
+
+    /// Bytes that something may need by itself, if there is a limit.
+    pub(super) fn limit_bytes(&self) -> Option<u64> {
+        self.options.max_memory_bytes
     }
 
     /// The bytes of a buffer, read when first asked for.
@@ -147,28 +153,39 @@ impl Document {
 
     /// The bytes of a buffer view and the stride it declares.
     pub(super) fn view(&self, index: usize) -> Result<(&[u8], Option<usize>), SceneError> {
-        let view = self
-            .root
-            .buffer_views
-            .get(index)
-            .ok_or_else(|| self.out_of_range("buffer view", index))?;
-        let compression = ["EXT_meshopt_compression", "KHR_meshopt_compression"]
-            .into_iter()
-            .find(|e| view.extensions.contains_key(*e));
-        let no_fallback =
-            self.root.buffers.get(view.buffer).is_some_and(|b| b.uri.is_none() && view.buffer > 0);
-        if let (Some(extension), true) = (compression, no_fallback) {
-            return Err(self.extension(extension));
+        let view = self.root.buffer_views.get(index);
+        let view = view.ok_or_else(|| self.out_of_range("buffer view", index))?;
+        if let Some(packed) = view.extensions.meshopt() {
+            let cell = &self.views[index];
+            let bytes = match cell.get() {
+                Some(bytes) => bytes,
+                None => {
+                    let bytes = self.decompressed(index, packed)?;
+                    cell.get_or_init(|| bytes)
+                }
+            };
+            return Ok((bytes, Some(packed.byte_stride)));
         }
-        let buffer = self.buffer(view.buffer)?;
-        let end = view.byte_offset.checked_add(view.byte_length).filter(|&end| end <= buffer.len());
+        let place = (view.byte_offset, view.byte_length);
+        Ok((self.slice(view.buffer, place, &format!("buffer view {index}"))?, view.byte_stride))
+    }
+
+    /// A part of a buffer, by offset and length; `owner` names whose it is.
+    pub(super) fn slice(
+        &self,
+        buffer: usize,
+        (offset, length): (usize, usize),
+        owner: &str,
+    ) -> Result<&[u8], SceneError> {
+        let bytes = self.buffer(buffer)?;
+        let end = offset.checked_add(length).filter(|&end| end <= bytes.len());
         let end = end.ok_or_else(|| {
-            let (offset, length, have) = (view.byte_offset, view.byte_length, buffer.len());
+            let have = bytes.len();
             self.malformed(format!(
-                "buffer view {index} reaches to byte {offset} + {length} of a buffer of {have} bytes"
+                "{owner} reaches to byte {offset} + {length} of a buffer of {have} bytes"
             ))
         })?;
-        Ok((&buffer[view.byte_offset..end], view.byte_stride))
+        Ok(&bytes[offset..end])
     }
 
     /// An error about an index that points nowhere.

@@ -138,7 +138,6 @@ fn soup<'a>(
         notes.push(note(Severity::Warning, "no-positions", mesh, 1, message));
         return Ok(None);
     };
-    check_compression(document, primitive, position)?;
     let points = morphed(document, primitive, position, weights, (mesh, &owner))?;
     let corners = match primitive.indices {
         Some(accessor) => document.indices(accessor, &owner)?,
@@ -201,20 +200,6 @@ fn morphed(
         }
     }
     Ok(points)
-}
-
-/// A compressed primitive can be read only if its plain numbers are there too.
-fn check_compression(
-    document: &Document,
-    primitive: &json::Primitive,
-    position: usize,
-) -> Result<(), SceneError> {
-    let draco = "KHR_draco_mesh_compression";
-    let plain = document.root.accessors.get(position).is_some_and(|a| a.buffer_view.is_some());
-    if primitive.extensions.contains_key(draco) && !plain {
-        return Err(document.extension(draco));
-    }
-    Ok(())
 }
 
 fn positions(

@@ -11,10 +11,14 @@ mod animation;
 mod base64;
 mod clock;
 mod document;
+mod draco;
 mod json;
 mod light;
 mod material;
 mod mesh;
+mod meshopt;
+#[cfg(test)]
+mod packed;
 mod tree;
 
 use document::Document;

@@ -8,6 +8,7 @@ mod broken;
 mod files;
 mod gltf;
 mod motion;
+mod packed;
 mod shipped;
 mod surfaces;
 

@@ -73,8 +73,7 @@ impl Document {
         let views = root.buffer_views.iter().map(|_| OnceCell::new()).collect();
         let directory = path.parent().unwrap_or(Path::new("")).to_owned();
         let options = options.clone();
-        let document =
-            Document { file, directory, options, root, binary, buffers, views, streams };
+        let document = Document { file, directory, options, root, binary, buffers, views, streams };
         document.check_version()?;
         document.check_extensions()?;
         Ok(document)
@@ -116,9 +115,10 @@ impl Document {
         SceneError::Extension {
             file: self.file.clone(),
             extension: extension.to_owned(),
-            remedy: "it is not supported, but the file says that nobody can read the scene without it; \
+            remedy:
+                "it is not supported, but the file says that nobody can read the scene without it; \
                      export the scene again without it"
-                .to_owned(),
+                    .to_owned(),
         }
     }
 

@@ -55,8 +55,10 @@ impl Streams {
         let json::Root { meshes, accessors, .. } = root;
         for primitive in meshes.iter_mut().flat_map(|mesh| &mut mesh.primitives) {
             let Some(draco) = primitive.extensions.draco.take() else { continue };
-            let plain = |index: &usize| accessors.get(*index).is_none_or(|a| a.buffer_view.is_some());
-            let attributes = || draco.attributes.keys().filter_map(|name| primitive.attributes.get(name));
+            let plain =
+                |index: &usize| accessors.get(*index).is_none_or(|a| a.buffer_view.is_some());
+            let attributes =
+                || draco.attributes.keys().filter_map(|name| primitive.attributes.get(name));
             if attributes().chain(&primitive.indices).all(plain) {
                 continue;
             }
@@ -125,7 +127,9 @@ impl Document {
             elements(attribute, count, normalized)
         });
         let wrong = || {
-            format!("{owner}: the compressed data in buffer view {view} has no attribute {id} of {N} numbers")
+            format!(
+                "{owner}: the compressed data in buffer view {view} has no attribute {id} of {N} numbers"
+            )
         };
         read.map(Some).ok_or_else(|| self.malformed(wrong()))
     }
@@ -148,7 +152,9 @@ impl Document {
             .decode(&mut DecoderBuffer::new(bytes).with_limits(limits), &mut mesh);
         if let Err(error) = decoded {
             let why = match error.kind() {
-                ErrorKind::LimitExceeded => "it holds more than can be solved, or than --max-memory allows",
+                ErrorKind::LimitExceeded => {
+                    "it holds more than can be solved, or than --max-memory allows"
+                }
                 _ => error.message(),
             };
             return Err(self.malformed(format!(

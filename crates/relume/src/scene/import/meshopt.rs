@@ -29,10 +29,10 @@ impl Document {
         packed: &json::Meshopt,
     ) -> Result<Vec<u8>, SceneError> {
         let what = format!("the compressed data of buffer view {index}");
-        let source =
-            self.slice(packed.buffer, (packed.byte_offset, packed.byte_length), &what)?;
+        let source = self.slice(packed.buffer, (packed.byte_offset, packed.byte_length), &what)?;
         let bytes = (packed.count as u64).saturating_mul(packed.byte_stride as u64);
-        let possible = (source.len() as u64).saturating_mul(EXPANSION_MAX).saturating_add(TAIL_BYTES);
+        let possible =
+            (source.len() as u64).saturating_mul(EXPANSION_MAX).saturating_add(TAIL_BYTES);
         if bytes > possible {
             return Err(self.malformed(format!(
                 "buffer view {index} declares {bytes} bytes, more than the {} compressed ones can hold",

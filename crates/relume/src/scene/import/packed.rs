@@ -33,8 +33,12 @@ fn holds_the_ring(file: &str, (around, across): (f64, f64), error: f64) {
     let document = open(file);
     let primitive = &document.root.meshes[0].primitives[0];
     let read = |name: &str| primitive.attributes[name];
-    let points: Vec<DVec3> =
-        document.numbers::<3>(read("POSITION"), file).unwrap().into_iter().map(DVec3::from).collect();
+    let points: Vec<DVec3> = document
+        .numbers::<3>(read("POSITION"), file)
+        .unwrap()
+        .into_iter()
+        .map(DVec3::from)
+        .collect();
     let colours = document.numbers::<4>(read("COLOR_0"), file).unwrap();
     let places: Vec<(f64, f64)> = colours
         .iter()
@@ -60,7 +64,11 @@ fn holds_the_ring(file: &str, (around, across): (f64, f64), error: f64) {
             t
         })
         .collect();
-    assert!(triangles.iter().all(|t| t[2].0 - t[0].0 == 1 && t.iter().all(|c| (c.1 - t[0].1).abs() <= 1)));
+    assert!(
+        triangles
+            .iter()
+            .all(|t| t[2].0 - t[0].0 == 1 && t.iter().all(|c| (c.1 - t[0].1).abs() <= 1))
+    );
     triangles.sort();
     triangles.dedup();
     assert_eq!(triangles.len(), (2.0 * around * across) as usize, "{file}");

@@ -38,7 +38,6 @@ pub(crate) fn failure(error: SceneError) -> Failure {
         | SceneError::Geometry { remedy, .. }
         | SceneError::Material { remedy, .. }
         | SceneError::Hierarchy { remedy, .. }
-        | SceneError::NotRigid { remedy, .. }
         | SceneError::Animation { remedy, .. }
         | SceneError::Empty { remedy, .. } => remedy,
     };

@@ -104,16 +104,6 @@ pub enum SceneError {
         /// What to do.
         remedy: String,
     },
-    /// A motion that changes an object's shape or size.
-    #[error("node `{node}` does not move rigidly: {what}; {remedy}")]
-    NotRigid {
-        /// The node's name.
-        node: String,
-        /// What the motion does.
-        what: String,
-        /// What to do.
-        remedy: String,
-    },
     /// Keyframes that make no sense, or an animation that is not there.
     #[error("animation `{animation}`: {what}; {remedy}")]
     Animation {

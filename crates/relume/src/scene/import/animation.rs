@@ -2,15 +2,18 @@
 //! materials and lights emit.
 //!
 //! All animations play together unless one is chosen by name: exporters such as Blender's write
-//! one for each object. Where two move the same property of a node, the first one wins, with a
-//! note. Scale keys that only switch between nothing and one size become presence; a size that
-//! changes otherwise is an error, because the object would not move rigidly.
+//! one for each object. Of those that move the same properties (a figure's walk and run) the first plays, and the others
+//! are listed. Scale keys that only switch between nothing and one size become presence; what changes its size otherwise
+//! is held at its first size, because it would not move rigidly.
+
+use std::collections::BTreeSet;
 
 use glam::{DQuat, DVec3};
 
 use super::clock::Keys;
 use super::document::Document;
 use super::{json, node_name, note};
+use crate::scene::rigid::check_track;
 use crate::scene::{Glow, Interpolation, Note, RotationTrack, SceneError, Severity, Track};
 
 /// How long a scale may take from nothing to full size and still count as a switch, seconds.
@@ -25,9 +28,9 @@ const SAME_SCALE: f64 = 1e-4;
 pub(super) struct Moves {
     pub(super) translation: Option<Track>,
     pub(super) rotation: Option<RotationTrack>,
-    /// The one scale of all keys, which replaces the node's.
+    /// The one scale of all keys, or the one that is held, which replaces the node's.
     pub(super) scale: Option<DVec3>,
-    /// How its scale changes, if it does: an error as soon as a mesh hangs below.
+    /// How its scale changes, if it does, and what becomes of it.
     pub(super) growth: Option<String>,
     /// The weights of its mesh's morph targets, where keys say that they never change.
     pub(super) weights: Option<Vec<f64>>,
@@ -103,20 +106,65 @@ pub(super) fn played(
         names: None,
         end_s: 0.0,
     };
-    let mut playing = Vec::new();
-    for (animation, name) in document.root.animations.iter().zip(&names) {
-        if chosen.is_none_or(|wanted| wanted == name) {
-            playing.push(name.clone());
-            for channel in &animation.channels {
-                Reader { document, animation, name }.channel(channel, &mut played, notes)?;
-            }
-        }
-        if chosen == Some(name) {
-            break;
+    let playing: Vec<usize> = match chosen {
+        Some(wanted) => names.iter().position(|n| n == wanted).into_iter().collect(),
+        None => first_of_each_kind(document, &names, notes),
+    };
+    for &index in &playing {
+        let (animation, name) = (&document.root.animations[index], &names[index]);
+        for channel in &animation.channels {
+            Reader { document, animation, name }.channel(channel, &mut played, notes)?;
         }
     }
+    let playing: Vec<&str> = playing.iter().map(|&index| names[index].as_str()).collect();
     played.names = (!playing.is_empty()).then(|| playing.join(", "));
     Ok(played)
+}
+
+/// The first of each set of animations that have nothing to do with the others, with a note that lists the rest.
+fn first_of_each_kind(document: &Document, names: &[String], notes: &mut Vec<Note>) -> Vec<usize> {
+    let mut kinds: Vec<(usize, BTreeSet<String>)> = Vec::new();
+    let mut silent = 0;
+    for (index, animation) in document.root.animations.iter().enumerate() {
+        let mut first = index;
+        let mut moved: BTreeSet<String> =
+            animation.channels.iter().filter_map(moved_property).collect();
+        kinds.retain(|(other, of_other)| {
+            let alike = !of_other.is_disjoint(&moved);
+            if alike {
+                first = first.min(*other);
+                moved.extend(of_other.iter().cloned());
+            }
+            !alike
+        });
+        silent += usize::from(moved.is_empty());
+        kinds.push((first, moved));
+    }
+    let mut playing: Vec<usize> = kinds.into_iter().map(|kind| kind.0).collect();
+    playing.sort_unstable();
+    let others: Vec<&str> = (0..names.len())
+        .filter(|index| !playing.contains(index))
+        .map(|index| names[index].as_str())
+        .collect();
+    if let (Some(&first), false) = (playing.first(), others.is_empty()) {
+        let message = format!(
+            "{} of {} animations are not played, because others move the same objects: {}; choose one by name",
+            others.len(),
+            names.len() - silent,
+            others.join(", ")
+        );
+        notes.push(note(Severity::Info, "other-animations", &names[first], others.len(), message));
+    }
+    playing
+}
+
+/// What a channel changes, as a pointer.
+fn moved_property(channel: &json::Channel) -> Option<String> {
+    let target = &channel.target;
+    match (target.path.as_str(), &target.extensions.pointer) {
+        ("pointer", pointer) => pointer.as_ref().map(|p| p.pointer.clone()),
+        (path, _) => target.node.map(|node| format!("/nodes/{node}/{path}")),
+    }
 }
 
 fn name_of(index: usize, animation: &json::Animation) -> String {
@@ -158,7 +206,7 @@ impl Reader<'_> {
         let taken = match path {
             "translation" => of_node.translation.is_some(),
             "rotation" => of_node.rotation.is_some(),
-            "scale" => of_node.scale.is_some() || of_node.growth.is_some(),
+            "scale" => of_node.scale.is_some(),
             "weights" => of_node.weights.is_some() || of_node.morphs,
             other => {
                 let what = format!("node `{name}` has an unknown animated property `{other}`");
@@ -206,17 +254,18 @@ impl Reader<'_> {
                     notes.push(note(Severity::Warning, "morph", name, 1, message.to_owned()));
                 }
             }
-            _ => match switches(&keys, &self.vectors(output, name)?) {
-                Ok((scale, presence)) => {
-                    of_node.scale = Some(scale);
-                    if presence.iter().any(|k| !k.1) {
-                        let message = "its scale of 0 is taken as absence".to_owned();
-                        notes.push(note(Severity::Info, "presence", name, 1, message));
-                        of_node.presence = presence;
-                    }
+            _ => {
+                let values = self.vectors(output, name)?;
+                check_track(name, &keys.times_s, values.len(), interpolation)?;
+                let sizes = sizes(&keys, &values);
+                of_node.scale = Some(sizes.scale);
+                of_node.growth = sizes.growth;
+                if sizes.presence.iter().any(|k| !k.1) {
+                    let message = "its scale of 0 is taken as absence".to_owned();
+                    notes.push(note(Severity::Info, "presence", name, 1, message));
+                    of_node.presence = sizes.presence;
                 }
-                Err(growth) => of_node.growth = Some(growth),
-            },
+            }
         }
         Ok(())
     }
@@ -402,63 +451,87 @@ fn constant_weights(when: &Keys, values: &[f64]) -> Option<Vec<f64>> {
     }
 }
 
-/// The one size among scale keys, and when the node has it; or how the size changes otherwise.
-fn switches(when: &Keys, values: &[DVec3]) -> Result<(DVec3, Vec<(f64, bool)>), String> {
-    let (times_s, interpolation) = (&when.times_s, when.interpolation);
-    let per_key = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
-    if values.len() != times_s.len() * per_key {
-        return Err(format!(
-            "its scale has {} key times but {} values",
-            times_s.len(),
-            values.len()
-        ));
-    }
+/// What scale keys come to.
+struct Sizes {
+    /// The one size, or the one that is held.
+    scale: DVec3,
+    /// When there is anything of it.
+    presence: Vec<(f64, bool)>,
+    /// How the size changes, if it is not only switched.
+    growth: Option<String>,
+}
+
+/// The one size among scale keys, and when the node has it; or, of a size that changes otherwise, the first one, the
+/// largest if that is nothing.
+fn sizes(when: &Keys, values: &[DVec3]) -> Sizes {
+    let per_key = if when.interpolation == Interpolation::CubicSpline { 3 } else { 1 };
     let keys: Vec<DVec3> = values.chunks(per_key).map(|v| v[per_key / 2]).collect();
     let size = |v: &DVec3| v.abs().max_element();
     let larger = |best: DVec3, v: DVec3| if size(&v) > size(&best) { v } else { best };
     let full = keys.iter().copied().fold(DVec3::ZERO, larger);
     let present = |v: &DVec3| size(v) > SAME_SCALE * size(&full);
     let differs = |v: &DVec3| size(&(*v - full)) > SAME_SCALE * size(&full);
-    if let Some(v) = keys.iter().find(|v| present(v) && differs(v)) {
-        let (v, f) = (v.to_array(), full.to_array());
-        return Err(format!("its scale changes over time, from {v:?} to {f:?}"));
+    let other = keys.iter().find(|v| present(v) && differs(v));
+    let scale = if other.is_some() && present(&keys[0]) { keys[0] } else { full };
+    let shown: Vec<bool> = keys.iter().map(present).collect();
+    let (presence, slow) = switched(when, &shown);
+    let held = format!("it is held at the size {:?}", scale.to_array());
+    let growth = match (other, slow) {
+        (Some(_), _) => Some(format!("its scale changes over time: {held}")),
+        (None, Some((from_s, to_s))) => Some(format!(
+            "it grows or shrinks between {from_s} s and {to_s} s: {held}, from halfway on or till then"
+        )),
+        (None, None) => None,
+    };
+    Sizes { scale, presence, growth }
+}
+
+/// When what is shown at these keys is there, and between which keys it slowly becomes so or ceases to be.
+fn switched(when: &Keys, shown: &[bool]) -> (Vec<(f64, bool)>, Option<(f64, f64)>) {
+    let (times_s, onsets_s) = (&when.times_s, when.onsets_s());
+    let mut presence = vec![(onsets_s[0], shown[0])];
+    let mut slow = None;
+    for k in (1..shown.len()).filter(|&k| shown[k] != shown[k - 1]) {
+        let (from_s, to_s) = (times_s[k - 1], times_s[k]);
+        let ramps = when.interpolation != Interpolation::Step && to_s - from_s > SWITCH_S;
+        presence.push((if ramps { 0.5 * (from_s + to_s) } else { onsets_s[k] }, shown[k]));
+        slow = slow.or(ramps.then_some((from_s, to_s)));
     }
-    let presence: Vec<(f64, bool)> =
-        times_s.iter().copied().zip(keys.iter().map(present)).collect();
-    let slow = presence.windows(2).find(|w| w[0].1 != w[1].1 && w[1].0 - w[0].0 > SWITCH_S);
-    if let (Some(w), true) = (slow, interpolation != Interpolation::Step) {
-        return Err(format!("it grows or shrinks between {} s and {} s", w[0].0, w[1].0));
-    }
-    let changes = |i: usize| i == 0 || presence[i].1 != presence[i - 1].1;
-    let onsets_s = when.onsets_s();
-    let switched = (0..presence.len()).filter(|&i| changes(i));
-    Ok((full, switched.map(|i| (onsets_s[i], presence[i].1)).collect()))
+    (presence, slow)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn keyed(keys: &[(f64, DVec3)], interpolation: Interpolation) -> Sizes {
+        let times: Vec<f64> = keys.iter().map(|k| k.0).collect();
+        let values: Vec<DVec3> = keys.iter().map(|k| k.1).collect();
+        sizes(&Keys::new("a", times, interpolation).unwrap(), &values)
+    }
+
     #[test]
-    fn scale_switches_are_presence_and_growth_is_refused() {
+    fn scale_switches_are_presence_and_growth_is_held() {
         let (o, s) = (DVec3::ZERO, DVec3::splat(2.0));
-        let step = |keys: &[(f64, DVec3)], interpolation| {
-            let times: Vec<f64> = keys.iter().map(|k| k.0).collect();
-            let values: Vec<DVec3> = keys.iter().map(|k| k.1).collect();
-            switches(&Keys::new("a", times, interpolation).unwrap(), &values)
-        };
         let blink = [(0.0, s), (1.0, o), (2.0, o), (3.0, s)];
-        let (scale, presence) = step(&blink, Interpolation::Step).unwrap();
-        assert_eq!(scale, s);
-        for (found, meant) in presence.iter().zip([(0.0, true), (1.0, false), (3.0, true)]) {
+        let stepped = keyed(&blink, Interpolation::Step);
+        assert_eq!((stepped.scale, stepped.growth), (s, None));
+        for (found, meant) in stepped.presence.iter().zip([(0.0, true), (1.0, false), (3.0, true)])
+        {
             assert!(found.1 == meant.1 && (found.0 - meant.0).abs() <= 1e-6 * meant.0);
         }
-        assert_eq!(presence.len(), 3);
-        let message = step(&blink, Interpolation::Linear).unwrap_err();
-        assert!(message.contains("between 0 s and 1 s"), "{message}");
-        assert!(step(&[(0.0, s), (1.0, s), (1.04, o)], Interpolation::Linear).is_ok());
-        let message = step(&[(0.0, s), (1.0, s * 1.5)], Interpolation::Step).unwrap_err();
-        assert!(message.contains("scale changes"), "{message}");
-        assert_eq!(step(&[(0.0, s)], Interpolation::Linear).unwrap().1, [(0.0, true)]);
+        assert_eq!(stepped.presence.len(), 3);
+        let ramped = keyed(&blink, Interpolation::Linear);
+        assert_eq!(ramped.presence, [(0.0, true), (0.5, false), (2.5, true)]);
+        assert!(ramped.growth.unwrap().contains("between 0 s and 1 s"));
+        assert!(keyed(&[(0.0, s), (1.0, s), (1.04, o)], Interpolation::Linear).growth.is_none());
+        let grown = keyed(&[(0.0, s), (1.0, s * 1.5)], Interpolation::Step);
+        assert_eq!((grown.scale, grown.presence), (s, vec![(0.0, true)]));
+        assert!(grown.growth.unwrap().contains("scale changes"));
+        // What is nothing at first is held at its largest.
+        let born = keyed(&[(0.0, o), (1.0, s), (2.0, s * 2.0)], Interpolation::Linear);
+        assert_eq!((born.scale, born.presence), (s * 2.0, vec![(0.0, false), (0.5, true)]));
+        assert_eq!(keyed(&[(0.0, s)], Interpolation::Linear).presence, [(0.0, true)]);
+        assert_eq!(keyed(&[(0.0, o)], Interpolation::Linear).scale, o);
     }
 }

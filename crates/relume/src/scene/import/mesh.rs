@@ -19,10 +19,10 @@ pub(super) struct Polygons {
 }
 
 /// A primitive before its triangles are merged.
-struct Soup<'a> {
+pub(super) struct Soup<'a> {
     primitive: &'a json::Primitive,
-    points: Vec<DVec3>,
-    triangles: Vec<[u32; 3]>,
+    pub(super) points: Vec<DVec3>,
+    pub(super) triangles: Vec<[u32; 3]>,
     owner: String,
 }
 
@@ -75,6 +75,18 @@ const STRAY_WEIGHT: f64 = 4e-3;
 
 /// The one joint that each vertex hangs on, if it is one.
 fn joints(document: &Document, soup: &Soup<'_>) -> Result<Vec<Option<usize>>, SceneError> {
+    let only = |vertex: &Vec<(usize, f64)>| {
+        let all: f64 = vertex.iter().map(|w| w.1.abs()).sum();
+        vertex.iter().find(|w| w.1 > 0.0 && w.1 >= (1.0 - STRAY_WEIGHT) * all).map(|w| w.0)
+    };
+    Ok(vertex_weights(document, soup)?.iter().map(only).collect())
+}
+
+/// The joints that each vertex hangs on, each once, and their weights as the file has them.
+pub(super) fn vertex_weights(
+    document: &Document,
+    soup: &Soup<'_>,
+) -> Result<Vec<Vec<(usize, f64)>>, SceneError> {
     let mut weights: Vec<Vec<(usize, f64)>> = vec![Vec::new(); soup.points.len()];
     for set in 0.. {
         let attribute = |name: &str| soup.primitive.attributes.get(&format!("{name}_{set}"));
@@ -93,15 +105,11 @@ fn joints(document: &Document, soup: &Soup<'_>) -> Result<Vec<Option<usize>>, Sc
             }
         }
     }
-    let only = |vertex: &Vec<(usize, f64)>| {
-        let all: f64 = vertex.iter().map(|w| w.1.abs()).sum();
-        vertex.iter().find(|w| w.1 > 0.0 && w.1 >= (1.0 - STRAY_WEIGHT) * all).map(|w| w.0)
-    };
-    Ok(weights.iter().map(only).collect())
+    Ok(weights)
 }
 
 /// The mesh's name and its primitives that have triangles.
-fn soups<'a>(
+pub(super) fn soups<'a>(
     document: &'a Document,
     index: usize,
     weights: &[f64],
@@ -163,7 +171,12 @@ fn soup<'a>(
 
 impl Soup<'_> {
     /// These triangles as polygons.
-    fn merged(&self, triangles: &[[u32; 3]], mesh: &str, notes: &mut Vec<Note>) -> Polygons {
+    pub(super) fn merged(
+        &self,
+        triangles: &[[u32; 3]],
+        mesh: &str,
+        notes: &mut Vec<Note>,
+    ) -> Polygons {
         let merged = merge(&self.points, triangles);
         if merged.degenerate > 0 {
             let message = format!(
@@ -209,14 +222,20 @@ fn positions(
 ) -> Result<Vec<DVec3>, SceneError> {
     let points: Vec<DVec3> =
         document.numbers::<3>(accessor, owner)?.into_iter().map(DVec3::from_array).collect();
-    if let Some((i, p)) = points.iter().enumerate().find(|(_, p)| !p.is_finite()) {
-        return Err(SceneError::Geometry {
+    check_places(&points, mesh)?;
+    Ok(points)
+}
+
+/// An error if a vertex is nowhere.
+pub(super) fn check_places(points: &[DVec3], mesh: &str) -> Result<(), SceneError> {
+    match points.iter().enumerate().find(|(_, p)| !p.is_finite()) {
+        None => Ok(()),
+        Some((i, p)) => Err(SceneError::Geometry {
             subject: format!("mesh `{mesh}`"),
             what: format!("vertex {i} is at ({}, {}, {}), which is no place", p.x, p.y, p.z),
             remedy: "repair the mesh and export it again".into(),
-        });
+        }),
     }
-    Ok(points)
 }
 
 /// Triangles of a list (4), strip (5) or fan (6).

@@ -19,6 +19,7 @@ mod mesh;
 mod meshopt;
 #[cfg(test)]
 mod packed;
+mod skin;
 mod tree;
 
 use document::Document;
@@ -30,7 +31,7 @@ use super::{Note, Scene, SceneError, Severity, view3d};
 #[derive(Clone, Debug, Default)]
 pub struct ImportOptions {
     /// Name of the one animation to play; `None` plays all together, as exporters that write one
-    /// for each object mean it.
+    /// for each object mean it, but of those that move the same properties the first alone.
     pub animation: Option<String>,
     /// Whether buffers and images may be anywhere: outside the file's folder, and devices or pipes.
     pub allow_outside: bool,
@@ -50,12 +51,12 @@ pub struct ImportOptions {
 /// converted ([`super::Light::conversion`]). Emissions and visibility may be animated
 /// (KHR_animation_pointer). Extensions without effect on diffuse light are
 /// ignored; what is read otherwise than the file says is in [`Scene::notes`]. Skins whose triangles hang on one
-/// joint each move with their joints; other skins and moving morph targets are read in their rest shape,
-/// with a warning that names the node. Only files in the scene's own folder and below are opened,
+/// joint each move with their joints; other skins are held in their pose at the start, moving morph targets in their
+/// rest shape, and scales that change at their first size, each with a warning that names the node. Only files in the scene's own folder and below are opened,
 /// unless [`ImportOptions::allow_outside`] says otherwise.
 ///
 /// # Errors
-/// A file that is missing, damaged or needs what is not supported, a motion that is not rigid, a
+/// A file that is missing, damaged or needs what is not supported, a
 /// scene without polygons: each names the file, node or mesh, and the remedy.
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError> {
     if view3d::is_view3d(path) {

@@ -34,6 +34,7 @@ pub(crate) fn failure(error: SceneError) -> Failure {
         | SceneError::Outside { remedy, .. }
         | SceneError::TooLarge { remedy, .. }
         | SceneError::View3d { remedy, .. }
+        | SceneError::Mesh { remedy, .. }
         | SceneError::Extension { remedy, .. }
         | SceneError::Geometry { remedy, .. }
         | SceneError::Material { remedy, .. }

@@ -64,6 +64,18 @@ pub enum SceneError {
         /// What to do.
         remedy: String,
     },
+    /// A file of meshes that is damaged or too large.
+    #[error("`{file}` is not a valid {format} file: {what}; {remedy}")]
+    Mesh {
+        /// The file.
+        file: String,
+        /// OBJ, STL or PLY.
+        format: &'static str,
+        /// What is wrong, and where.
+        what: String,
+        /// What to do.
+        remedy: String,
+    },
     /// The file needs an extension that is not supported.
     #[error("`{file}` needs the extension {extension}: {remedy}")]
     Extension {

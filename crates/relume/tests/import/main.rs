@@ -7,6 +7,7 @@
 mod broken;
 mod files;
 mod gltf;
+mod meshes;
 mod motion;
 mod packed;
 mod shipped;

@@ -125,6 +125,28 @@ const MTL: &str =
     "newmtl red\nKd 0.8 0.1 1.0\nmap_Kd wood.png\nd 0.5\nnewmtl light\nKe 4 2 0\nKd 0.2 0.2 0.2\n";
 
 #[test]
+fn ply_with_other_ends_of_lines_and_more_space() {
+    for format in ["ascii", "binary_little_endian"] {
+        let plain = ply(format);
+        let body = plain.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+        for end in ["\r", "\r\n"] {
+            let again = |bytes: &[u8]| {
+                String::from_utf8(bytes.to_vec()).unwrap().replace('\n', end).into_bytes()
+            };
+            let text = again(&plain[..body]);
+            let rest =
+                if format == "ascii" { again(&plain[body..]) } else { plain[body..].to_vec() };
+            is_the_cube(&scene_of("cube.ply", &[text, rest].concat()).unwrap());
+        }
+        let text = String::from_utf8(plain[..body].to_vec()).unwrap();
+        let text = text
+            .replace("element face", "\t element  \tface")
+            .replace("property float", "property   float");
+        is_the_cube(&scene_of("cube.ply", &[text.as_bytes(), &plain[body..]].concat()).unwrap());
+    }
+}
+
+#[test]
 fn obj_with_objects_groups_and_materials() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("room.obj");

@@ -50,7 +50,11 @@ fn all_animations_play_unless_one_is_chosen() {
     let all = scene_of(&g).unwrap();
     assert_eq!((at(&all, 1.0), all.moves(BodyId(1)), all.motion.duration_s), (DVec3::X, true, 2.0));
     let others = with_code(&all.notes, "other-animations");
-    assert!(others.len() == 1 && others[0].message.contains(": again;"), "{:?}", all.notes);
+    assert!(
+        others.len() == 1 && others[0].message.contains("1 others do not: again;"),
+        "{:?}",
+        all.notes
+    );
     let again = choose("again").unwrap();
     assert_eq!((at(&again, 1.0), again.moves(BodyId(1))), (DVec3::Z * 5.0, false));
     let message = choose("none such").unwrap_err().to_string();
@@ -454,7 +458,11 @@ fn of_animations_of_the_same_things_the_first_plays_and_the_others_are_listed() 
     assert_eq!([0, 1, 2].map(|b| scene.moves(BodyId(b))), [true, false, true]);
     assert_eq!(scene.pose(BodyId(0), 1.0).unwrap().rotation, glam::DMat3::IDENTITY);
     let listed = with_code(&scene.notes, "other-animations");
-    assert!(listed.len() == 1 && listed[0].message.contains("wave, run"), "{:?}", scene.notes);
+    assert!(
+        listed.len() == 1 && listed[0].message.contains("2 others do not: wave, run"),
+        "{:?}",
+        scene.notes
+    );
 }
 
 #[test]

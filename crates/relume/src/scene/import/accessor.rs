@@ -79,9 +79,7 @@ impl Document {
                 .malformed(format!("{owner}: accessor {index} should be {wanted} but is {kind}")));
         }
         let component = self.component(accessor.component_type, index)?;
-        let bytes = (accessor.count as u64).saturating_mul(size_of::<[f64; N]>() as u64);
-        self.fits(format_args!("accessor {index} of {owner}"), bytes)?;
-        let mut values = match (self.from_stream(index, owner)?, accessor.buffer_view) {
+        let mut values = match (self.streamed(index, owner)?, accessor.buffer_view) {
             (Some(stored), _) => stored,
             (None, Some(_)) => self.dense(accessor, index, component, owner)?,
             (None, None) if accessor.count > LARGEST_COUNT => {
@@ -90,7 +88,10 @@ impl Document {
                     "{owner}: accessor {index} declares {count} elements without data, more than {LARGEST_COUNT}"
                 )));
             }
-            (None, None) => vec![[0.0; N]; accessor.count],
+            (None, None) => {
+                self.numbers_fit::<N>(accessor.count, index, owner)?;
+                vec![[0.0; N]; accessor.count]
+            }
         };
         self.apply_sparse(accessor, index, component, owner, &mut values)?;
         Ok(values)
@@ -109,6 +110,17 @@ impl Document {
             )));
         }
         Ok(self.numbers::<1>(index, owner)?.into_iter().map(|[v]| v as u32).collect())
+    }
+
+    /// An error if so many elements need more memory than is allowed.
+    pub(super) fn numbers_fit<const N: usize>(
+        &self,
+        count: usize,
+        index: usize,
+        owner: &str,
+    ) -> Result<(), SceneError> {
+        let bytes = (count as u64).saturating_mul(size_of::<[f64; N]>() as u64);
+        self.fits(format_args!("accessor {index} of {owner}"), bytes)
     }
 
     fn no_accessor(&self, index: usize, owner: &str) -> SceneError {
@@ -130,6 +142,11 @@ impl Document {
     ) -> Result<Vec<[f64; N]>, SceneError> {
         let (bytes, stride) = self.view(accessor.buffer_view.unwrap_or_default())?;
         let stride = stride.filter(|&s| s > 0).unwrap_or(N * component.size());
+        // What cannot be there is damage, however little memory is allowed.
+        if accessor.count > bytes.len() {
+            return Err(self.too_short(index, owner, accessor.count, bytes.len()));
+        }
+        self.numbers_fit::<N>(accessor.count, index, owner)?;
         let read = elements(
             bytes,
             accessor.byte_offset,

@@ -8,7 +8,8 @@ use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 use draco_core::{
-    DataType, DecodeLimits, DecoderBuffer, ErrorKind, Mesh, MeshDecoder, PointAttribute, PointIndex,
+    DataType, DecodeLimits, DecoderBuffer, DracoError, ErrorKind, Mesh, MeshDecoder,
+    PointAttribute, PointIndex,
 };
 
 use super::accessor::Component;
@@ -103,7 +104,7 @@ impl Streams {
 
 impl Document {
     /// The elements of an accessor that are in a compressed stream, if they are.
-    pub(super) fn from_stream<const N: usize>(
+    pub(super) fn streamed<const N: usize>(
         &self,
         index: usize,
         owner: &str,
@@ -116,8 +117,7 @@ impl Document {
             Content::Attribute(_) => mesh.num_points(),
             Content::Corners => 3 * mesh.num_faces(),
         };
-        let bytes = (count as u64).saturating_mul(size_of::<[f64; N]>() as u64);
-        self.fits(format_args!("accessor {index} of {owner}"), bytes)?;
+        self.numbers_fit::<N>(count, index, owner)?;
         let Content::Attribute(id) = what else {
             let corners = mesh.faces().iter().flatten();
             return Ok(Some(corners.map(|corner| [f64::from(corner.0); N]).collect()));
@@ -150,18 +150,29 @@ impl Document {
         let mut mesh = Mesh::new();
         let decoded = MeshDecoder::new()
             .decode(&mut DecoderBuffer::new(bytes).with_limits(limits), &mut mesh);
-        if let Err(error) = decoded {
-            let why = match error.kind() {
-                ErrorKind::LimitExceeded => {
-                    "it holds more than can be solved, or than --max-memory allows"
-                }
-                _ => error.message(),
-            };
-            return Err(self.malformed(format!(
-                "{owner}: the compressed data in buffer view {view} cannot be read: {why}"
-            )));
+        match decoded {
+            Ok(()) => Ok(cell.get_or_init(|| mesh)),
+            Err(error) => Err(self.undecoded(&error, view, owner, bytes_max)),
         }
-        Ok(cell.get_or_init(|| mesh))
+    }
+
+    /// Why a stream is not decoded.
+    fn undecoded(
+        &self,
+        error: &DracoError,
+        view: usize,
+        owner: &str,
+        bytes_max: u64,
+    ) -> SceneError {
+        let what = format!("{owner}: the compressed data in buffer view {view}");
+        if error.kind() != ErrorKind::LimitExceeded {
+            return self.malformed(format!("{what} cannot be read: {}", error.message()));
+        }
+        // How much more it needs is not known.
+        match self.fits(&what, bytes_max + 1) {
+            Err(too_large) => too_large,
+            Ok(()) => self.malformed(format!("{what} holds more than can be solved")),
+        }
     }
 }
 

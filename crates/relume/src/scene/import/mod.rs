@@ -19,6 +19,7 @@ mod mesh;
 mod meshopt;
 #[cfg(test)]
 mod packed;
+mod sizes;
 mod skin;
 mod tree;
 

@@ -76,6 +76,7 @@ impl PropertyAccess for Other {
 
 pub(super) fn read(bytes: &[u8], stem: &str, folder: &Folder) -> Result<Contents, SceneError> {
     let wrong = |what: &dyn std::fmt::Display| damaged(folder, Format::Ply, first_line(what));
+    let bytes = &plain_lines(bytes)[..];
     let mut reader = Reader::new(Cursor::new(bytes));
     let header = Parser::<Other>::new().read_header(&mut reader).map_err(|e| wrong(&e))?;
     let (mut points, mut faces, mut unused) = (Vec::new(), Vec::new(), Vec::new());
@@ -118,6 +119,38 @@ pub(super) fn read(bytes: &[u8], stem: &str, folder: &Folder) -> Result<Contents
     let parts = vec![Part { material: None, points, triangles }];
     contents.objects = vec![Object { name: stem.to_owned(), parts }];
     Ok(contents)
+}
+
+/// The file with a header, and a body if that is text, whose lines end with line feeds and have single spaces:
+/// programs also write carriage returns, alone or before line feeds, and tabs.
+fn plain_lines(bytes: &[u8]) -> Vec<u8> {
+    const LAST: &[u8] = b"end_header";
+    let last = bytes.windows(LAST.len()).position(|w| w == LAST);
+    let (Some(last), Some(b"ply\r")) = (last, bytes.get(..4)) else {
+        return single_spaces(bytes, last.unwrap_or(0));
+    };
+    let both = bytes.get(4) == Some(&b'\n');
+    let end = (last + LAST.len() + 1 + usize::from(both)).min(bytes.len());
+    let is_text = bytes[..end].windows(5).any(|w| w == b"ascii");
+    let ended = |part: &[u8]| match both {
+        true => part.iter().copied().filter(|&b| b != b'\r').collect::<Vec<u8>>(),
+        false => part.iter().map(|&b| if b == b'\r' { b'\n' } else { b }).collect(),
+    };
+    let body = if is_text { ended(&bytes[end..]) } else { bytes[end..].to_vec() };
+    let header = ended(&bytes[..end]);
+    let last = header.len().saturating_sub(LAST.len() + 1);
+    single_spaces(&[header, body].concat(), last)
+}
+
+/// The same with single spaces between the words of its first `header` bytes, and none around its lines.
+fn single_spaces(bytes: &[u8], header: usize) -> Vec<u8> {
+    let (header, rest) = bytes.split_at(header.min(bytes.len()));
+    let words = |line: &[u8]| {
+        let words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        words.collect::<Vec<&[u8]>>().join(&b' ')
+    };
+    let lines: Vec<Vec<u8>> = header.split(|&b| b == b'\n').map(words).collect();
+    [&lines.join(&b'\n'), rest].concat()
 }
 
 /// The parser's messages show the line that it could not read below.

@@ -67,7 +67,7 @@ fn stl_in_text_and_in_both_guises_of_binary() {
     is_the_cube(&scene_of("cube.stl", stl_text().as_bytes()).unwrap());
     is_the_cube(&scene_of("cube.STL", &stl_binary(b"made by hand")).unwrap());
     is_the_cube(
-        &scene_of("cube.stl", &stl_binary(b"solid cube made by a program that does not care"))
+        &scene_of("cube.stl", &stl_binary(b"solid cube\nmade by a program that does not care"))
             .unwrap(),
     );
 }

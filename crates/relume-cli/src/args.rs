@@ -261,7 +261,7 @@ pub(crate) enum DemoScene {
 /// `relume render`
 #[derive(Debug, Args)]
 pub(crate) struct RenderArgs {
-    /// The scene, a .glb or .gltf file.
+    /// The scene, a .glb or .gltf file (or .obj, .stl, .ply, .vs3).
     #[arg(value_name = "SCENE")]
     pub(crate) scene: PathBuf,
     /// Directory for the pictures and report.json; made if missing. Give each task of a job array
@@ -277,7 +277,7 @@ pub(crate) struct RenderArgs {
 /// `relume solve`
 #[derive(Debug, Args)]
 pub(crate) struct SolveArgs {
-    /// The scene, a .glb or .gltf file.
+    /// The scene, a .glb or .gltf file (or .obj, .stl, .ply, .vs3).
     #[arg(value_name = "SCENE")]
     pub(crate) scene: PathBuf,
     /// Directory for report.json; made if missing.
@@ -416,7 +416,7 @@ impl FactorFormat {
 /// `relume info`
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// The scene, a .glb or .gltf file.
+    /// The scene, a .glb or .gltf file (or .obj, .stl, .ply, .vs3).
     #[arg(value_name = "SCENE")]
     pub(crate) scene: PathBuf,
     #[command(flatten)]
@@ -424,12 +424,15 @@ pub(crate) struct InfoArgs {
     /// Frames a second at which the animation's frames are counted.
     #[arg(long, value_name = "FPS", default_value = "24", value_parser = parse_fps)]
     pub(crate) fps: f64,
+    /// Print every note, also where many are of one kind.
+    #[arg(long)]
+    pub(crate) verbose: bool,
 }
 
 /// `relume check`
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
-    /// The scene, a .glb or .gltf file.
+    /// The scene, a .glb or .gltf file (or .obj, .stl, .ply, .vs3).
     #[arg(value_name = "SCENE")]
     pub(crate) scene: PathBuf,
     #[command(flatten)]
@@ -442,7 +445,8 @@ pub(crate) struct CheckArgs {
 /// Which animation plays, and what a scene may be read from.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct AnimationFlag {
-    /// Name of the animation to play; all of them together if left out.
+    /// Name of the animation to play; if left out all of them together, but of those that move the same things the
+    /// first alone.
     #[arg(long = "animation", value_name = "NAME")]
     pub(crate) name: Option<String>,
     /// Read buffers and images of a glTF file wherever they are: outside its folder, devices, pipes.
@@ -478,6 +482,9 @@ pub(crate) struct ClipFlags {
     /// No progress bar, no warnings, no summary; errors only.
     #[arg(short, long)]
     pub(crate) quiet: bool,
+    /// Print every warning, also where many are of one kind.
+    #[arg(long)]
+    pub(crate) verbose: bool,
 }
 
 impl Default for ClipFlags {
@@ -490,6 +497,7 @@ impl Default for ClipFlags {
             oracle: OracleFlag::Error,
             threads: None,
             quiet: false,
+            verbose: false,
         }
     }
 }
@@ -534,7 +542,7 @@ pub(crate) struct SolveFlags {
 /// A scene file, or a demonstration instead.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct SourceFlags {
-    /// The scene, a .glb or .gltf file.
+    /// The scene, a .glb or .gltf file (or .obj, .stl, .ply, .vs3).
     #[arg(value_name = "SCENE", required_unless_present = "demo", conflicts_with = "demo")]
     pub(crate) scene: Option<PathBuf>,
     /// Instead of a file, a scene that ships with relume, at its own tolerance by default.

@@ -1,12 +1,12 @@
 //! `relume check`: what is wrong with a scene, and what to do about it.
 
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
 
 use relume::scene::{self, Note, Scene, Severity};
 
 use crate::args::CheckArgs;
 use crate::failure::Failure;
+use crate::notes;
 use crate::output::{self, counted};
 use crate::scene_file;
 
@@ -48,25 +48,10 @@ fn count_of(notes: &[Note], severity: Severity) -> usize {
     notes.iter().filter(|note| note.severity == severity).count()
 }
 
-/// Findings of one kind that are printed one by one.
-const SHOWN: usize = 5;
-
-/// The findings as text, a line each, and the count of them.
-///
-/// Of more than [`SHOWN`] of one kind the rest is one line, unless all are asked for.
+/// The findings as text, a line each or one for many of a kind, and the count of them.
 fn text(name: &str, notes: &[Note], verbose: bool) -> String {
-    let mut text = String::new();
-    let mut kinds: BTreeMap<(Reverse<Severity>, &str), Vec<&Note>> = BTreeMap::new();
-    for note in notes {
-        kinds.entry((Reverse(note.severity), note.code)).or_default().push(note);
-    }
-    for ((_, code), alike) in kinds {
-        let shown = if verbose || alike.len() <= SHOWN { alike.len() } else { SHOWN - 1 };
-        alike[..shown].iter().for_each(|note| text += &(scene_file::line(note) + "\n"));
-        if shown < alike.len() {
-            text += &format!("  and {} more [{code}] (--verbose lists all)\n", alike.len() - shown);
-        }
-    }
+    let lines = notes::lines(notes, verbose);
+    let mut text: String = lines.iter().map(|line| format!("{line}\n")).collect();
     let name = output::name(name);
     let (errors, warnings) = (count_of(notes, Severity::Error), count_of(notes, Severity::Warning));
     text += &match (errors, warnings) {
@@ -108,8 +93,8 @@ mod tests {
     fn many_findings_of_one_kind_are_one_line() {
         let notes = vec![note(Severity::Warning, 1); 100];
         let folded = text("room", &notes, false);
-        assert_eq!(folded.lines().count(), 6, "{folded}");
-        assert!(folded.contains("and 96 more [open]"), "{folded}");
+        assert_eq!(folded.lines().count(), 2, "{folded}");
+        assert!(folded.contains("warning[open] (100 of this kind"), "{folded}");
         assert_eq!(text("room", &notes, true).lines().count(), 101);
     }
 }

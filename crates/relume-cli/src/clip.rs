@@ -141,7 +141,7 @@ impl Clip {
     /// Says on stderr what is doubtful about the scene, unless the user wants quiet.
     pub(crate) fn warn(&self) {
         if !self.flags.quiet {
-            scene_file::warn(&self.scene);
+            scene_file::warn(&self.scene, self.flags.verbose);
         }
     }
 

@@ -13,6 +13,7 @@ use crate::args::{By, ClosureFlag, FactorFormat, FactorsArgs};
 use crate::clip::{Clip, TOLERANCE, now, step_failure};
 use crate::failure::Failure;
 use crate::interrupt;
+use crate::notes;
 use crate::output::{self, Sink, count, counted};
 use crate::progress::Progress;
 use crate::scene_file;
@@ -34,7 +35,7 @@ pub(crate) fn factors(args: &FactorsArgs) -> Result<(), Failure> {
     let grouping = grouping(&clip.scene, args.by);
     let things = Things { environment: environment(&grouping), grouping };
     if !args.clip.quiet {
-        say(&clip.scene, &things, args.by);
+        say(&clip.scene, &things, args.by, args.clip.verbose);
     }
     if let Some(path) = &args.report {
         probe(path).map_err(|error| Failure::write(path, &error))?;
@@ -134,11 +135,12 @@ fn judge(args: &FactorsArgs, format: FactorFormat, clip: &Clip) -> Result<(), Fa
 }
 
 /// Warnings about the scene, and names that were made unique.
-fn say(scene: &Scene, things: &Things, by: By) {
-    scene_file::warn_but_for(scene, &["nothing-emits", "light-lost"]);
+fn say(scene: &Scene, things: &Things, by: By, verbose: bool) {
+    scene_file::warn_but_for(scene, verbose, &["nothing-emits", "light-lost"]);
     if by != By::Body || things.environment != ENVIRONMENT {
-        let renamed = scene.notes.iter().filter(|note| note.code == "renamed");
-        renamed.for_each(|note| output::complain(&scene_file::line(note)));
+        let renamed = scene.notes.iter().filter(|note| note.code == "renamed").cloned();
+        let renamed: Vec<_> = renamed.collect();
+        notes::lines(&renamed, verbose).iter().for_each(|line| output::complain(line));
     }
     if things.environment != ENVIRONMENT {
         output::complain(&format!(

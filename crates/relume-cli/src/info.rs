@@ -9,18 +9,19 @@ use relume::scene::{
 use crate::args::InfoArgs;
 use crate::failure::Failure;
 use crate::frames;
+use crate::notes;
 use crate::output::{self, counted};
 use crate::scene_file;
 
 /// Runs the command.
 pub(crate) fn info(args: &InfoArgs) -> Result<(), Failure> {
     let scene = scene_file::load(&args.scene, &args.animation, false)?;
-    let text = describe(&scene, args.fps)?;
+    let text = describe(&scene, args.fps, args.verbose)?;
     output::print(&text)
 }
 
 /// The whole text.
-fn describe(scene: &Scene, fps: f64) -> Result<String, Failure> {
+fn describe(scene: &Scene, fps: f64, verbose: bool) -> Result<String, Failure> {
     let count = frames::frame_count(scene.motion.duration_s, fps).map_err(Failure::new)?;
     let mut text = String::new();
     let written = (|| -> fmt::Result {
@@ -31,7 +32,7 @@ fn describe(scene: &Scene, fps: f64) -> Result<String, Failure> {
         emitters(&mut text, scene)?;
         lights(&mut text, scene)?;
         cameras(&mut text, scene)?;
-        notes(&mut text, scene)
+        notes(&mut text, scene, verbose)
     })();
     written.map_err(|error| Failure::new(format_args!("cannot describe the scene: {error}")))?;
     Ok(text)
@@ -196,12 +197,12 @@ fn cameras(out: &mut String, scene: &Scene) -> fmt::Result {
     Ok(())
 }
 
-fn notes(out: &mut String, scene: &Scene) -> fmt::Result {
+fn notes(out: &mut String, scene: &Scene, verbose: bool) -> fmt::Result {
     if scene.notes.is_empty() {
         return Ok(());
     }
     writeln!(out, "\nnotes")?;
-    scene.notes.iter().try_for_each(|note| writeln!(out, "  {}", scene_file::line(note)))
+    notes::lines(&scene.notes, verbose).iter().try_for_each(|line| writeln!(out, "  {line}"))
 }
 
 /// Four significant digits, no exponent for numbers of everyday size.
@@ -255,7 +256,7 @@ mod tests {
     #[test]
     fn the_room_is_described() {
         let scene = (demo(DemoScene::Room).build)().unwrap();
-        let text = describe(&scene, 24.0).unwrap();
+        let text = describe(&scene, 24.0, false).unwrap();
         for line in [
             "scene      room",
             "content    7 bodies, 7 surfaces, 7 patches, 54.49 m2",

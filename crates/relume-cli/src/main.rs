@@ -15,6 +15,7 @@ mod info;
 mod interrupt;
 mod lock;
 mod memory;
+mod notes;
 mod output;
 mod paper;
 mod probe;

@@ -8,6 +8,7 @@ use relume::scene::{ImportOptions, Note, Scene, SceneError, Severity, check, imp
 use crate::args::AnimationFlag;
 use crate::failure::Failure;
 use crate::memory;
+use crate::notes;
 use crate::output;
 
 /// Reads a scene; with its images, if it is for pictures.
@@ -38,11 +39,11 @@ pub(crate) fn failure(error: SceneError) -> Failure {
         | SceneError::Outside { remedy, .. }
         | SceneError::TooLarge { remedy, .. }
         | SceneError::View3d { remedy, .. }
+        | SceneError::Mesh { remedy, .. }
         | SceneError::Extension { remedy, .. }
         | SceneError::Geometry { remedy, .. }
         | SceneError::Material { remedy, .. }
         | SceneError::Hierarchy { remedy, .. }
-        | SceneError::NotRigid { remedy, .. }
         | SceneError::Animation { remedy, .. }
         | SceneError::Empty { remedy, .. } => remedy,
     };
@@ -57,38 +58,22 @@ pub(crate) fn failure(error: SceneError) -> Failure {
 /// Says on stderr, before a scene is solved, what was noticed while reading, unless it is merely
 /// worth knowing, and what `relume check` would call an error, an overlap or a
 /// light that lights nothing.
-pub(crate) fn warn(scene: &Scene) {
-    warn_but_for(scene, &[]);
+pub(crate) fn warn(scene: &Scene, verbose: bool) {
+    warn_but_for(scene, verbose, &[]);
 }
 
 /// What `relume check` finds that is said before a scene is solved, errors aside.
 const SAID_BEFORE: [&str; 2] = ["overlap", "light-lost"];
 
 /// The same but for some codes that do not matter for what is to be done.
-pub(crate) fn warn_but_for(scene: &Scene, codes: &[&str]) {
+pub(crate) fn warn_but_for(scene: &Scene, verbose: bool, codes: &[&str]) {
     let read = scene.notes.iter().filter(|note| note.severity > Severity::Info).cloned();
     let found = check(scene)
         .into_iter()
         .filter(|note| note.severity > Severity::Info)
         .filter(|note| note.severity == Severity::Error || SAID_BEFORE.contains(&note.code));
-    for note in read.chain(found).filter(|note| !codes.contains(&note.code)) {
-        // The run goes on, so it is no more than a warning here.
-        output::complain(&line(&Note { severity: Severity::Warning, ..note }));
-    }
-}
-
-/// One line about a note: severity, subject, message.
-pub(crate) fn line(note: &Note) -> String {
-    let severity = match note.severity {
-        Severity::Info => "note",
-        Severity::Warning => "warning",
-        Severity::Error => "error",
-    };
-    let count = if note.count > 1 { format!(" ({} x)", note.count) } else { String::new() };
-    let subject = if note.subject.is_empty() {
-        String::new()
-    } else {
-        format!("{}: ", output::name(&note.subject))
-    };
-    output::one_line(&format!("{severity}[{}]: {subject}{}{count}", note.code, note.message))
+    // The run goes on, so it is no more than a warning here.
+    let said = read.chain(found).filter(|note| !codes.contains(&note.code));
+    let said: Vec<Note> = said.map(|note| Note { severity: Severity::Warning, ..note }).collect();
+    notes::lines(&said, verbose).iter().for_each(|line| output::complain(line));
 }

@@ -13,3 +13,10 @@ pub(crate) fn pack(json: &Value, bin: &[u8]) -> Vec<u8> {
     let head = [&b"glTF"[..], &word(2), &total, &word(text.len()), b"JSON"].concat();
     [&head[..], &text, &word(bin.len()), b"BIN\0", &bin].concat()
 }
+
+/// The JSON and the bytes of a file that is right.
+pub(crate) fn unpack(file: &[u8]) -> (Value, Vec<u8>) {
+    let length = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().unwrap()) as usize;
+    let (text, bin) = (length(12), 20 + length(12));
+    (serde_json::from_slice(&file[20..20 + text]).unwrap(), file[bin + 8..][..length(bin)].to_vec())
+}

@@ -33,6 +33,10 @@ fn commands(format: Format, random: &mut Random) -> Vec<Vec<String>> {
             3..=4 => vec![of("check FILE")],
             _ => vec![of("info FILE")],
         },
+        Format::Obj | Format::Stl | Format::Ply => match random.below(3) {
+            0 => vec![of("info FILE"), of(&format!("factors FILE {coarse}"))],
+            _ => vec![of("info FILE")],
+        },
         Format::View3d => match random.below(4) {
             0 => vec![of("info FILE"), of(&format!("factors FILE {coarse}"))],
             _ => vec![of("check FILE")],

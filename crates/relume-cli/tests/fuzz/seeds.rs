@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::glb::pack;
+use super::glb::{pack, unpack};
 
 /// The formats that are read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,6 +13,9 @@ pub(crate) enum Format {
     Flat,
     Svg,
     Sensors,
+    Obj,
+    Stl,
+    Ply,
 }
 
 impl Format {
@@ -24,6 +27,9 @@ impl Format {
             Format::Flat => "flat",
             Format::Svg => "svg",
             Format::Sensors => "txt",
+            Format::Obj => "obj",
+            Format::Stl => "stl",
+            Format::Ply => "ply",
         }
     }
 }
@@ -263,6 +269,22 @@ const SVG: &str = r#"<svg xmlns="http://www.w3.org/2000/svg" data-units-per-metr
 </svg>
 "#;
 
+const OBJ: &str = "mtllib missing.mtl\no floor\nv 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 0.5 0\nv 0 2 0\nusemtl red\nf 1 2 3 4 5\n\
+g lamp\nv 0 0 3\nv 1 0 3\nv 1 1 3\nv 0 1 3\nvt 0 1\nvn 0 0 1\nf -1/1/1 -2/1/1 -3/1/1 -4/1/1\nf 6//1 7//1 8//1\nl 1 2\np 1\n";
+
+const STL: &str = "solid roof\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0.5\nendloop\nendfacet\n\
+facet normal 0 0 1\nouter loop\nvertex 1 0 0\nvertex 1 1 1e-1\nvertex 0 1 0.5\nendloop\nendfacet\nendsolid roof\n";
+
+const PLY: &str = "ply\nformat ascii 1.0\ncomment roof\nelement vertex 5\nproperty float x\nproperty double y\nproperty int z\n\
+property uchar red\nelement face 2\nproperty list uchar int vertex_indices\nelement edge 1\nproperty list char float a\nend_header\n\
+0 0 0 1\n2 0 0 2\n2 2 0 3\n1 0.5 0 4\n0 2 1 5\n4 0 1 2 3\n3 0 3 4\n2 1.5 2\n";
+
+/// A ring whose mesh is stored compressed, from the tests of the reader.
+fn ring(name: &'static str, file: &[u8]) -> Seed {
+    let (json, bin) = unpack(file);
+    Seed { name, format: Format::Glb, content: Content::Tree { json, bin } }
+}
+
 /// All of them.
 pub(crate) fn all() -> Vec<Seed> {
     let tree = |name, format| {
@@ -280,5 +302,28 @@ pub(crate) fn all() -> Vec<Seed> {
         text("room.svg", Format::Svg, SVG),
         text("sensors", Format::Sensors, SENSORS),
         text("table of sensors", Format::Sensors, TABLE),
+        text("room.obj", Format::Obj, OBJ),
+        text("roof.stl", Format::Stl, STL),
+        text("roof.ply", Format::Ply, PLY),
+        ring(
+            "draco, in order",
+            include_bytes!("../../../relume/tests/data/packed/ring-draco-sequential.glb"),
+        ),
+        ring(
+            "draco, standard",
+            include_bytes!("../../../relume/tests/data/packed/ring-draco-standard.glb"),
+        ),
+        ring(
+            "draco, valence",
+            include_bytes!("../../../relume/tests/data/packed/ring-draco-valence.glb"),
+        ),
+        ring(
+            "meshopt, older",
+            include_bytes!("../../../relume/tests/data/packed/ring-meshopt-ext.glb"),
+        ),
+        ring(
+            "meshopt, newer",
+            include_bytes!("../../../relume/tests/data/packed/ring-meshopt-khr.glb"),
+        ),
     ]
 }

@@ -13,7 +13,7 @@ use super::draft::{Draft, DraftNode, DraftSurface};
 use super::flatten::{Flaw, flatten, seen_from_behind};
 use super::limits::{COORDINATE_MAX_M, EMISSION_MAX, EXTENT_MIN_M, SPECK, is_place};
 use super::names::Names;
-use super::rigid::{check_track, without_scales};
+use super::rigid::{Rigid, check_track, without_scales};
 use super::{
     Body, BodyId, Frame, Glow, Interpolation, Material, MaterialId, Motion, NodeId, Note, Patch,
     PatchId, Print, Scene, SceneError, Severity, Surface, SurfaceId, TintId,
@@ -28,10 +28,11 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
     start_glows(&mut draft);
     let mut notes = std::mem::take(&mut draft.notes);
     unique_names(&mut draft, &mut notes);
-    let (nodes, residuals) = without_scales(&draft)?;
+    let Rigid { nodes, residuals, held } = without_scales(&draft)?;
     let duration_s = duration_s(&draft);
     let motion = Motion { duration_s, nodes, animation: draft.animation.clone() };
     notes.extend(misdirected(&draft, &residuals));
+    notes.extend(held.into_iter().map(|node| held_note(&draft.nodes[node].name)));
     let mut parts = Parts::default();
     for (node, members) in bodies_of(&draft, &motion) {
         let first = parts.patches.len() as u32;
@@ -463,6 +464,18 @@ fn check_lights(draft: &Draft) -> Result<(), SceneError> {
         }
     }
     Ok(())
+}
+
+fn held_note(node: &str) -> Note {
+    Note {
+        severity: Severity::Warning,
+        code: "held-shape",
+        subject: node.to_owned(),
+        count: 1,
+        message: "it rotates below a parent of non-uniform scale, which would shear it in time: it keeps its shape \
+                  at the start; apply the parent's scale to its mesh"
+            .into(),
+    }
 }
 
 fn degenerate_note(surface: &str, count: usize) -> Note {

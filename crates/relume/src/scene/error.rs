@@ -64,6 +64,18 @@ pub enum SceneError {
         /// What to do.
         remedy: String,
     },
+    /// A file of meshes that is damaged or too large.
+    #[error("`{file}` is not a valid {format} file: {what}; {remedy}")]
+    Mesh {
+        /// The file.
+        file: String,
+        /// OBJ, STL or PLY.
+        format: &'static str,
+        /// What is wrong, and where.
+        what: String,
+        /// What to do.
+        remedy: String,
+    },
     /// The file needs an extension that is not supported.
     #[error("`{file}` needs the extension {extension}: {remedy}")]
     Extension {
@@ -100,16 +112,6 @@ pub enum SceneError {
         /// The node's name.
         node: String,
         /// What is wrong.
-        what: String,
-        /// What to do.
-        remedy: String,
-    },
-    /// A motion that changes an object's shape or size.
-    #[error("node `{node}` does not move rigidly: {what}; {remedy}")]
-    NotRigid {
-        /// The node's name.
-        node: String,
-        /// What the motion does.
         what: String,
         /// What to do.
         remedy: String,

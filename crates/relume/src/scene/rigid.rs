@@ -19,42 +19,44 @@ use super::{Interpolation, Node, NodeId, RotationTrack, SceneError, Track};
 /// from rounding, a tenth of a millimetre of a metre.
 pub(super) const UNEVEN: f64 = 1e-4;
 
-/// The rigid nodes of a draft (names as given) and each node's residual matrix.
-pub(super) fn without_scales(draft: &Draft) -> Result<(Vec<Node>, Vec<DMat3>), SceneError> {
+/// What is left of a draft's nodes without their scales.
+pub(super) struct Rigid {
+    /// Names as given.
+    pub(super) nodes: Vec<Node>,
+    /// What shapes the polygons of each node.
+    pub(super) residuals: Vec<DMat3>,
+    /// Nodes whose rotation would shear what is shown on them or below: it keeps the shape it has at the start.
+    pub(super) held: Vec<usize>,
+}
+
+/// The rigid nodes of a draft and each node's residual matrix.
+pub(super) fn without_scales(draft: &Draft) -> Result<Rigid, SceneError> {
     let mut nodes = Vec::with_capacity(draft.nodes.len());
     let mut residuals: Vec<DMat3> = Vec::with_capacity(draft.nodes.len());
-    // For each node the one at or above it that shears what hangs below.
-    let mut sheared: Vec<Option<usize>> = Vec::with_capacity(draft.nodes.len());
+    let mut shears = vec![false; draft.nodes.len()];
     for (index, node) in draft.nodes.iter().enumerate() {
         assert!(node.parent.is_none_or(|p| p < index), "parents come before children");
         let above = node.parent.map_or(DMat3::IDENTITY, |p| residuals[p]);
         let mut rigid = rigid_node(node, above)?;
-        let shears = match residual(node, &mut rigid, above)? {
-            Some(residual) => {
-                residuals.push(residual);
-                None
-            }
-            None => {
-                residuals.push(above * node.shape);
-                Some(index)
-            }
-        };
-        sheared.push(node.parent.and_then(|p| sheared[p]).or(shears));
-        let shows = node.surfaces.iter().any(|s| !s.polygons.is_empty());
-        if let (Some(by), true) = (sheared[index], shows) {
-            return Err(shear(&draft.nodes[by]));
-        }
+        let residual;
+        (residual, shears[index]) = residual_of(node, &mut rigid, above)?;
+        residuals.push(residual);
         nodes.push(rigid);
     }
-    Ok((nodes, residuals))
+    let held = held(draft, &shears);
+    Ok(Rigid { nodes, residuals, held })
 }
 
-fn shear(node: &DraftNode) -> SceneError {
-    SceneError::NotRigid {
-        node: node.name.clone(),
-        what: "it rotates below a parent of non-uniform scale, which would shear it in time".into(),
-        remedy: "apply the parent's scale to its mesh (in Blender: Object > Apply > Scale)".into(),
+/// The nodes that shear something that is shown.
+fn held(draft: &Draft, shears: &[bool]) -> Vec<usize> {
+    let mut shows: Vec<bool> =
+        draft.nodes.iter().map(|n| n.surfaces.iter().any(|s| !s.polygons.is_empty())).collect();
+    for (index, node) in draft.nodes.iter().enumerate().rev() {
+        if let (Some(parent), true) = (node.parent, shows[index]) {
+            shows[parent] = true;
+        }
     }
+    (0..shears.len()).filter(|&n| shears[n] && shows[n]).collect()
 }
 
 /// The node without its scale, below a parent of residual `above`; constant tracks are folded.
@@ -96,35 +98,60 @@ fn rigid_node(node: &DraftNode, above: DMat3) -> Result<Node, SceneError> {
     })
 }
 
-/// The matrix that shapes what hangs on the node, whose rotation is turned round where the scale above mirrors;
-/// `None` where no rigid motion does what the file says.
-fn residual(node: &DraftNode, rigid: &mut Node, above: DMat3) -> Result<Option<DMat3>, SceneError> {
+/// The matrix that shapes what hangs on the node, whose rotation is turned round where the scale above mirrors; and
+/// whether no rigid motion does what the file says, so that it is the shape at the start.
+fn residual_of(
+    node: &DraftNode,
+    rigid: &mut Node,
+    above: DMat3,
+) -> Result<(DMat3, bool), SceneError> {
     let scale = node.shape;
     for column in [scale.x_axis, scale.y_axis, scale.z_axis] {
         finite(node, "scale", column)?;
     }
     let isotropic = above == DMat3::from_diagonal(DVec3::splat(above.x_axis.x));
     if isotropic && above.x_axis.x >= 0.0 {
-        return Ok(Some(above * scale));
+        return Ok((above * scale, false));
     }
-    let Some(track) = &mut rigid.rotation_track else {
-        let rotation = DMat3::from_quat(rigid.rotation);
-        return Ok(Some(rotation.transpose() * above * rotation * scale));
+    let shaped = |rotation: DQuat| {
+        let rotation = DMat3::from_quat(rotation);
+        rotation.transpose() * above * rotation * scale
     };
+    let Some(track) = &mut rigid.rotation_track else { return Ok((shaped(rigid.rotation), false)) };
     if let Some(turn) = of_similarity(above) {
         if turn != DMat3::IDENTITY {
             track.values.iter_mut().for_each(|q| *q = turned(turn, *q));
         }
-        return Ok(Some(above * scale));
+        return Ok((above * scale, false));
     }
     let first = track.values[usize::from(track.interpolation == Interpolation::CubicSpline)];
     let since: Vec<DQuat> = track.values.iter().map(|&q| q * first.conjugate()).collect();
-    let Some(turn) = about_one_axis(&since, above) else { return Ok(None) };
-    for (value, since) in track.values.iter_mut().zip(since) {
-        *value = turned(turn, since) * first;
+    if let Some(turn) = about_one_axis(&since, above) {
+        for (value, since) in track.values.iter_mut().zip(since) {
+            *value = turned(turn, since) * first;
+        }
+        return Ok((shaped(first), false));
     }
-    let rotation = DMat3::from_quat(first);
-    Ok(Some(rotation.transpose() * above * rotation * scale))
+    if track.interpolation == Interpolation::CubicSpline {
+        track.interpolation = Interpolation::Linear;
+        track.values = track.values.chunks(3).map(|key| key[1]).collect();
+    }
+    for value in &mut track.values {
+        *value = nearest_turn(above, *value * first.conjugate()) * first;
+    }
+    Ok((shaped(first), true))
+}
+
+/// The rotation nearest to L D L^-1 (its polar factor, by Newton's iteration: Higham, Computing the polar
+/// decomposition, 1986); none where L is singular.
+fn nearest_turn(above: DMat3, turn: DQuat) -> DQuat {
+    let mut nearest = above * DMat3::from_quat(turn) * above.inverse();
+    for _ in 0..32 {
+        nearest = (nearest + nearest.inverse().transpose()) * 0.5;
+    }
+    let found = DQuat::from_mat3(&nearest).normalize();
+    let orthogonal = largest(nearest.transpose() * nearest - DMat3::IDENTITY) < 1e-9;
+    if orthogonal && found.is_finite() { found } else { DQuat::IDENTITY }
 }
 
 /// The quaternion of L D L^-1, D being that of `q`: `turn` is what L makes of its axis.

@@ -7,7 +7,9 @@
 mod broken;
 mod files;
 mod gltf;
+mod meshes;
 mod motion;
+mod packed;
 mod shipped;
 mod surfaces;
 mod textures;

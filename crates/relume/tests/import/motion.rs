@@ -49,11 +49,11 @@ fn all_animations_play_unless_one_is_chosen() {
     };
     let all = scene_of(&g).unwrap();
     assert_eq!((at(&all, 1.0), all.moves(BodyId(1)), all.motion.duration_s), (DVec3::X, true, 2.0));
-    let conflict = with_code(&all.notes, "animation-conflict");
+    let others = with_code(&all.notes, "other-animations");
     assert!(
-        conflict.len() == 1
-            && conflict[0].subject == "crate"
-            && conflict[0].message.contains("`again`")
+        others.len() == 1 && others[0].message.contains("1 others do not: again;"),
+        "{:?}",
+        all.notes
     );
     let again = choose("again").unwrap();
     assert_eq!((at(&again, 1.0), again.moves(BodyId(1))), (DVec3::Z * 5.0, false));
@@ -73,8 +73,29 @@ fn scales_are_constant_or_switch() {
     assert_eq!(constant.bounds(0.0).unwrap().1, DVec3::new(2.0, 3.0, 1.0));
     let blinks = with("STEP", &[0.0, 1.0, 2.0], &[1., 1., 1., 0., 0., 0., 1., 1., 1.]).unwrap();
     assert_eq!([0.5, 1.5, 2.5].map(|t| blinks.pose(BodyId(0), t).is_some()), [true, false, true]);
-    let grows = with("LINEAR", &[0.0, 1.0], &[1., 1., 1., 2., 2., 2.]).unwrap_err().to_string();
-    assert!(grows.contains("`crate`") && grows.contains("scale changes"), "{grows}");
+    // What grows otherwise is held at its first size, and moves on.
+    let mut g = Gltf::cube();
+    g.animate("a", 0, "scale", "LINEAR", &[0.0, 1.0], &[2., 2., 2., 3., 1., 3.]);
+    g.animate("b", 0, "translation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 4., 0., 0.]);
+    let channel = g.json["animations"][1]["channels"][0].clone();
+    let sampler = g.json["animations"][1]["samplers"][0].clone();
+    g.json["animations"][0]["channels"].as_array_mut().unwrap().push(channel);
+    g.json["animations"][0]["channels"][1]["sampler"] = json!(1);
+    g.json["animations"][0]["samplers"].as_array_mut().unwrap().push(sampler);
+    let grows = scene_of(&g).unwrap();
+    assert_eq!(grows.bounds(1.0).unwrap(), (DVec3::X * 4.0, DVec3::new(6.0, 2.0, 2.0)));
+    let held = with_code(&grows.notes, "held-size");
+    assert!(
+        held.len() == 1
+            && held[0].subject == "crate"
+            && held[0].message.contains("[2.0, 2.0, 2.0]")
+    );
+    // What grows out of nothing is there from halfway on.
+    let born = with("LINEAR", &[0.0, 1.0], &[0., 0., 0., 2., 2., 2.]).unwrap();
+    assert_eq!([0.4, 0.6].map(|t| born.pose(BodyId(0), t).is_some()), [false, true]);
+    assert_eq!(born.bounds(1.0).unwrap().1, DVec3::splat(2.0));
+    let short = with("LINEAR", &[0.0, 1.0], &[1., 1., 1.]).unwrap_err().to_string();
+    assert!(short.contains("`crate`") && short.contains("2 key times need 2 values"), "{short}");
 }
 
 #[test]
@@ -82,11 +103,17 @@ fn growth_matters_only_where_a_mesh_hangs_below() {
     let mut g = Gltf::cube();
     let bone = g.node(json!({"name": "bone"}));
     g.animate("a", bone, "scale", "LINEAR", &[0.0, 1.0], &[1., 1., 1., 2., 2., 2.]);
-    assert!(!scene_of(&g).unwrap().moves(BodyId(0)));
-    let shape = g.push("nodes", json!({"name": "shape", "mesh": 0}));
-    g.json["nodes"][bone]["children"] = json!([shape]);
-    let grows = scene_of(&g).unwrap_err().to_string();
-    assert!(grows.contains("`bone`") && grows.contains("scale changes"), "{grows}");
+    let quiet = scene_of(&g).unwrap();
+    assert!(!quiet.moves(BodyId(0)) && with_code(&quiet.notes, "held-size").is_empty());
+    let shapes = json!([
+        g.push("nodes", json!({"name": "shape", "mesh": 0, "translation": [5, 0, 0]})),
+        g.push("nodes", json!({"name": "twin", "mesh": 0, "translation": [7, 0, 0]})),
+    ]);
+    g.json["nodes"][bone]["children"] = shapes;
+    let grows = scene_of(&g).unwrap();
+    let held = with_code(&grows.notes, "held-size");
+    assert_eq!((held.len(), held[0].subject.as_str()), (1, "bone"));
+    assert_eq!(grows.bounds(1.0).unwrap().1, DVec3::new(8.0, 1.0, 1.0));
 }
 
 #[test]
@@ -343,15 +370,99 @@ fn a_turning_child_of_a_mirrored_parent_goes_where_the_file_says() {
 #[test]
 fn a_shear_matters_only_where_a_mesh_is_moved_by_it() {
     let mut g = turning_below([1.0, 1.0, 2.0], 0);
-    let error = scene_of(&g).unwrap_err().to_string();
-    assert!(error.contains("`child`") && error.contains("shear"), "{error}");
+    let held = |g: &Gltf| {
+        let scene = scene_of(g).unwrap();
+        let notes = with_code(&scene.notes, "held-shape");
+        notes.iter().map(|n| n.subject.clone()).collect::<Vec<String>>()
+    };
+    assert_eq!(held(&g), ["child"]);
     g.json["nodes"][0].as_object_mut().unwrap().remove("mesh");
     g.node(json!({"name": "box", "mesh": 0}));
     assert_eq!(scene_of(&g).unwrap().bodies.len(), 1);
+    assert!(held(&g).is_empty());
     // Below the sheared node it counts again.
     let below = g.push("nodes", json!({"name": "below", "mesh": 0}));
     g.json["nodes"][0]["children"] = json!([below]);
-    assert!(scene_of(&g).unwrap_err().to_string().contains("`child`"));
+    assert_eq!(held(&g), ["child"]);
+}
+
+#[test]
+fn what_is_sheared_keeps_its_first_shape_and_turns_as_nearly_as_a_body_can() {
+    let stretched = DVec3::new(1.0, 1.0, 2.0);
+    for how in ["LINEAR", "CUBICSPLINE"] {
+        let mut g = turning_below(stretched.to_array(), 0);
+        if how == "CUBICSPLINE" {
+            let (first, last) =
+                ([0.5_f32; 4], glam::Quat::from_rotation_x(1.0) * glam::Quat::from_array([0.5; 4]));
+            let flat = [0.0; 4];
+            let keys = [flat, first, flat, flat, last.to_array(), flat].concat();
+            let output = g.floats("VEC4", &keys);
+            g.json["animations"][0]["samplers"][0]["output"] = json!(output);
+            g.json["animations"][0]["samplers"][0]["interpolation"] = json!(how);
+        }
+        let scene = scene_of(&g).unwrap();
+        let corners = |time_s: f64| {
+            let pose = scene.pose(BodyId(0), time_s).unwrap();
+            scene
+                .patches
+                .iter()
+                .flat_map(|p| p.corners_in_body())
+                .map(|c| pose.point(c))
+                .collect::<Vec<_>>()
+        };
+        // At the start just what the file says.
+        let turn = glam::DQuat::from_xyzw(0.5, 0.5, 0.5, 0.5);
+        for found in corners(0.0) {
+            let nearest = (0..8)
+                .map(|bits| DVec3::from([0, 1, 2].map(|k| f64::from(bits >> k & 1))))
+                .map(|corner| found.distance(stretched * (DVec3::X * 3.0 + turn * corner)))
+                .fold(9.0, f64::min);
+            assert!(nearest < 1e-6, "{how}: {nearest}");
+        }
+        // A body turns about the axis that the file turns it about.
+        let pose = scene.pose(BodyId(0), 1.0).unwrap();
+        let since = pose.rotation * scene.pose(BodyId(0), 0.0).unwrap().rotation.transpose();
+        let (axis, angle) = glam::DQuat::from_mat3(&since).to_axis_angle();
+        assert!(
+            axis.distance(DVec3::X) < 1e-6 && (0.8..1.8).contains(&angle),
+            "{how}: {axis} {angle}"
+        );
+    }
+}
+
+#[test]
+fn of_animations_of_the_same_things_the_first_plays_and_the_others_are_listed() {
+    let mut g = Gltf::cube();
+    let other = g.node(json!({"name": "other", "mesh": 0}));
+    let third = g.node(json!({"name": "third", "mesh": 0}));
+    let along = |g: &mut Gltf, name: &str, node: usize, path: &str| {
+        let values: &[f32] = if path == "rotation" {
+            &[0., 0., 0., 1., 1., 0., 0., 0.]
+        } else {
+            &[0., 0., 0., 1., 0., 0.]
+        };
+        g.animate(name, node, path, "LINEAR", &[0.0, 1.0], values);
+    };
+    along(&mut g, "walk", 0, "translation");
+    along(&mut g, "door", third, "translation");
+    along(&mut g, "wave", other, "rotation");
+    // What both move ties them together: walk, wave and this are clips of one figure.
+    along(&mut g, "run", 0, "translation");
+    let mut channel = g.json["animations"][2]["channels"][0].clone();
+    channel["sampler"] = json!(1);
+    let sampler = g.json["animations"][2]["samplers"][0].clone();
+    g.json["animations"][3]["channels"].as_array_mut().unwrap().push(channel);
+    g.json["animations"][3]["samplers"].as_array_mut().unwrap().push(sampler);
+    let scene = scene_of(&g).unwrap();
+    assert_eq!(scene.motion.animation.as_deref(), Some("walk, door"));
+    assert_eq!([0, 1, 2].map(|b| scene.moves(BodyId(b))), [true, false, true]);
+    assert_eq!(scene.pose(BodyId(0), 1.0).unwrap().rotation, glam::DMat3::IDENTITY);
+    let listed = with_code(&scene.notes, "other-animations");
+    assert!(
+        listed.len() == 1 && listed[0].message.contains("2 others do not: wave, run"),
+        "{:?}",
+        scene.notes
+    );
 }
 
 #[test]
@@ -433,16 +544,61 @@ fn a_skin_of_rigid_joints_moves_with_them() {
 }
 
 #[test]
-fn a_skin_that_bends_is_named_and_read_at_rest() {
+fn a_skin_that_bends_is_held_in_its_pose_at_the_start() {
     let mut g = skinned(false);
-    // One vertex of a side belongs to the other joint.
+    // The first vertex of side -x, at the cube's origin, hangs on both joints by halves.
+    let weights = g.json["accessors"][3]["bufferView"].as_u64().unwrap() as usize;
+    let offset = g.json["bufferViews"][weights]["byteOffset"].as_u64().unwrap() as usize;
+    for (k, value) in [0.5_f32, 0.5].into_iter().enumerate() {
+        g.bin[offset + 4 * k..][..4].copy_from_slice(&value.to_le_bytes());
+    }
     let view = g.json["accessors"][2]["bufferView"].as_u64().unwrap() as usize;
     let offset = g.json["bufferViews"][view]["byteOffset"].as_u64().unwrap() as usize;
     g.bin[offset] = 0;
+    g.bin[offset + 1] = 1;
+    // Both joints hang on an armature that moves; the first joint moves by itself as well.
+    let armature = g.node(json!({"name": "armature", "scale": [2, 2, 2], "children": [0, 1]}));
+    g.json["scenes"][0]["nodes"] = json!([armature, 2]);
+    g.animate("b", armature, "translation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 0., 0., 9.]);
+    let scene = scene_of(&g).unwrap();
+    let notes = with_code(&scene.notes, "skin");
+    assert_eq!((notes.len(), notes[0].subject.as_str()), (1, "robot"));
+    assert!(
+        notes[0].message.contains("several joints") && notes[0].message.contains("`armature`"),
+        "{}",
+        notes[0].message
+    );
+    assert_eq!(scene.surfaces[0].name, "robot");
+    // Brute force: the first joint puts a vertex at v + (0, 0, 5), the second where it is; twice as large.
+    for time_s in [0.0, 1.0] {
+        let pose = scene.pose(BodyId(0), time_s).unwrap();
+        let found: Vec<DVec3> =
+            scene.patches.iter().flat_map(|p| p.corners_in_body()).map(|c| pose.point(c)).collect();
+        let positions = super::gltf::cube_positions();
+        for (vertex, p) in positions.chunks(3).enumerate() {
+            let share = if vertex == 0 {
+                0.5
+            } else if vertex < 8 {
+                0.0
+            } else {
+                1.0
+            };
+            let p = DVec3::new(p[0].into(), p[1].into(), p[2].into());
+            let meant = 2.0 * (p + DVec3::Z * 5.0 * share) + DVec3::Z * 9.0 * time_s;
+            let nearest = found.iter().map(|f| f.distance(meant)).fold(99.0, f64::min);
+            assert!(nearest < 1e-6, "vertex {vertex} at {time_s}: {nearest}");
+        }
+    }
+}
+
+#[test]
+fn a_skin_without_its_joints_is_named_and_read_as_it_was_before() {
+    let mut g = skinned(true);
+    g.json["scenes"][0]["nodes"] = json!([2]);
     let scene = scene_of(&g).unwrap();
     let notes = with_code(&scene.notes, "skin");
     assert_eq!(notes[0].subject, "robot");
-    assert!(notes[0].message.contains("several joints"), "{}", notes[0].message);
+    assert!(notes[0].message.contains("not in the scene"), "{}", notes[0].message);
     assert_eq!(scene.bounds(0.0).unwrap().0, DVec3::splat(70.0));
 }
 

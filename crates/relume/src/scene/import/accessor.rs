@@ -1,4 +1,4 @@
-//! Numbers out of accessors: any component type, normalised or not, strided, sparse.
+//! Numbers out of accessors: any component type, normalised or not, strided, sparse, compressed.
 //!
 //! Every read is checked against the bytes that are there. Must not know what the numbers mean.
 
@@ -12,7 +12,7 @@ const LARGEST_COUNT: usize = 1 << 20;
 
 /// A component type of glTF.
 #[derive(Clone, Copy, PartialEq)]
-enum Component {
+pub(super) enum Component {
     I8,
     U8,
     I16,
@@ -34,7 +34,7 @@ impl Component {
         })
     }
 
-    fn size(self) -> usize {
+    pub(super) fn size(self) -> usize {
         match self {
             Component::I8 | Component::U8 => 1,
             Component::I16 | Component::U16 => 2,
@@ -43,7 +43,7 @@ impl Component {
     }
 
     /// The number, mapped to [-1, 1] or [0, 1] if normalised (glTF 2.0, section 3.11).
-    fn read(self, b: &[u8], normalized: bool) -> f64 {
+    pub(super) fn read(self, b: &[u8], normalized: bool) -> f64 {
         let (value, largest) = match self {
             Component::I8 => (f64::from(b[0] as i8), 127.0),
             Component::U8 => (f64::from(b[0]), 255.0),
@@ -80,17 +80,19 @@ impl Document {
                 .malformed(format!("{owner}: accessor {index} should be {wanted} but is {kind}")));
         }
         let component = self.component(accessor.component_type, index)?;
-        let bytes = (accessor.count as u64).saturating_mul(size_of::<[f64; N]>() as u64);
-        self.fits(format_args!("accessor {index} of {owner}"), bytes)?;
-        let mut values = match accessor.buffer_view {
-            Some(_) => self.dense(accessor, index, component, owner)?,
-            None if accessor.count > LARGEST_COUNT => {
+        let mut values = match (self.streamed(index, owner)?, accessor.buffer_view) {
+            (Some(stored), _) => stored,
+            (None, Some(_)) => self.dense(accessor, index, component, owner)?,
+            (None, None) if accessor.count > LARGEST_COUNT => {
                 let count = accessor.count;
                 return Err(self.malformed(format!(
                     "{owner}: accessor {index} declares {count} elements without data, more than {LARGEST_COUNT}"
                 )));
             }
-            None => vec![[0.0; N]; accessor.count],
+            (None, None) => {
+                self.numbers_fit::<N>(accessor.count, index, owner)?;
+                vec![[0.0; N]; accessor.count]
+            }
         };
         self.apply_sparse(accessor, index, component, owner, &mut values)?;
         Ok(values)
@@ -109,6 +111,17 @@ impl Document {
             )));
         }
         Ok(self.numbers::<1>(index, owner)?.into_iter().map(|[v]| v as u32).collect())
+    }
+
+    /// An error if so many elements need more memory than is allowed.
+    pub(super) fn numbers_fit<const N: usize>(
+        &self,
+        count: usize,
+        index: usize,
+        owner: &str,
+    ) -> Result<(), SceneError> {
+        let bytes = (count as u64).saturating_mul(size_of::<[f64; N]>() as u64);
+        self.fits(format_args!("accessor {index} of {owner}"), bytes)
     }
 
     fn no_accessor(&self, index: usize, owner: &str) -> SceneError {
@@ -130,6 +143,11 @@ impl Document {
     ) -> Result<Vec<[f64; N]>, SceneError> {
         let (bytes, stride) = self.view(accessor.buffer_view.unwrap_or_default())?;
         let stride = stride.filter(|&s| s > 0).unwrap_or(N * component.size());
+        // What cannot be there is damage, however little memory is allowed.
+        if accessor.count > bytes.len() {
+            return Err(self.too_short(index, owner, accessor.count, bytes.len()));
+        }
+        self.numbers_fit::<N>(accessor.count, index, owner)?;
         let read = elements(
             bytes,
             accessor.byte_offset,

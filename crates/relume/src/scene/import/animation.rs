@@ -2,32 +2,29 @@
 //! materials and lights emit.
 //!
 //! All animations play together unless one is chosen by name: exporters such as Blender's write
-//! one for each object. Where two move the same property of a node, the first one wins, with a
-//! note. Scale keys that only switch between nothing and one size become presence; a size that
-//! changes otherwise is an error, because the object would not move rigidly.
+//! one for each object. Of those that move the same properties (a figure's walk and run) the first plays, and the others
+//! are listed. Scale keys that only switch between nothing and one size become presence; what changes its size otherwise
+//! is held at its first size, because it would not move rigidly.
+
+use std::collections::BTreeSet;
 
 use glam::{DQuat, DVec3};
 
 use super::clock::Keys;
 use super::document::Document;
+use super::sizes::sizes;
 use super::{json, node_name, note};
+use crate::scene::rigid::check_track;
 use crate::scene::{Glow, Interpolation, Note, RotationTrack, SceneError, Severity, Track};
-
-/// How long a scale may take from nothing to full size and still count as a switch, seconds.
-/// Exporters that write a key for each frame turn a switch into a ramp of one frame.
-const SWITCH_S: f64 = 0.1;
-
-/// Relative difference of scales that counts as none: what exporters and rigs leave behind.
-const SAME_SCALE: f64 = 1e-4;
 
 /// Keyframes of one node of the file.
 #[derive(Default)]
 pub(super) struct Moves {
     pub(super) translation: Option<Track>,
     pub(super) rotation: Option<RotationTrack>,
-    /// The one scale of all keys, which replaces the node's.
+    /// The one scale of all keys, or the one that is held, which replaces the node's.
     pub(super) scale: Option<DVec3>,
-    /// How its scale changes, if it does: an error as soon as a mesh hangs below.
+    /// How its scale changes, if it does, and what becomes of it.
     pub(super) growth: Option<String>,
     /// The weights of its mesh's morph targets, where keys say that they never change.
     pub(super) weights: Option<Vec<f64>>,
@@ -103,20 +100,62 @@ pub(super) fn played(
         names: None,
         end_s: 0.0,
     };
-    let mut playing = Vec::new();
-    for (animation, name) in document.root.animations.iter().zip(&names) {
-        if chosen.is_none_or(|wanted| wanted == name) {
-            playing.push(name.clone());
-            for channel in &animation.channels {
-                Reader { document, animation, name }.channel(channel, &mut played, notes)?;
-            }
-        }
-        if chosen == Some(name) {
-            break;
+    let playing: Vec<usize> = match chosen {
+        Some(wanted) => names.iter().position(|n| n == wanted).into_iter().collect(),
+        None => first_of_each_kind(document, &names, notes),
+    };
+    for &index in &playing {
+        let (animation, name) = (&document.root.animations[index], &names[index]);
+        for channel in &animation.channels {
+            Reader { document, animation, name }.channel(channel, &mut played, notes)?;
         }
     }
+    let playing: Vec<&str> = playing.iter().map(|&index| names[index].as_str()).collect();
     played.names = (!playing.is_empty()).then(|| playing.join(", "));
     Ok(played)
+}
+
+/// The first of each set of animations that have nothing to do with the others, with a note that lists the rest.
+fn first_of_each_kind(document: &Document, names: &[String], notes: &mut Vec<Note>) -> Vec<usize> {
+    let mut kinds: Vec<(usize, BTreeSet<String>)> = Vec::new();
+    for (index, animation) in document.root.animations.iter().enumerate() {
+        let mut first = index;
+        let mut moved: BTreeSet<String> =
+            animation.channels.iter().filter_map(moved_property).collect();
+        kinds.retain(|(other, of_other)| {
+            let alike = !of_other.is_disjoint(&moved);
+            if alike {
+                first = first.min(*other);
+                moved.extend(of_other.iter().cloned());
+            }
+            !alike
+        });
+        kinds.push((first, moved));
+    }
+    let mut playing: Vec<usize> = kinds.into_iter().map(|kind| kind.0).collect();
+    playing.sort_unstable();
+    let others: Vec<&str> = (0..names.len())
+        .filter(|index| !playing.contains(index))
+        .map(|index| names[index].as_str())
+        .collect();
+    if let (Some(&first), false) = (playing.first(), others.is_empty()) {
+        let message = format!(
+            "of the animations that move the same objects the first plays; {} others do not: {}; choose one by name",
+            others.len(),
+            others.join(", ")
+        );
+        notes.push(note(Severity::Info, "other-animations", &names[first], 1, message));
+    }
+    playing
+}
+
+/// What a channel changes, as a pointer.
+fn moved_property(channel: &json::Channel) -> Option<String> {
+    let target = &channel.target;
+    match (target.path.as_str(), &target.extensions.pointer) {
+        ("pointer", pointer) => pointer.as_ref().map(|p| p.pointer.clone()),
+        (path, _) => target.node.map(|node| format!("/nodes/{node}/{path}")),
+    }
 }
 
 fn name_of(index: usize, animation: &json::Animation) -> String {
@@ -158,7 +197,7 @@ impl Reader<'_> {
         let taken = match path {
             "translation" => of_node.translation.is_some(),
             "rotation" => of_node.rotation.is_some(),
-            "scale" => of_node.scale.is_some() || of_node.growth.is_some(),
+            "scale" => of_node.scale.is_some(),
             "weights" => of_node.weights.is_some() || of_node.morphs,
             other => {
                 let what = format!("node `{name}` has an unknown animated property `{other}`");
@@ -206,17 +245,18 @@ impl Reader<'_> {
                     notes.push(note(Severity::Warning, "morph", name, 1, message.to_owned()));
                 }
             }
-            _ => match switches(&keys, &self.vectors(output, name)?) {
-                Ok((scale, presence)) => {
-                    of_node.scale = Some(scale);
-                    if presence.iter().any(|k| !k.1) {
-                        let message = "its scale of 0 is taken as absence".to_owned();
-                        notes.push(note(Severity::Info, "presence", name, 1, message));
-                        of_node.presence = presence;
-                    }
+            _ => {
+                let values = self.vectors(output, name)?;
+                check_track(name, &keys.times_s, values.len(), interpolation)?;
+                let sizes = sizes(&keys, &values);
+                of_node.scale = Some(sizes.scale);
+                of_node.growth = sizes.growth;
+                if sizes.presence.iter().any(|k| !k.1) {
+                    let message = "its scale of 0 is taken as absence".to_owned();
+                    notes.push(note(Severity::Info, "presence", name, 1, message));
+                    of_node.presence = sizes.presence;
                 }
-                Err(growth) => of_node.growth = Some(growth),
-            },
+            }
         }
         Ok(())
     }
@@ -399,66 +439,5 @@ fn constant_weights(when: &Keys, values: &[f64]) -> Option<Vec<f64>> {
             (per_key.is_multiple_of(3) && sets.all(still)).then(|| first.to_vec())
         }
         _ => sets.all(|k| *k == values[..per_key]).then(|| values[..per_key].to_vec()),
-    }
-}
-
-/// The one size among scale keys, and when the node has it; or how the size changes otherwise.
-fn switches(when: &Keys, values: &[DVec3]) -> Result<(DVec3, Vec<(f64, bool)>), String> {
-    let (times_s, interpolation) = (&when.times_s, when.interpolation);
-    let per_key = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
-    if values.len() != times_s.len() * per_key {
-        return Err(format!(
-            "its scale has {} key times but {} values",
-            times_s.len(),
-            values.len()
-        ));
-    }
-    let keys: Vec<DVec3> = values.chunks(per_key).map(|v| v[per_key / 2]).collect();
-    let size = |v: &DVec3| v.abs().max_element();
-    let larger = |best: DVec3, v: DVec3| if size(&v) > size(&best) { v } else { best };
-    let full = keys.iter().copied().fold(DVec3::ZERO, larger);
-    let present = |v: &DVec3| size(v) > SAME_SCALE * size(&full);
-    let differs = |v: &DVec3| size(&(*v - full)) > SAME_SCALE * size(&full);
-    if let Some(v) = keys.iter().find(|v| present(v) && differs(v)) {
-        let (v, f) = (v.to_array(), full.to_array());
-        return Err(format!("its scale changes over time, from {v:?} to {f:?}"));
-    }
-    let presence: Vec<(f64, bool)> =
-        times_s.iter().copied().zip(keys.iter().map(present)).collect();
-    let slow = presence.windows(2).find(|w| w[0].1 != w[1].1 && w[1].0 - w[0].0 > SWITCH_S);
-    if let (Some(w), true) = (slow, interpolation != Interpolation::Step) {
-        return Err(format!("it grows or shrinks between {} s and {} s", w[0].0, w[1].0));
-    }
-    let changes = |i: usize| i == 0 || presence[i].1 != presence[i - 1].1;
-    let onsets_s = when.onsets_s();
-    let switched = (0..presence.len()).filter(|&i| changes(i));
-    Ok((full, switched.map(|i| (onsets_s[i], presence[i].1)).collect()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn scale_switches_are_presence_and_growth_is_refused() {
-        let (o, s) = (DVec3::ZERO, DVec3::splat(2.0));
-        let step = |keys: &[(f64, DVec3)], interpolation| {
-            let times: Vec<f64> = keys.iter().map(|k| k.0).collect();
-            let values: Vec<DVec3> = keys.iter().map(|k| k.1).collect();
-            switches(&Keys::new("a", times, interpolation).unwrap(), &values)
-        };
-        let blink = [(0.0, s), (1.0, o), (2.0, o), (3.0, s)];
-        let (scale, presence) = step(&blink, Interpolation::Step).unwrap();
-        assert_eq!(scale, s);
-        for (found, meant) in presence.iter().zip([(0.0, true), (1.0, false), (3.0, true)]) {
-            assert!(found.1 == meant.1 && (found.0 - meant.0).abs() <= 1e-6 * meant.0);
-        }
-        assert_eq!(presence.len(), 3);
-        let message = step(&blink, Interpolation::Linear).unwrap_err();
-        assert!(message.contains("between 0 s and 1 s"), "{message}");
-        assert!(step(&[(0.0, s), (1.0, s), (1.04, o)], Interpolation::Linear).is_ok());
-        let message = step(&[(0.0, s), (1.0, s * 1.5)], Interpolation::Step).unwrap_err();
-        assert!(message.contains("scale changes"), "{message}");
-        assert_eq!(step(&[(0.0, s)], Interpolation::Linear).unwrap().1, [(0.0, true)]);
     }
 }

@@ -5,9 +5,6 @@
 //! not looked at, and so cannot be an error. Must not know what anything is used for.
 
 use serde::Deserialize;
-use serde_json::{Map, Value};
-
-pub(super) type Extensions = Map<String, Value>;
 
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
@@ -146,7 +143,22 @@ pub(super) struct Primitive {
     pub(super) material: Option<usize>,
     pub(super) mode: Option<u32>,
     pub(super) targets: Vec<std::collections::BTreeMap<String, usize>>,
-    pub(super) extensions: Extensions,
+    pub(super) extensions: PrimitiveExtensions,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct PrimitiveExtensions {
+    #[serde(rename = "KHR_draco_mesh_compression")]
+    pub(super) draco: Option<Draco>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Draco {
+    pub(super) buffer_view: usize,
+    #[serde(default)]
+    pub(super) attributes: std::collections::BTreeMap<String, u32>,
 }
 
 #[derive(Deserialize, Default)]
@@ -262,7 +274,7 @@ pub(super) struct Image {
     pub(super) buffer_view: Option<usize>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Clone)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Accessor {
     pub(super) buffer_view: Option<usize>,
@@ -277,14 +289,29 @@ pub(super) struct Accessor {
     pub(super) sparse: Option<Sparse>,
 }
 
-#[derive(Deserialize)]
+impl Accessor {
+    /// One for the corners of triangles that are stored elsewhere.
+    pub(super) fn of_corners() -> Accessor {
+        Accessor {
+            buffer_view: None,
+            byte_offset: 0,
+            component_type: 5125,
+            normalized: false,
+            count: 0,
+            kind: "SCALAR".into(),
+            sparse: None,
+        }
+    }
+}
+
+#[derive(Deserialize, Clone)]
 pub(super) struct Sparse {
     pub(super) count: usize,
     pub(super) indices: SparseIndices,
     pub(super) values: SparseValues,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Clone)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct SparseIndices {
     pub(super) buffer_view: usize,
@@ -293,7 +320,7 @@ pub(super) struct SparseIndices {
     pub(super) component_type: u32,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Clone)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct SparseValues {
     pub(super) buffer_view: usize,
@@ -310,7 +337,36 @@ pub(super) struct BufferView {
     pub(super) byte_length: usize,
     pub(super) byte_stride: Option<usize>,
     #[serde(default)]
-    pub(super) extensions: Extensions,
+    pub(super) extensions: ViewExtensions,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct ViewExtensions {
+    #[serde(rename = "EXT_meshopt_compression")]
+    meshopt: Option<Meshopt>,
+    #[serde(rename = "KHR_meshopt_compression")]
+    meshopt_khr: Option<Meshopt>,
+}
+
+impl ViewExtensions {
+    /// How the view is stored compressed, if it is.
+    pub(super) fn meshopt(&self) -> Option<&Meshopt> {
+        self.meshopt_khr.as_ref().or(self.meshopt.as_ref())
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Meshopt {
+    pub(super) buffer: usize,
+    #[serde(default)]
+    pub(super) byte_offset: usize,
+    pub(super) byte_length: usize,
+    pub(super) byte_stride: usize,
+    pub(super) count: usize,
+    pub(super) mode: String,
+    pub(super) filter: Option<String>,
 }
 
 #[derive(Deserialize)]

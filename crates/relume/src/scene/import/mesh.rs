@@ -22,10 +22,10 @@ pub(super) struct Polygons {
 }
 
 /// A primitive before its triangles are merged.
-struct Soup<'a> {
+pub(super) struct Soup<'a> {
     primitive: &'a json::Primitive,
-    points: Vec<DVec3>,
-    triangles: Vec<[u32; 3]>,
+    pub(super) points: Vec<DVec3>,
+    pub(super) triangles: Vec<[u32; 3]>,
     owner: String,
 }
 
@@ -78,6 +78,18 @@ const STRAY_WEIGHT: f64 = 4e-3;
 
 /// The one joint that each vertex hangs on, if it is one.
 fn joints(document: &Document, soup: &Soup<'_>) -> Result<Vec<Option<usize>>, SceneError> {
+    let only = |vertex: &Vec<(usize, f64)>| {
+        let all: f64 = vertex.iter().map(|w| w.1.abs()).sum();
+        vertex.iter().find(|w| w.1 > 0.0 && w.1 >= (1.0 - STRAY_WEIGHT) * all).map(|w| w.0)
+    };
+    Ok(vertex_weights(document, soup)?.iter().map(only).collect())
+}
+
+/// The joints that each vertex hangs on, each once, and their weights as the file has them.
+pub(super) fn vertex_weights(
+    document: &Document,
+    soup: &Soup<'_>,
+) -> Result<Vec<Vec<(usize, f64)>>, SceneError> {
     let mut weights: Vec<Vec<(usize, f64)>> = vec![Vec::new(); soup.points.len()];
     for set in 0.. {
         let attribute = |name: &str| soup.primitive.attributes.get(&format!("{name}_{set}"));
@@ -96,15 +108,11 @@ fn joints(document: &Document, soup: &Soup<'_>) -> Result<Vec<Option<usize>>, Sc
             }
         }
     }
-    let only = |vertex: &Vec<(usize, f64)>| {
-        let all: f64 = vertex.iter().map(|w| w.1.abs()).sum();
-        vertex.iter().find(|w| w.1 > 0.0 && w.1 >= (1.0 - STRAY_WEIGHT) * all).map(|w| w.0)
-    };
-    Ok(weights.iter().map(only).collect())
+    Ok(weights)
 }
 
 /// The mesh's name and its primitives that have triangles.
-fn soups<'a>(
+pub(super) fn soups<'a>(
     document: &'a Document,
     index: usize,
     weights: &[f64],
@@ -141,7 +149,6 @@ fn soup<'a>(
         notes.push(note(Severity::Warning, "no-positions", mesh, 1, message));
         return Ok(None);
     };
-    check_compression(document, primitive, position)?;
     let points = morphed(document, primitive, position, weights, (mesh, &owner))?;
     let corners = match primitive.indices {
         Some(accessor) => document.indices(accessor, &owner)?,
@@ -167,7 +174,7 @@ fn soup<'a>(
 
 impl Soup<'_> {
     /// These triangles as polygons.
-    fn merged(
+    pub(super) fn merged(
         &self,
         triangles: &[[u32; 3]],
         mesh: &str,
@@ -214,20 +221,6 @@ fn morphed(
     Ok(points)
 }
 
-/// A compressed primitive can be read only if its plain numbers are there too.
-fn check_compression(
-    document: &Document,
-    primitive: &json::Primitive,
-    position: usize,
-) -> Result<(), SceneError> {
-    let draco = "KHR_draco_mesh_compression";
-    let plain = document.root.accessors.get(position).is_some_and(|a| a.buffer_view.is_some());
-    if primitive.extensions.contains_key(draco) && !plain {
-        return Err(document.extension(draco));
-    }
-    Ok(())
-}
-
 fn positions(
     document: &Document,
     accessor: usize,
@@ -235,14 +228,20 @@ fn positions(
 ) -> Result<Vec<DVec3>, SceneError> {
     let points: Vec<DVec3> =
         document.numbers::<3>(accessor, owner)?.into_iter().map(DVec3::from_array).collect();
-    if let Some((i, p)) = points.iter().enumerate().find(|(_, p)| !p.is_finite()) {
-        return Err(SceneError::Geometry {
+    check_places(&points, mesh)?;
+    Ok(points)
+}
+
+/// An error if a vertex is nowhere.
+pub(super) fn check_places(points: &[DVec3], mesh: &str) -> Result<(), SceneError> {
+    match points.iter().enumerate().find(|(_, p)| !p.is_finite()) {
+        None => Ok(()),
+        Some((i, p)) => Err(SceneError::Geometry {
             subject: format!("mesh `{mesh}`"),
             what: format!("vertex {i} is at ({}, {}, {}), which is no place", p.x, p.y, p.z),
             remedy: "repair the mesh and export it again".into(),
-        });
+        }),
     }
-    Ok(points)
 }
 
 /// Triangles of a list (4), strip (5) or fan (6).

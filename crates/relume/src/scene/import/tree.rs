@@ -7,7 +7,8 @@ use glam::{DMat3, DQuat, DVec3};
 use super::animation::{GlowKeys, Moves, played};
 use super::document::Document;
 use super::look::Looks;
-use super::mesh::{Polygons, by_joint, polygons};
+use super::mesh::{Polygons, polygons};
+use super::skin::Skinned;
 use super::{ImportOptions, json, light, material, node_name, note};
 use crate::scene::draft::{Draft, DraftNode, DraftSurface};
 use crate::scene::{Camera, MaterialId, NodeId, Note, SceneError, Severity};
@@ -32,6 +33,7 @@ pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draf
         skinned: Vec::new(),
         polygons: 0,
         without_material: 0,
+        growths: BTreeMap::new(),
         growing: Vec::new(),
         draft: Draft {
             materials,
@@ -82,40 +84,31 @@ fn not_a_tree(document: &Document, node: usize) -> SceneError {
     }
 }
 
-struct Tree<'a> {
-    document: &'a Document,
+pub(super) struct Tree<'a> {
+    pub(super) document: &'a Document,
     moves: Vec<Moves>,
     /// How the lights of the file change.
     lights: Vec<GlowKeys>,
-    looks: Looks<'a>,
+    pub(super) looks: Looks<'a>,
     /// Polygons of the meshes read so far, by mesh and weights of its morph targets (as bits).
     meshes: BTreeMap<(usize, Vec<u64>), Vec<Polygons>>,
     /// Where each node of the file is in the draft.
-    places: Vec<Option<usize>>,
+    pub(super) places: Vec<Option<usize>>,
     /// Nodes with a skin, which wait for their joints.
-    skinned: Vec<Skinned>,
+    pub(super) skinned: Vec<Skinned>,
     /// Polygons in the draft so far.
     polygons: usize,
     without_material: usize,
-    /// For each node of the draft: the nearest one at or above it whose scale changes, and how.
-    growing: Vec<Option<(usize, String)>>,
-    draft: Draft,
+    /// How the scales of nodes of the file change, until that is said.
+    growths: BTreeMap<usize, String>,
+    /// For each node of the draft: the nodes of the file at or above it whose scale changes.
+    growing: Vec<Vec<usize>>,
+    pub(super) draft: Draft,
 }
 
 /// Polygons of a draft at most: above any scene that can be solved, and a small file can ask for many by
 /// instances.
 const POLYGONS_MAX: usize = 1 << 22;
-
-/// A node of the file with a skinned mesh.
-struct Skinned {
-    /// In the file.
-    index: usize,
-    /// In the draft.
-    me: usize,
-    mesh: usize,
-    skin: usize,
-    weights: Vec<f64>,
-}
 
 impl Tree<'_> {
     /// Adds the nodes below `roots`, parents first, in file order.
@@ -169,8 +162,12 @@ impl Tree<'_> {
         };
         let me = self.draft.nodes.len();
         self.places[index] = Some(me);
-        let above = parent.and_then(|p| self.growing[p].clone());
-        self.growing.push(moves.growth.map(|what| (index, what)).or(above));
+        let mut growing = parent.map(|p| self.growing[p].clone()).unwrap_or_default();
+        if let Some(how) = moves.growth {
+            growing.push(index);
+            self.growths.insert(index, how);
+        }
+        self.growing.push(growing);
         self.draft.nodes.push(placed);
         if let Some(mesh) = node.mesh {
             let weights = self.weights(mesh, index, moves.weights.as_deref(), moves.morphs)?;
@@ -198,16 +195,13 @@ impl Tree<'_> {
         Ok(me)
     }
 
-    /// An error if a mesh hangs on a node whose scale changes, or below one.
-    fn check_growth(&self, node: usize) -> Result<(), SceneError> {
-        let Some((index, what)) = &self.growing[node] else { return Ok(()) };
-        Err(SceneError::NotRigid {
-            node: node_name(self.document, *index),
-            what: what.clone(),
-            remedy: "animate translation and rotation only, or switch the scale between 0 and one \
-                     value in one step"
-                .into(),
-        })
+    /// Says once of each node whose scale changes that what hangs on it or below is held at one size.
+    fn note_growth(&mut self, node: usize) {
+        for index in std::mem::take(&mut self.growing[node]) {
+            if let Some(how) = self.growths.remove(&index) {
+                self.note(Severity::Warning, "held-size", index, how);
+            }
+        }
     }
 
     /// The weights of a mesh's morph targets on a node, with a note where they count.
@@ -233,7 +227,12 @@ impl Tree<'_> {
     }
 
     /// Shows a mesh on a node of the draft.
-    fn show(&mut self, me: usize, mesh: usize, weights: &[f64]) -> Result<(), SceneError> {
+    pub(super) fn show(
+        &mut self,
+        me: usize,
+        mesh: usize,
+        weights: &[f64],
+    ) -> Result<(), SceneError> {
         let key = (mesh, weights.iter().map(|w| w.to_bits()).collect::<Vec<u64>>());
         let primitives = match self.meshes.get(&key) {
             Some(read) => read.clone(),
@@ -247,8 +246,8 @@ impl Tree<'_> {
     }
 
     /// Hangs polygons on a node of the draft.
-    fn put(&mut self, me: usize, primitives: Vec<Polygons>) -> Result<(), SceneError> {
-        self.check_growth(me)?;
+    pub(super) fn put(&mut self, me: usize, primitives: Vec<Polygons>) -> Result<(), SceneError> {
+        self.note_growth(me);
         for primitive in primitives {
             let none = self.draft.materials.len() - 1;
             let material = primitive.material.unwrap_or(none);
@@ -278,8 +277,8 @@ impl Tree<'_> {
     }
 
     /// Adds a node that does not move by itself.
-    fn below(&mut self, parent: usize, node: DraftNode) -> usize {
-        self.growing.push(self.growing[parent].clone());
+    pub(super) fn below(&mut self, parent: Option<usize>, node: DraftNode) -> usize {
+        self.growing.push(parent.map(|p| self.growing[p].clone()).unwrap_or_default());
         self.draft.nodes.push(node);
         self.draft.nodes.len() - 1
     }
@@ -313,82 +312,14 @@ impl Tree<'_> {
                 ..json::Node::default()
             };
             let name = format!("{}/{k}", self.draft.nodes[me].name);
-            let instance = self.below(me, placed(&node, &name, Some(me)));
+            let instance = self.below(Some(me), placed(&node, &name, Some(me)));
             self.show(instance, mesh, weights)?;
         }
         Ok(())
     }
 
-    /// Hangs what is skinned rigidly on its joints, and reads what bends in its shape at rest.
-    fn skins(&mut self) -> Result<(), SceneError> {
-        for skinned in std::mem::take(&mut self.skinned) {
-            if let Err(why) = self.skin(&skinned)? {
-                let message = format!(
-                    "its skin is ignored ({why}): the mesh is read in its rest shape and moves only with the node; \
-                     bake the pose into the mesh, or split the mesh into rigid parts"
-                );
-                self.note(Severity::Warning, "skin", skinned.index, message);
-                self.show(skinned.me, skinned.mesh, &skinned.weights)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Hangs a skinned mesh on its joints (glTF 2.0, section 3.7.3.3: its own node's placement does not count), or
-    /// says why it cannot move rigidly with them.
-    fn skin(&mut self, skinned: &Skinned) -> Result<Result<(), String>, SceneError> {
-        let document = self.document;
-        let Some(skin) = document.root.skins.get(skinned.skin) else {
-            return Ok(Err(format!("skin {} does not exist", skinned.skin)));
-        };
-        let notes = &mut self.draft.notes;
-        let with = (document, &mut self.looks);
-        let parts = match by_joint(with, skinned.mesh, &skinned.weights, notes)? {
-            Ok(parts) => parts,
-            Err(bent) => return Ok(Err(format!("triangles that hang on several joints: {bent}"))),
-        };
-        let name = self.draft.nodes[skinned.me].name.clone();
-        let owner = format!("the skin of node `{name}`");
-        let binds = match skin.inverse_bind_matrices {
-            Some(accessor) => Some(document.numbers::<16>(accessor, &owner)?),
-            None => None,
-        };
-        let mut carriers = Vec::new();
-        for (joint, primitives) in parts {
-            let node = skin.joints.get(joint).copied();
-            let place = node.and_then(|n| self.places.get(n).copied().flatten());
-            let (Some(node), Some(parent)) = (node, place) else {
-                return Ok(Err(format!("its joint {joint} is not in the scene")));
-            };
-            let bind = match &binds {
-                Some(binds) => match binds.get(joint) {
-                    Some(bind) => Some(*bind),
-                    None => {
-                        return Ok(Err(format!("its joint {joint} has no inverse bind matrix")));
-                    }
-                },
-                None => None,
-            };
-            carriers.push((node, parent, bind, primitives));
-        }
-        // The name stays with what is seen.
-        self.draft.nodes[skinned.me].name = format!("{name} (node)");
-        let presence = self.presence_of(skinned.me);
-        let one = carriers.len() == 1;
-        for (node, parent, matrix, primitives) in carriers {
-            let of_joint = || format!("{name}/{}", node_name(document, node));
-            let part = if one { name.clone() } else { of_joint() };
-            let bound = json::Node { matrix, ..json::Node::default() };
-            let mut bound = placed(&bound, &part, Some(parent));
-            bound.presence = presence.clone();
-            let part = self.below(parent, bound);
-            self.put(part, primitives)?;
-        }
-        Ok(Ok(()))
-    }
-
     /// When a node of the draft and all above it are present.
-    fn presence_of(&self, node: usize) -> Vec<(f64, bool)> {
+    pub(super) fn presence_of(&self, node: usize) -> Vec<(f64, bool)> {
         let nodes = &self.draft.nodes;
         let upward = std::iter::successors(Some(node), |&n| nodes[n].parent);
         let keyed = upward.map(|n| &nodes[n].presence).filter(|keys| !keys.is_empty());
@@ -398,7 +329,13 @@ impl Tree<'_> {
         })
     }
 
-    fn note(&mut self, severity: Severity, code: &'static str, node: usize, message: String) {
+    pub(super) fn note(
+        &mut self,
+        severity: Severity,
+        code: &'static str,
+        node: usize,
+        message: String,
+    ) {
         self.draft.notes.push(note(severity, code, &node_name(self.document, node), 1, message));
     }
 
@@ -425,7 +362,7 @@ impl Tree<'_> {
 }
 
 /// A node with its placement: from its matrix, or from translation, rotation and scale.
-fn placed(node: &json::Node, name: &str, parent: Option<usize>) -> DraftNode {
+pub(super) fn placed(node: &json::Node, name: &str, parent: Option<usize>) -> DraftNode {
     let (translation, rotation, shape) = match &node.matrix {
         Some(m) => decomposed(m),
         None => (

@@ -103,7 +103,7 @@ pub(crate) fn body(scene: &mut Scene, polygons: &[(Vec<DVec3>, MaterialId)]) -> 
         });
     }
     let patches = first..scene.patches.len() as u32;
-    scene.bodies.push(Body { name: format!("body {}", body.0), node, patches });
+    scene.bodies.push(Body { name: format!("body {}", body.0), node, patches, distant: false });
     body
 }
 

@@ -52,7 +52,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
         let patches = Range { start: first, end: parts.patches.len() as u32 };
         if !patches.is_empty() {
             let name = draft.nodes[node].name.clone();
-            parts.bodies.push(Body { name, node: NodeId(node as u32), patches });
+            parts.bodies.push(Body { name, node: NodeId(node as u32), patches, distant: false });
         }
     }
     parts.leave_out_specks(&motion)?;

@@ -97,6 +97,9 @@ pub struct Body {
     pub node: NodeId,
     /// The patches of this body, a range of [`Scene::patches`].
     pub patches: std::ops::Range<u32>,
+    /// It stands for light from outside, the sky or the sun: so far away that it has no place in the scene. It shines,
+    /// and what reaches it has escaped; it has no share in the scene's extent and area, hides nothing, is lit by nothing.
+    pub distant: bool,
 }
 
 /// A named part of a body: one mesh primitive of one object (node with a mesh).
@@ -276,11 +279,11 @@ impl Scene {
         self.motion.moves(self.bodies[body.0 as usize].node)
     }
 
-    /// The smallest and largest world coordinates of all patches present at `time_s`, metres;
+    /// The smallest and largest world coordinates of all patches present at `time_s`, distant ones aside, metres;
     /// `None` while none is.
     pub fn bounds(&self, time_s: f64) -> Option<(DVec3, DVec3)> {
         let mut bounds: Option<(DVec3, DVec3)> = None;
-        for body in (0..self.bodies.len() as u32).map(BodyId) {
+        for body in (0..self.bodies.len() as u32).map(BodyId).filter(|&b| !self.is_distant(b)) {
             let Some(pose) = self.pose(body, time_s) else { continue };
             for point in self.patches_of(body).flat_map(|(_, p)| p.corners_in_body()) {
                 let p = pose.point(point);
@@ -306,9 +309,15 @@ impl Scene {
         range.map(|i| (PatchId(i), &self.patches[i as usize]))
     }
 
-    /// Sum of the areas of all patches, m2 (a double-sided polygon counts twice).
+    /// Whether a body stands for light from outside; see [`Body::distant`].
+    pub fn is_distant(&self, body: BodyId) -> bool {
+        self.bodies[body.0 as usize].distant
+    }
+
+    /// Sum of the areas of all patches, distant ones aside, m2 (a double-sided polygon counts twice).
     pub fn area_m2(&self) -> f64 {
-        self.patches.iter().map(Patch::area_m2).sum()
+        let near = self.patches.iter().filter(|p| !self.is_distant(p.body));
+        near.map(Patch::area_m2).sum()
     }
 }
 
@@ -317,6 +326,15 @@ impl Patch {
     pub fn area_m2(&self) -> f64 {
         let n = self.corners.len();
         (0..n).map(|i| self.corners[i].perp_dot(self.corners[(i + 1) % n])).sum::<f64>() / 2.0
+    }
+
+    /// The largest form factor from a point of the scene to this patch, if it is distant: its area over pi times
+    /// the square of the distance of its plane or corners from the body's origin, whichever is larger in place.
+    pub(crate) fn most_factor(&self) -> f64 {
+        let middle = self.corners_in_body().sum::<DVec3>() / self.corners.len() as f64;
+        let reach = self.corners_in_body().map(|c| c.distance(middle)).fold(0.0, f64::max);
+        let far = (middle.length() - reach).max(0.5 * middle.length());
+        (self.area_m2() / (std::f64::consts::PI * far * far)).min(1.0)
     }
 
     /// Corners in the body's frame, counter-clockwise seen from the front.

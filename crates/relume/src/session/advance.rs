@@ -179,12 +179,14 @@ impl Session {
     ) -> f64 {
         let scene = &self.scene;
         let mean = |c: [f64; 3]| c.iter().sum::<f64>() / 3.0;
+        let area_m2 = scene.area_m2();
         let of_patch = |p: &scene::Patch| {
-            p.area_m2() * mean(exitance(&scene.materials[p.material.0 as usize]))
+            let exitance = mean(exitance(&scene.materials[p.material.0 as usize]));
+            exitance * if scene.is_distant(p.body) { p.most_factor() * area_m2 } else { p.area_m2() }
         };
         let of_light = |light: &scene::Light| {
             let spread = match light.kind {
-                LightKind::Directional => scene.area_m2(),
+                LightKind::Directional => area_m2,
                 LightKind::Point | LightKind::Spot { .. } => 4.0 * std::f64::consts::PI,
             };
             mean(intensity(light)) * spread

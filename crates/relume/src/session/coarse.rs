@@ -112,6 +112,10 @@ impl Coarse {
         let mut lights: Vec<f64> = scene.lights.iter().map(intensity).collect();
         let floor = arriving / total_area * DARK_FLOOR;
         let light_of = |(&id, irradiance): (&u32, &f64)| {
+            if seed.is_distant(ElementId(id)) {
+                let radiosity = mean(self.radiosity.radiosity(id));
+                return Light { radiosity, ..Light::DISTANT };
+            }
             let emitted = mean(surfaces.lit(surfaces.facet_of(id)).exitance);
             let radiosity = mean(self.radiosity.radiosity(id));
             let reflected = (radiosity - emitted).max(0.0);
@@ -129,7 +133,12 @@ impl Coarse {
         } else {
             // Nothing emits, or all is hidden: every surface and light weighs the same, and errors are relative to row sums.
             lights.iter_mut().for_each(|i| *i = f64::from(u8::from(*i > 0.0)));
-            vec![Light::UNIFORM; coarse.len()]
+            let uniform = |&id: &u32| match seed.is_distant(ElementId(id)) {
+                true if self.radiosity.radiosity(id) == [0.0; 3] => Light::DISTANT,
+                true => Light { radiosity: 1.0, ..Light::DISTANT },
+                false => Light::UNIFORM,
+            };
+            coarse.iter().map(uniform).collect()
         };
         Brightness::new(known, lights, total_area * REFERENCE_SHARE)
     }

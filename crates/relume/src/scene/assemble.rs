@@ -71,6 +71,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
         lights: draft.lights,
         cameras: draft.cameras,
         motion,
+        outside: None,
         notes,
     })
 }

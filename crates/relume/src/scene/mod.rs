@@ -5,6 +5,7 @@
 //! pairs or light transport.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
@@ -27,6 +28,7 @@ pub mod limits;
 mod merge;
 mod motion;
 mod names;
+pub mod outside;
 mod rigid;
 mod shell;
 mod solid;
@@ -82,6 +84,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// The node tree and its animation.
     pub motion: Motion,
+    /// The light from outside that distant bodies stand for ([`Scene::with_outside`]).
+    pub outside: Option<Arc<outside::Outside>>,
     /// What was noticed while reading, for `info` and `check`.
     pub notes: Vec<Note>,
 }
@@ -328,12 +332,10 @@ impl Patch {
         (0..n).map(|i| self.corners[i].perp_dot(self.corners[(i + 1) % n])).sum::<f64>() / 2.0
     }
 
-    /// The largest form factor from a point of the scene to this patch, if it is distant: its area over pi times
-    /// the square of the distance of its plane or corners from the body's origin, whichever is larger in place.
-    pub(crate) fn most_factor(&self) -> f64 {
-        let middle = self.corners_in_body().sum::<DVec3>() / self.corners.len() as f64;
-        let reach = self.corners_in_body().map(|c| c.distance(middle)).fold(0.0, f64::max);
-        let far = (middle.length() - reach).max(0.5 * middle.length());
+    /// A bound on the form factor from a point of the scene around `centre` to this patch, if it is distant: its area
+    /// over pi times the square of how far its plane is.
+    pub(crate) fn most_factor(&self, centre: DVec3) -> f64 {
+        let far = (self.frame.origin - centre).dot(self.frame.normal);
         (self.area_m2() / (std::f64::consts::PI * far * far)).min(1.0)
     }
 

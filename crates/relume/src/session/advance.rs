@@ -2,6 +2,8 @@
 //!
 //! Without a state to start from, the same edits build it: a cold build is the update of nothing.
 
+use glam::DVec3;
+
 use crate::element::{ElementId, Forest, Kind, WorldView};
 use crate::event::Ticks;
 use crate::pair::{
@@ -180,9 +182,14 @@ impl Session {
         let scene = &self.scene;
         let mean = |c: [f64; 3]| c.iter().sum::<f64>() / 3.0;
         let area_m2 = scene.area_m2();
+        // Of what moves, patches are placed about its origin, which is the scene's middle.
+        let middle = scene.bounds(0.0).map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
+        let factor = |p: &scene::Patch| {
+            p.most_factor(if scene.moves(p.body) { DVec3::ZERO } else { middle })
+        };
         let of_patch = |p: &scene::Patch| {
             let exitance = mean(exitance(&scene.materials[p.material.0 as usize]));
-            exitance * if scene.is_distant(p.body) { p.most_factor() * area_m2 } else { p.area_m2() }
+            exitance * if scene.is_distant(p.body) { factor(p) * area_m2 } else { p.area_m2() }
         };
         let of_light = |light: &scene::Light| {
             let spread = match light.kind {

@@ -1,0 +1,204 @@
+//! The sky as facets: cells of a cube's sides around the scene, finer where radiance varies.
+//!
+//! Sides of a cube tile all directions without gaps, and boxes around their cells have no thickness. Cells are divided
+//! evenly in angle. Must not know what a sky's radiance comes from.
+
+use std::f64::consts::FRAC_PI_4;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::sky::SkyNow;
+
+/// A part of a side of the cube [-1, 1]^3, seen from its middle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Cell {
+    side: Side,
+    /// Lower and upper angles along both axes of the side, in units of 45 degrees.
+    low: DVec2,
+    high: DVec2,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Side {
+    outward: DVec3,
+    u: DVec3,
+    v: DVec3,
+}
+
+/// A cell with its mean radiance at each of the given instants, W/m2/sr.
+#[derive(Clone, Debug)]
+pub(super) struct Facet {
+    pub(super) cell: Cell,
+    pub(super) radiance: Vec<[f64; 3]>,
+    /// Root mean square of what radiance differs by from the mean, times the solid angle, over the whole sky's flux; the
+    /// largest of all instants.
+    uneven: f64,
+    depth: u32,
+}
+
+/// A cell is uneven enough to be divided above this share of the sky's light.
+const UNEVEN: f64 = 1e-3;
+
+/// Facets of a sky at most.
+const FACETS_MAX: usize = 192;
+
+/// Samples along a side of a cell, of skies by formula and of pictures.
+const SAMPLES: (u32, u32) = (8, 32);
+
+/// Divisions of a cell at most, of skies by formula and of pictures.
+const DEPTH_MAX: (u32, u32) = (5, 8);
+
+/// Facets of a sky that is given at one instant or more; without those that are always dark.
+pub(super) fn facets(skies: &[SkyNow], all_round: bool) -> Vec<Facet> {
+    let pictured = matches!(skies.first(), Some(SkyNow::Picture(_)));
+    let (samples, depth_max) =
+        if pictured { (SAMPLES.1, DEPTH_MAX.1) } else { (SAMPLES.0, DEPTH_MAX.0) };
+    let means = |cell: Cell| -> (f64, Vec<Mean>) {
+        let mut solid_angle = 0.0;
+        let of = |sky: &SkyNow| Mean::of(sky, &cell, samples);
+        let means = skies.iter().map(of).collect::<Vec<_>>();
+        solid_angle += cell.solid_angle(samples);
+        (solid_angle, means)
+    };
+    let roots: Vec<(Cell, f64, Vec<Mean>)> = roots(all_round)
+        .into_par_iter()
+        .map(|cell| {
+            let (angle, means) = means(cell);
+            (cell, angle, means)
+        })
+        .collect();
+    let mut flux = vec![0.0; skies.len()];
+    for (_, angle, means) in &roots {
+        flux.iter_mut().zip(means).for_each(|(flux, m)| *flux += angle * m.brightness());
+    }
+    let facet = |cell: Cell, (angle, means): (f64, Vec<Mean>), depth: u32| Facet {
+        cell,
+        uneven: means.iter().zip(&flux).map(|(m, f)| angle * m.uneven() / f.max(f64::MIN_POSITIVE)).fold(0.0, f64::max),
+        radiance: means.iter().map(|m| m.radiance).collect(),
+        depth,
+    };
+    let mut out: Vec<Facet> =
+        roots.into_iter().map(|(cell, angle, means)| facet(cell, (angle, means), 0)).collect();
+    while out.len() + 3 <= FACETS_MAX {
+        let may_split = |f: &&Facet| f.depth < depth_max && f.uneven > UNEVEN;
+        let uneven = out.iter().enumerate().filter(|(_, f)| may_split(f));
+        // The first of equals.
+        let Some((worst, _)) = uneven.reduce(|one, two| if two.1.uneven > one.1.uneven { two } else { one })
+        else {
+            break;
+        };
+        let Facet { cell, depth, .. } = out[worst];
+        let parts: Vec<Facet> =
+            cell.quarters().into_par_iter().map(|c| facet(c, means(c), depth + 1)).collect();
+        out.splice(worst..=worst, parts);
+    }
+    out.retain(|f| f.radiance.iter().any(|l| l.iter().any(|&c| c > 0.0)));
+    out
+}
+
+/// Cells to begin with: 45 degrees by 45.
+fn roots(all_round: bool) -> Vec<Cell> {
+    let side = |outward: DVec3, u: DVec3| Side { outward, u, v: u.cross(outward) };
+    let mut out = Vec::new();
+    let mut add = |side: Side, low: DVec2| out.push(Cell { side, low, high: low + 1.0 });
+    let halves = [-1.0, 0.0];
+    let flat = [Some(DVec3::Y), all_round.then_some(DVec3::NEG_Y)];
+    for outward in flat.into_iter().flatten() {
+        for (u, v) in halves.into_iter().flat_map(|u| halves.map(|v| (u, v))) {
+            add(side(outward, DVec3::X), DVec2::new(u, v));
+        }
+    }
+    for outward in [DVec3::NEG_Z, DVec3::X, DVec3::Z, DVec3::NEG_X] {
+        let upright = Side { outward, u: outward.cross(DVec3::Y), v: DVec3::Y };
+        let floors: &[f64] = if all_round { &[0.0, -1.0] } else { &[0.0] };
+        for (u, &v) in halves.into_iter().flat_map(|u| floors.iter().map(move |v| (u, v))) {
+            add(upright, DVec2::new(u, v));
+        }
+    }
+    out
+}
+
+impl Cell {
+    /// The lower half of all directions.
+    pub(super) fn below() -> Vec<Cell> {
+        let all = roots(true);
+        let down = |c: &Cell| c.side.outward.y < 0.0 || (c.side.outward.y == 0.0 && c.low.y < 0.0);
+        all.into_iter().filter(down).collect()
+    }
+
+    /// The point of the cube's surface at angles along both axes, in units of 45 degrees.
+    fn point(&self, at: DVec2) -> DVec3 {
+        let Side { outward, u, v } = self.side;
+        // Exact where cells of two sides meet.
+        let along = |a: f64| if a.abs() == 1.0 { a } else { libm::tan(a * FRAC_PI_4) };
+        outward + u * along(at.x) + v * along(at.y)
+    }
+
+    /// Corners on the surface of the cube, counter-clockwise seen from its middle.
+    pub(super) fn corners(&self) -> [DVec3; 4] {
+        let (l, h) = (self.low, self.high);
+        let corners = [l, DVec2::new(h.x, l.y), h, DVec2::new(l.x, h.y)].map(|at| self.point(at));
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        match normal.dot(self.side.outward) < 0.0 {
+            true => corners,
+            false => [corners[3], corners[2], corners[1], corners[0]],
+        }
+    }
+
+    fn quarters(&self) -> Vec<Cell> {
+        let half = (self.high - self.low) * 0.5;
+        let part = |k: usize| {
+            let low = self.low + half * DVec2::new((k & 1) as f64, (k >> 1) as f64);
+            Cell { low, high: low + half, ..*self }
+        };
+        (0..4).map(part).collect()
+    }
+
+    /// Directions of evenly spread points, each with its solid angle, sr.
+    fn samples(&self, count: u32) -> impl Iterator<Item = (DVec3, f64)> + '_ {
+        let step = (self.high - self.low) / f64::from(count);
+        (0..count * count).map(move |k| {
+            let at = DVec2::new(f64::from(k % count) + 0.5, f64::from(k / count) + 0.5);
+            let p = self.point(self.low + at * step);
+            let tangent = |axis: DVec3| p.dot(axis);
+            let (tu, tv) = (tangent(self.side.u), tangent(self.side.v));
+            // d omega = du dv / r^3 on the side, du = (1 + u^2) times the angle.
+            let area = (1.0 + tu * tu) * (1.0 + tv * tv) * FRAC_PI_4 * FRAC_PI_4 * step.x * step.y;
+            let r = p.length();
+            (p / r, area / (r * r * r))
+        })
+    }
+
+    fn solid_angle(&self, count: u32) -> f64 {
+        self.samples(count).map(|s| s.1).sum()
+    }
+}
+
+/// Mean radiance over a cell, and of its square.
+struct Mean {
+    radiance: [f64; 3],
+    square: f64,
+}
+
+impl Mean {
+    fn of(sky: &SkyNow, cell: &Cell, samples: u32) -> Mean {
+        let (mut sum, mut square, mut all) = ([0.0; 3], 0.0, 0.0);
+        for (direction, angle) in cell.samples(samples) {
+            let radiance = sky.radiance(direction);
+            (0..3).for_each(|c| sum[c] += angle * radiance[c]);
+            let mean = radiance.iter().sum::<f64>() / 3.0;
+            square += angle * mean * mean;
+            all += angle;
+        }
+        Mean { radiance: sum.map(|s| s / all), square: square / all }
+    }
+
+    fn brightness(&self) -> f64 {
+        self.radiance.iter().sum::<f64>() / 3.0
+    }
+
+    fn uneven(&self) -> f64 {
+        (self.square - self.brightness().powi(2)).max(0.0).sqrt()
+    }
+}

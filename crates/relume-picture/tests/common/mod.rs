@@ -39,6 +39,7 @@ pub(crate) fn empty() -> Scene {
         lights: Vec::new(),
         cameras: Vec::new(),
         motion: Motion::default(),
+        outside: None,
         notes: Vec::new(),
     }
 }

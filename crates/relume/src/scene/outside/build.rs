@@ -94,12 +94,14 @@ impl<'a> Adding<'a> {
         let all_round = outside.sky.as_ref().is_some_and(super::Sky::is_all_round);
         let mut lit: Vec<(&str, Cell, Vec<[f64; 3]>)> = Vec::new();
         if !skies.is_empty() {
-            let facets = dome::facets(&skies, all_round);
+            let facets = dome::facets(&skies, all_round, outside.fineness);
             lit.extend(facets.into_iter().map(|f| ("sky", f.cell, f.radiance)));
         }
         let ground: Vec<[f64; 3]> = keys.iter().map(|key| key.ground).collect();
         if ground.iter().flatten().any(|&l| l > 0.0) {
-            lit.extend(Cell::below().into_iter().map(|cell| ("ground beyond", cell, ground.clone())));
+            lit.extend(
+                Cell::below().into_iter().map(|cell| ("ground beyond", cell, ground.clone())),
+            );
         }
         if lit.is_empty() {
             return;

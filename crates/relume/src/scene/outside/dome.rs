@@ -31,17 +31,18 @@ struct Side {
 pub(super) struct Facet {
     pub(super) cell: Cell,
     pub(super) radiance: Vec<[f64; 3]>,
-    /// Root mean square of what radiance differs by from the mean, times the solid angle, over the whole sky's flux; the
-    /// largest of all instants.
-    uneven: f64,
+    /// By how much of the sky's light, at each instant, the light of this cell is sent from the wrong place at most: the
+    /// standard deviations of radiance and of direction over the cell times its solid angle.
+    errors: Vec<f64>,
     depth: u32,
 }
 
-/// A cell is uneven enough to be divided above this share of the sky's light.
-const UNEVEN: f64 = 1e-3;
+/// Share of what facets may make irradiance wrong by that the sum of their errors may be: a bound for any surface, of
+/// which shaped skies come to two thirds.
+const SHARE: f64 = 0.5;
 
 /// Facets of a sky at most.
-const FACETS_MAX: usize = 192;
+const FACETS_MAX: usize = 1024;
 
 /// Samples along a side of a cell, of skies by formula and of pictures.
 const SAMPLES: (u32, u32) = (8, 32);
@@ -50,47 +51,40 @@ const SAMPLES: (u32, u32) = (8, 32);
 const DEPTH_MAX: (u32, u32) = (5, 8);
 
 /// Facets of a sky that is given at one instant or more; without those that are always dark.
-pub(super) fn facets(skies: &[SkyNow], all_round: bool) -> Vec<Facet> {
+///
+/// The cell that errs most is divided until the errors of all are below half of `fineness`, relative to the sky's light.
+pub(super) fn facets(skies: &[SkyNow], all_round: bool, fineness: f64) -> Vec<Facet> {
     let pictured = matches!(skies.first(), Some(SkyNow::Picture(_)));
     let (samples, depth_max) =
         if pictured { (SAMPLES.1, DEPTH_MAX.1) } else { (SAMPLES.0, DEPTH_MAX.0) };
-    let means = |cell: Cell| -> (f64, Vec<Mean>) {
-        let mut solid_angle = 0.0;
-        let of = |sky: &SkyNow| Mean::of(sky, &cell, samples);
-        let means = skies.iter().map(of).collect::<Vec<_>>();
-        solid_angle += cell.solid_angle(samples);
-        (solid_angle, means)
-    };
-    let roots: Vec<(Cell, f64, Vec<Mean>)> = roots(all_round)
-        .into_par_iter()
-        .map(|cell| {
-            let (angle, means) = means(cell);
-            (cell, angle, means)
-        })
-        .collect();
-    let mut flux = vec![0.0; skies.len()];
-    for (_, angle, means) in &roots {
-        flux.iter_mut().zip(means).for_each(|(flux, m)| *flux += angle * m.brightness());
-    }
-    let facet = |cell: Cell, (angle, means): (f64, Vec<Mean>), depth: u32| Facet {
+    let look = |cell: &Cell| skies.iter().map(|s| Mean::of(s, cell, samples)).collect::<Vec<_>>();
+    let roots = roots(all_round);
+    let looks: Vec<Vec<Mean>> = roots.par_iter().map(look).collect();
+    let flux_of = |k: usize| looks.iter().map(|of_cell| of_cell[k].flux()).sum::<f64>();
+    let flux: Vec<f64> = (0..skies.len()).map(flux_of).collect();
+    let facet = |cell: Cell, means: Vec<Mean>, depth: u32| Facet {
         cell,
-        uneven: means.iter().zip(&flux).map(|(m, f)| angle * m.uneven() / f.max(f64::MIN_POSITIVE)).fold(0.0, f64::max),
+        errors: means.iter().zip(&flux).map(|(m, all)| m.error() / all.max(1e-300)).collect(),
         radiance: means.iter().map(|m| m.radiance).collect(),
         depth,
     };
     let mut out: Vec<Facet> =
-        roots.into_iter().map(|(cell, angle, means)| facet(cell, (angle, means), 0)).collect();
+        roots.into_iter().zip(looks).map(|(cell, means)| facet(cell, means, 0)).collect();
     while out.len() + 3 <= FACETS_MAX {
-        let may_split = |f: &&Facet| f.depth < depth_max && f.uneven > UNEVEN;
-        let uneven = out.iter().enumerate().filter(|(_, f)| may_split(f));
-        // The first of equals.
-        let Some((worst, _)) = uneven.reduce(|one, two| if two.1.uneven > one.1.uneven { two } else { one })
+        let sums = (0..skies.len()).map(|k| out.iter().map(|f| f.errors[k]).sum::<f64>());
+        // The instant that errs most.
+        let (instant, sum) = sums.enumerate().fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
+        let may_split = |f: &(usize, &Facet)| f.1.depth < depth_max && f.1.errors[instant] > 0.0;
+        let worst = out.iter().enumerate().filter(may_split).reduce(|one, two| {
+            // The first of equals.
+            if two.1.errors[instant] > one.1.errors[instant] { two } else { one }
+        });
+        let Some((worst, &Facet { cell, depth, .. })) = worst.filter(|_| sum > SHARE * fineness)
         else {
             break;
         };
-        let Facet { cell, depth, .. } = out[worst];
-        let parts: Vec<Facet> =
-            cell.quarters().into_par_iter().map(|c| facet(c, means(c), depth + 1)).collect();
+        let parts = cell.quarters().into_par_iter();
+        let parts: Vec<Facet> = parts.map(|c| facet(c, look(&c), depth + 1)).collect();
         out.splice(worst..=worst, parts);
     }
     out.retain(|f| f.radiance.iter().any(|l| l.iter().any(|&c| c > 0.0)));
@@ -169,36 +163,42 @@ impl Cell {
             (p / r, area / (r * r * r))
         })
     }
-
-    fn solid_angle(&self, count: u32) -> f64 {
-        self.samples(count).map(|s| s.1).sum()
-    }
 }
 
-/// Mean radiance over a cell, and of its square.
+/// What comes from a cell at one instant.
 struct Mean {
     radiance: [f64; 3],
-    square: f64,
+    solid_angle: f64,
+    /// Standard deviations of radiance (mean of the channels), W/m2/sr, and of direction, radians.
+    spread: (f64, f64),
 }
 
 impl Mean {
     fn of(sky: &SkyNow, cell: &Cell, samples: u32) -> Mean {
-        let (mut sum, mut square, mut all) = ([0.0; 3], 0.0, 0.0);
+        let (mut sum, mut square, mut all, mut middle) = ([0.0; 3], 0.0, 0.0, DVec3::ZERO);
         for (direction, angle) in cell.samples(samples) {
             let radiance = sky.radiance(direction);
             (0..3).for_each(|c| sum[c] += angle * radiance[c]);
             let mean = radiance.iter().sum::<f64>() / 3.0;
             square += angle * mean * mean;
             all += angle;
+            middle += direction * angle;
         }
-        Mean { radiance: sum.map(|s| s / all), square: square / all }
+        let radiance = sum.map(|s| s / all);
+        let mean = radiance.iter().sum::<f64>() / 3.0;
+        let deviation = |square: f64| square.max(0.0).sqrt();
+        let spread = (
+            deviation(square / all - mean * mean),
+            deviation(1.0 - (middle / all).length_squared()),
+        );
+        Mean { radiance, solid_angle: all, spread }
     }
 
-    fn brightness(&self) -> f64 {
-        self.radiance.iter().sum::<f64>() / 3.0
+    fn flux(&self) -> f64 {
+        self.solid_angle * self.radiance.iter().sum::<f64>() / 3.0
     }
 
-    fn uneven(&self) -> f64 {
-        (self.square - self.brightness().powi(2)).max(0.0).sqrt()
+    fn error(&self) -> f64 {
+        self.solid_angle * self.spread.0 * self.spread.1
     }
 }

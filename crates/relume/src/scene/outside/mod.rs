@@ -33,6 +33,9 @@ pub struct Outside {
     pub ground: f64,
     /// How the clip's time runs for the sun.
     pub day: Option<Day>,
+    /// Relative error of irradiance that the sky's facets may make: the tolerance, as a rule. At 0 they are as many as
+    /// are allowed.
+    pub fineness: f64,
 }
 
 /// How the clip's time runs for the sun: it is at its place in the given second of the place's time at the start, and
@@ -91,7 +94,11 @@ impl Outside {
         }
         if self.sky.as_ref().is_some_and(Sky::follows_the_sun) && self.sun.is_none() {
             let what = "how it looks depends on where the sun is".into();
-            return fails("the sky", what, "give the sun's place: --sun AZIMUTH,ELEVATION or LATITUDE,LONGITUDE,TIME");
+            return fails(
+                "the sky",
+                what,
+                "give the sun's place: --sun AZIMUTH,ELEVATION or LATITUDE,LONGITUDE,TIME",
+            );
         }
         if let Some(sun) = &self.sun {
             if !(sun.diameter_deg >= 1e-3 && sun.diameter_deg <= 60.0) {
@@ -108,7 +115,8 @@ impl Outside {
         match (&self.day, &self.sun) {
             (None, _) | (Some(_), Some(Sun { place: SunPlace::Earth { .. }, .. })) => Ok(()),
             _ => {
-                let what = "the sun moves over the day of a place on earth, and there is none".into();
+                let what =
+                    "the sun moves over the day of a place on earth, and there is none".into();
                 fails("the day", what, "give --sun LATITUDE,LONGITUDE,TIME")
             }
         }

@@ -49,11 +49,8 @@ impl Coloured {
         let radiance = luminance / LUMENS_PER_WATT;
         let xyz = [radiance * x / y, radiance, radiance * (1.0 - x - y) / y];
         // IEC 61966-2-1. Colours out of the gamut lose what is below nothing.
-        let to_rgb = [
-            [3.2406, -1.5372, -0.4986],
-            [-0.9689, 1.8758, 0.0415],
-            [0.0557, -0.2040, 1.0570],
-        ];
+        let to_rgb =
+            [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]];
         to_rgb.map(|row| (0..3).map(|k| row[k] * xyz[k]).sum::<f64>().max(0.0))
     }
 }
@@ -181,8 +178,7 @@ pub(super) fn all_weather(direct: f64, diffuse: f64, sun: f64) -> Distribution {
     let brightness = (diffuse * air_mass(sun) / SOLAR_CONSTANT).clamp(0.01, 0.6);
     let row = CLEARNESSES.iter().filter(|&&bound| clearness >= bound).count();
     let table = &ALL_WEATHER[row];
-    let mut parameters =
-        table.map(|[p, q, r, s]| p + q * sun + brightness * (r + s * sun));
+    let mut parameters = table.map(|[p, q, r, s]| p + q * sun + brightness * (r + s * sun));
     if row == 0 {
         let [[c1, c2, c3, c4], [d1, d2, d3, d4]] = [table[2], table[3]];
         parameters[2] = libm::exp(libm::pow(brightness * (c1 + c2 * sun), c3)) - c4;

@@ -66,7 +66,9 @@ impl SunPlace {
         let found = found.map_err(|error| SceneError::Geometry {
             subject: "the sun".into(),
             what: format!("it has no place at latitude {latitude}, longitude {longitude}: {error}"),
-            remedy: "give a latitude of -90 to 90, a longitude of -180 to 180, and a year of our time".into(),
+            remedy:
+                "give a latitude of -90 to 90, a longitude of -180 to 180, and a year of our time"
+                    .into(),
         })?;
         let round = |a: f64| (a / ROUND_DEG).round() * ROUND_DEG;
         Ok([round(found.azimuth()), round(found.elevation_angle())])

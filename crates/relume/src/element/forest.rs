@@ -151,6 +151,8 @@ struct Fixed {
     connected_m2: Vec<f64>,
     /// Whether a node stands for light from outside, by id; empty if none does.
     distant: Vec<bool>,
+    /// How many facets receive light: they come before those that are distant.
+    near_facets: usize,
 }
 
 /// Where elements went when the forest was put together: those that stayed keep their order.
@@ -235,6 +237,8 @@ impl Forest {
             forest.fixed_mut().distant = distant;
         }
         forest.fixed_mut().facets.sort_unstable();
+        let near_facets = forest.facets().partition_point(|facet| !forest.is_distant(*facet));
+        forest.fixed_mut().near_facets = near_facets;
         forest.fixed_len = forest.nodes.len() as u32;
         forest.kept_len = forest.fixed_len;
         forest.sum_areas();
@@ -402,6 +406,16 @@ impl Forest {
     /// The quadtree roots, ascending.
     pub fn facets(&self) -> &[ElementId] {
         &self.fixed.facets
+    }
+
+    /// Those of them that receive light, ascending; the others are distant.
+    pub fn near_facets(&self) -> &[ElementId] {
+        &self.fixed.facets[..self.fixed.near_facets]
+    }
+
+    /// Those of them that are distant, ascending.
+    pub fn distant_facets(&self) -> &[ElementId] {
+        &self.fixed.facets[self.fixed.near_facets..]
     }
 
     /// Bytes held by what clones of this forest do not share.

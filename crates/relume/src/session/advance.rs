@@ -86,16 +86,22 @@ impl Session {
             if relit {
                 parents.extend(self.relit_facets(&solved, from_s));
             }
+            parents.retain(|&facet| solved.forest.receives(ElementId(facet)));
         }
-        if self.scene.lights.iter().any(|light| light.is_relit([from_s, time_s])) {
-            // Whoever gathers from a light gathers anew.
-            let lit = (&*self.scene, time_s);
-            coarse::set_lights(lit, &solved.forest, &mut solved.radiosity);
+        let lights = &self.scene.lights;
+        let relights = lights.iter().any(|light| light.is_relit([from_s, time_s]))
+            || self.outside_differs(&solved, &old, from_s);
+        if relights {
+            // Whoever gathers from a light, or from outside, gathers anew: neither knows who that is.
             dirty = Dirty::All;
         }
         report.seconds.judge = clock.lap();
 
         let lit = LitForest::new(&self.scene, &solved.forest, time_s).present_in(&solved.view);
+        if relights {
+            let at = (&*self.scene, time_s);
+            coarse::set_sources(at, (&solved.forest, &lit), &mut solved.radiosity);
+        }
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
         let share = if cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE };
         let residual = self.options.tolerance * share;
@@ -316,6 +322,13 @@ impl Session {
             solved.view.is_present(body) != old.is_present(body)
         };
         forest.facets().iter().filter(toggled).map(|f| f.0).collect()
+    }
+
+    /// Whether what is distant emits otherwise than at `from_s`, or came or went since `old`.
+    fn outside_differs(&self, solved: &Solved, old: &WorldView, from_s: f64) -> bool {
+        let distant = |id: &u32| solved.forest.is_distant(ElementId(*id));
+        self.came_or_went(solved, old).iter().any(distant)
+            || self.relit_facets(solved, from_s).iter().any(distant)
     }
 
     /// Facets that emit otherwise than at `from_s`.

@@ -155,19 +155,22 @@ impl Coarse {
     }
 }
 
-/// A solution to begin with: exitances, and intensities of punctual lights.
+/// A solution to begin with: exitances, and what lights and what is distant send.
 pub(super) fn start(lit: (&Scene, f64), forest: &Forest, surfaces: &LitForest<'_>) -> Radiosity {
     let mut out = Radiosity::new(surfaces);
-    set_lights(lit, forest, &mut out);
+    set_sources(lit, (forest, surfaces), &mut out);
     out
 }
 
-/// Gives the punctual lights the intensities that they have at a time.
-pub(super) fn set_lights(
+/// Gives the punctual lights the intensities that they have at a time, and what is distant its exitance.
+pub(super) fn set_sources(
     (scene, time_s): (&Scene, f64),
-    forest: &Forest,
+    (forest, surfaces): (&Forest, &LitForest<'_>),
     radiosity: &mut Radiosity,
 ) {
+    for facet in forest.distant_facets() {
+        radiosity.set(facet.0, surfaces.lit(facet.0).exitance);
+    }
     for id in 0..forest.fixed_len() {
         if let Some(light) = forest.light(ElementId(id)) {
             radiosity.set(id, scene.lights[light].intensity_at(time_s).map(|x| x as f32));

@@ -70,7 +70,7 @@ impl Surfaces for LitForest<'_> {
     }
 
     fn facets(&self) -> &[ElementId] {
-        self.forest.facets()
+        self.forest.near_facets()
     }
 
     fn is_surface(&self, id: u32) -> bool {

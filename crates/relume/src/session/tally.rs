@@ -59,8 +59,7 @@ fn balance(scene: &Scene, solved: &Solved) -> (RowSumError, Energy) {
         let patch = forest.patch(*facet).expect("has a patch");
         solved.view.is_present(scene.patches[patch.0 as usize].body)
     };
-    let near = |facet: &ElementId| forest.receives(*facet);
-    let facets = forest.facets().iter().copied().filter(near).filter(present);
+    let facets = forest.near_facets().iter().copied().filter(present);
     let is_surface = |id: u32| forest.receives(ElementId(id));
     let lit = (&solved.links, &solved.radiosity);
     let (rows, mut energy) = balance_of(&surfaces, lit, facets, &is_surface);
@@ -178,7 +177,7 @@ pub(super) fn row_sums_of(scene: &Scene, solved: &Solved) -> Vec<(ElementId, f64
     let surfaces = LitForest::new(scene, forest, solved.time_s);
     let is_surface = |id: u32| forest.receives(ElementId(id));
     let mut out = Vec::with_capacity(forest.counts().leaves as usize);
-    for facet in forest.facets().iter().filter(|facet| forest.receives(**facet)) {
+    for facet in forest.near_facets() {
         let links = (&solved.links, !solved.radiosity.is_bounded());
         row_sums(&surfaces, links, &is_surface, facet.0, &mut |id, sum| {
             out.push((ElementId(id), f64::from(sum)));

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
 use crate::frames::FrameSpec;
+use crate::outside::OutsideFlags;
 
 /// Largest picture side, pixels.
 const SIZE_MAX: u32 = 16_384;
@@ -424,6 +425,8 @@ pub(crate) struct InfoArgs {
     /// Frames a second at which the animation's frames are counted.
     #[arg(long, value_name = "FPS", default_value = "24", value_parser = parse_fps)]
     pub(crate) fps: f64,
+    #[command(flatten)]
+    pub(crate) outside: OutsideFlags,
 }
 
 /// `relume check`
@@ -475,6 +478,8 @@ pub(crate) struct ClipFlags {
     /// Threads to use; the result has the same bits for any number [default: all cores].
     #[arg(long, value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
+    #[command(flatten)]
+    pub(crate) outside: OutsideFlags,
     /// No progress bar, no warnings, no summary; errors only.
     #[arg(short, long)]
     pub(crate) quiet: bool,
@@ -489,6 +494,7 @@ impl Default for ClipFlags {
             tolerance: None,
             oracle: OracleFlag::Error,
             threads: None,
+            outside: OutsideFlags::default(),
             quiet: false,
         }
     }

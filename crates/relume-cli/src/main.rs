@@ -16,6 +16,7 @@ mod interrupt;
 mod lock;
 mod memory;
 mod output;
+mod outside;
 mod paper;
 mod probe;
 mod progress;

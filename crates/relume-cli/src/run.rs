@@ -104,6 +104,7 @@ impl Job {
             ));
         }
         let clip = Clip::of_file(&self.scene, &self.solve.clip, self.tolerance)?;
+        let clip = if self.picture.is_some() { clip.lit()? } else { clip };
         clip.warn();
         clip.warn_of(self.solve.update);
         let clip = clip.without_dark_sides();
@@ -211,6 +212,7 @@ impl Job {
             update: self.solve.update.name(),
             threads: clip.threads,
             max_memory_bytes: memory::limit_bytes(),
+            outside: flags.outside.describe(),
             picture,
         }
     }

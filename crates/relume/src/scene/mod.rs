@@ -307,6 +307,17 @@ impl Scene {
         dark
     }
 
+    /// The same scene without the bodies that stand for light from outside, which come last.
+    pub fn without_outside(&self) -> Scene {
+        let mut near = Scene { outside: None, ..self.clone() };
+        near.bodies.retain(|body| !body.distant);
+        let (bodies, patches) =
+            (near.bodies.len(), near.bodies.last().map_or(0, |body| body.patches.end));
+        near.patches.truncate(patches as usize);
+        near.surfaces.retain(|surface| (surface.body.0 as usize) < bodies);
+        near
+    }
+
     /// The patches of a body with their ids.
     pub fn patches_of(&self, body: BodyId) -> impl Iterator<Item = (PatchId, &Patch)> {
         let range = self.bodies[body.0 as usize].patches.clone();

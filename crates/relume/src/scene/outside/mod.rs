@@ -168,6 +168,23 @@ impl Outside {
 const KEY_S: f64 = 600.0;
 
 impl OutsideNow {
+    /// Azimuth and elevation of the sun, degrees, if there is one.
+    pub fn sun_angles(&self) -> Option<[f64; 2]> {
+        let (d, ..) = self.sun?;
+        let azimuth = libm::atan2(d.x, -d.z).to_degrees().rem_euclid(360.0);
+        Some([azimuth, libm::asin(d.y.clamp(-1.0, 1.0)).to_degrees()])
+    }
+
+    /// Irradiance of a horizontal surface that faces up: of the sky, and of the sun; W/m2, linear RGB.
+    pub fn horizontal_w_m2(&self) -> [[f64; 3]; 2] {
+        let sky = self.sky.as_ref().map_or([0.0; 3], SkyNow::horizontal);
+        let sun = self.sun.map_or([0.0; 3], |(towards, cosine, radiance)| {
+            // Irradiance is pi sin^2 of the disc's radius times radiance.
+            radiance.map(|l| PI * (1.0 - cosine * cosine) * l * towards.y.max(0.0))
+        });
+        [sky, sun]
+    }
+
     /// Radiance from a direction (a unit vector), W/m2/sr, linear RGB: what a camera sees there.
     pub fn radiance(&self, direction: DVec3) -> [f64; 3] {
         if let Some((towards, cosine, radiance)) = self.sun

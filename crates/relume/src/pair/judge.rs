@@ -130,7 +130,9 @@ impl Judge for Placed<'_> {
     ) -> bool {
         match (self.forest.kind(a), self.forest.kind(b)) {
             (Kind::Element, Kind::Element) => {
-                let by_area = matches!(self.oracle, Oracle::FormFactor { .. });
+                // Of what is distant the form-factor oracle goes by what is seen, too.
+                let distant = self.forest.is_distant(a) || self.forest.is_distant(b);
+                let by_area = matches!(self.oracle, Oracle::FormFactor { .. }) && !distant;
                 if !by_area && !self.is_above_coarse(a, b) {
                     return false;
                 }

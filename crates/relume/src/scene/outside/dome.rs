@@ -47,6 +47,9 @@ const FACETS_MAX: usize = 1024;
 /// Samples along a side of a cell, of skies by formula and of pictures.
 const SAMPLES: (u32, u32) = (8, 32);
 
+/// Divisions of a cell at least: what stands before a large one is much to clip.
+const DEPTH_MIN: u32 = 1;
+
 /// Divisions of a cell at most, of skies by formula and of pictures.
 const DEPTH_MAX: (u32, u32) = (5, 8);
 
@@ -70,8 +73,18 @@ pub(super) fn facets(skies: &[SkyNow], all_round: bool, fineness: f64) -> Vec<Fa
     };
     let mut out: Vec<Facet> =
         roots.into_iter().zip(looks).map(|(cell, means)| facet(cell, means, 0)).collect();
+    let divide = |out: &mut Vec<Facet>, at: usize| {
+        let Facet { cell, depth, .. } = out[at];
+        let parts = cell.quarters().into_par_iter();
+        let parts: Vec<Facet> = parts.map(|c| facet(c, look(&c), depth + 1)).collect();
+        out.splice(at..=at, parts);
+    };
     while out.len() + 3 <= FACETS_MAX {
         let sums = (0..skies.len()).map(|k| out.iter().map(|f| f.errors[k]).sum::<f64>());
+        if let Some(coarse) = out.iter().position(|f| f.depth < DEPTH_MIN) {
+            divide(&mut out, coarse);
+            continue;
+        }
         // The instant that errs most.
         let (instant, sum) = sums.enumerate().fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
         let may_split = |f: &(usize, &Facet)| f.1.depth < depth_max && f.1.errors[instant] > 0.0;
@@ -79,13 +92,8 @@ pub(super) fn facets(skies: &[SkyNow], all_round: bool, fineness: f64) -> Vec<Fa
             // The first of equals.
             if two.1.errors[instant] > one.1.errors[instant] { two } else { one }
         });
-        let Some((worst, &Facet { cell, depth, .. })) = worst.filter(|_| sum > SHARE * fineness)
-        else {
-            break;
-        };
-        let parts = cell.quarters().into_par_iter();
-        let parts: Vec<Facet> = parts.map(|c| facet(c, look(&c), depth + 1)).collect();
-        out.splice(worst..=worst, parts);
+        let Some((worst, _)) = worst.filter(|_| sum > SHARE * fineness) else { break };
+        divide(&mut out, worst);
     }
     out.retain(|f| f.radiance.iter().any(|l| l.iter().any(|&c| c > 0.0)));
     out

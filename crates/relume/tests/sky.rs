@@ -8,7 +8,7 @@ use std::sync::Arc;
 use common::{at_tolerance, still, v};
 use glam::DVec3;
 use rayon::prelude::*;
-use relume::scene::outside::{Day, Outside, SUN_DIAMETER_DEG, Sky, Sun, SunPlace};
+use relume::scene::outside::{Day, Environment, Outside, SUN_DIAMETER_DEG, Sky, Sun, SunPlace};
 use relume::scene::{Scene, SceneBuilder};
 use relume::session::{Sensor, Session, Solution, Update};
 use relume_judge::{Random, World};
@@ -363,4 +363,119 @@ fn a_day_with_blinds_before_the_window_equals_cold_builds() {
             );
         }
     }
+}
+
+/// A picture of 64 x 32 pixels with one of them bright.
+fn spotted(bright: (u32, u32), radiance: f32) -> Vec<[f32; 3]> {
+    let at = (bright.1 * 64 + bright.0) as usize;
+    (0..64 * 32).map(|k| if k == at { [radiance; 3] } else { [0.5, 1.0, 2.0] }).collect()
+}
+
+/// Direction of the middle of a pixel, and its solid angle.
+fn pixel(x: u32, y: u32) -> (DVec3, f64) {
+    let across = (f64::from(x) + 0.5) / 64.0 * 2.0 * PI - PI;
+    let (top, bottom) = (f64::from(y) / 32.0 * PI, f64::from(y + 1) / 32.0 * PI);
+    let down = 0.5 * (top + bottom);
+    let d = v(down.sin() * across.sin(), down.cos(), -down.sin() * across.cos());
+    (d, (top.cos() - bottom.cos()) * 2.0 * PI / 64.0)
+}
+
+#[test]
+fn a_picture_lights_from_all_round_and_its_brightest_pixel_is_a_lamp() {
+    let wall = |b: &mut SceneBuilder| {
+        let black = b.material("wall", [0.0; 3], [0.0; 3]);
+        let node = still(b, "wall");
+        // It faces east.
+        let c = [v(5.0, 0.0, 1.0), v(5.0, 0.0, -1.0), v(5.0, 2.0, -1.0), v(5.0, 2.0, 1.0)];
+        b.polygon(node, "wall", black, &c);
+    };
+    // North-east and up.
+    let (radiance, at) = (900.0, (40, 10));
+    let picture = Environment::new("spot", (64, 32), spotted(at, radiance)).unwrap();
+    let outside = |turn: f64| under(Sky::Environment(Arc::new(picture.clone().turned(turn))));
+    let session = solved(floor(1.0, wall), outside(0.0), 0.01);
+    let (towards, solid) = pixel(at.0, at.1);
+    let lamp = (f64::from(radiance) - 0.5) * solid;
+    assert!(towards.x > 0.5 && towards.z < -0.1, "{towards}");
+    close(session.irradiance_at(DVec3::ZERO, UP)[0], 0.5 * PI + lamp * towards.y, 5e-3);
+    let east = session.irradiance_at(v(5.0, 1.0, 0.0), DVec3::X);
+    close(east[0], 0.5 * PI + lamp * towards.x, 5e-3);
+    close(mean_of(&session, "wall"), east[0], 5e-3);
+    // Turned by a quarter to the left, what was in the north-east is in the north-west.
+    let session = solved(floor(1.0, wall), outside(90.0), 0.01);
+    close(session.irradiance_at(v(5.0, 1.0, 0.0), DVec3::X)[2], 2.0 * PI, 5e-3);
+    close(session.irradiance_at(v(5.0, 1.0, 0.0), -DVec3::Z)[0], 0.5 * PI + lamp * towards.x, 5e-3);
+}
+
+#[test]
+fn pictures_are_read_from_both_formats_and_bad_ones_are_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let pixels = spotted((3, 4), 64.0);
+    let flat: Vec<f32> = pixels.iter().flatten().copied().collect();
+    let image = image::Rgb32FImage::from_raw(64, 32, flat).unwrap();
+    for name in ["a.hdr", "a.exr"] {
+        let path = dir.path().join(name);
+        image::DynamicImage::ImageRgb32F(image.clone()).save(&path).unwrap();
+        let read = Environment::read(&path, None).unwrap();
+        assert_eq!(read.size(), (64, 32));
+        let (towards, _) = pixel(3, 4);
+        assert_eq!(read.radiance(towards), [64.0; 3], "{name}");
+        assert_eq!(read.radiance(UP), [0.5, 1.0, 2.0], "{name}");
+        let too_large = Environment::read(&path, Some(20_000)).unwrap_err().to_string();
+        assert!(too_large.contains(name) && too_large.contains("bytes"), "{too_large}");
+        // Cut short.
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &bytes[..bytes.len() / 3]).unwrap();
+        let damaged = Environment::read(&path, None).unwrap_err().to_string();
+        assert!(damaged.contains(name), "{damaged}");
+    }
+    let other = dir.path().join("b.hdr");
+    std::fs::write(&other, "no picture").unwrap();
+    let error = Environment::read(&other, None).unwrap_err().to_string();
+    assert!(error.contains("b.hdr") && error.contains(".exr"), "{error}");
+    assert!(Environment::read(&dir.path().join("none.hdr"), None).is_err());
+    assert!(Environment::new("x", (2, 1), vec![[0.0, f32::NAN, 0.0]; 2]).is_err());
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_with_its_remedy() {
+    let sun = |azimuth, elevation| Some(sun_at(azimuth, elevation, 1.0));
+    let day = Some(Day { from_s: 0.0, to_s: 1.0, over_s: 1.0 });
+    let outsides = [
+        (under(Sky::Clear { irradiance: 1.0 }), "--sun"),
+        (under(Sky::Uniform([-1.0; 3])), "0 to 1e12"),
+        (Outside { sun: sun(0.0, 91.0), ..Outside::default() }, "-90 to 90"),
+        (Outside { sun: sun(0.0, 45.0), day, ..Outside::default() }, "LATITUDE"),
+        (Outside { ground: 1.0, ..under(Sky::Uniform([1.0; 3])) }, "less than 1"),
+        (Outside { sun: sun(0.0, 45.0), ..under(Sky::Turbid { turbidity: 40.0 }) }, "hazy"),
+    ];
+    for (outside, remedy) in outsides {
+        let error = floor(1.0, |_| ()).with_outside(outside).unwrap_err().to_string();
+        assert!(error.contains(remedy), "{error}");
+    }
+    let error = floor(1e9, |_| ()).with_outside(under(Sky::Uniform([1.0; 3]))).unwrap_err();
+    assert!(error.to_string().contains("scale it"), "{error}");
+}
+
+#[test]
+fn what_is_outside_has_no_place_in_the_scene() {
+    let scene = floor(2.0, |_| ());
+    let sky = Outside {
+        sun: Some(sun_at(10.0, 50.0, 1.0)),
+        ground: 0.2,
+        ..under(Sky::Uniform([1.0; 3]))
+    };
+    let lit = scene.clone().with_outside(sky).unwrap();
+    assert_eq!((lit.area_m2(), lit.bounds(0.0)), (scene.area_m2(), scene.bounds(0.0)));
+    let near = lit.without_outside();
+    assert_eq!((near.bodies.len(), near.patches.len()), (scene.bodies.len(), scene.patches.len()));
+    assert_eq!(near.surfaces.len(), scene.surfaces.len());
+    let mut session = Session::new(Arc::new(lit), at_tolerance(0.1)).unwrap();
+    let report = session.step(0, 0.0).unwrap();
+    // What is sent to the sky escapes: of a black floor nothing, and all that arrives is absorbed.
+    let energy = report.energy.unwrap();
+    assert!((energy.absorbed_w / energy.emitted_w - 1.0).abs() < 1e-3, "{energy:?}");
+    assert!(energy.escaped_w.abs() < 1e-3 * energy.emitted_w, "{energy:?}");
+    let sky_leaves = |p: u32| session.snapshot().leaves_of(relume::scene::PatchId(p)).len();
+    assert_eq!(sky_leaves(scene.patches.len() as u32), 0);
 }

@@ -41,11 +41,17 @@ pub(super) struct Facet {
 /// which shaped skies come to two thirds.
 const SHARE: f64 = 0.5;
 
+/// The same where light comes from below too: no surface sees more than half of it.
+const SHARE_ALL_ROUND: f64 = 0.25;
+
 /// Facets of a sky at most.
 const FACETS_MAX: usize = 1024;
 
-/// Samples along a side of a cell, of skies by formula and of pictures.
-const SAMPLES: (u32, u32) = (8, 32);
+/// Samples along a side of a cell, of skies by formula.
+const SAMPLES: u32 = 8;
+
+/// The same of pictures, at least and at most: as many as there are pixels, so that the sun is not overlooked.
+const SAMPLES_OF_PICTURES: (u32, u32) = (64, 1024);
 
 /// Divisions of a cell at least: what stands before a large one is much to clip.
 const DEPTH_MIN: u32 = 1;
@@ -58,9 +64,9 @@ const DEPTH_MAX: (u32, u32) = (5, 8);
 /// The cell that errs most is divided until the errors of all are below half of `fineness`, relative to the sky's light.
 pub(super) fn facets(skies: &[SkyNow], all_round: bool, fineness: f64) -> Vec<Facet> {
     let pictured = matches!(skies.first(), Some(SkyNow::Picture(_)));
-    let (samples, depth_max) =
-        if pictured { (SAMPLES.1, DEPTH_MAX.1) } else { (SAMPLES.0, DEPTH_MAX.0) };
-    let look = |cell: &Cell| skies.iter().map(|s| Mean::of(s, cell, samples)).collect::<Vec<_>>();
+    let share = if all_round { SHARE_ALL_ROUND } else { SHARE };
+    let depth_max = if pictured { DEPTH_MAX.1 } else { DEPTH_MAX.0 };
+    let look = |cell: &Cell| skies.iter().map(|s| Mean::of(s, cell)).collect::<Vec<_>>();
     let roots = roots(all_round);
     let looks: Vec<Vec<Mean>> = roots.par_iter().map(look).collect();
     let flux_of = |k: usize| looks.iter().map(|of_cell| of_cell[k].flux()).sum::<f64>();
@@ -92,7 +98,7 @@ pub(super) fn facets(skies: &[SkyNow], all_round: bool, fineness: f64) -> Vec<Fa
             // The first of equals.
             if two.1.errors[instant] > one.1.errors[instant] { two } else { one }
         });
-        let Some((worst, _)) = worst.filter(|_| sum > SHARE * fineness) else { break };
+        let Some((worst, _)) = worst.filter(|_| sum > share * fineness) else { break };
         divide(&mut out, worst);
     }
     out.retain(|f| f.radiance.iter().any(|l| l.iter().any(|&c| c > 0.0)));
@@ -157,19 +163,40 @@ impl Cell {
         (0..4).map(part).collect()
     }
 
-    /// Directions of evenly spread points, each with its solid angle, sr.
-    fn samples(&self, count: u32) -> impl Iterator<Item = (DVec3, f64)> + '_ {
-        let step = (self.high - self.low) / f64::from(count);
-        (0..count * count).map(move |k| {
-            let at = DVec2::new(f64::from(k % count) + 0.5, f64::from(k / count) + 0.5);
-            let p = self.point(self.low + at * step);
-            let tangent = |axis: DVec3| p.dot(axis);
-            let (tu, tv) = (tangent(self.side.u), tangent(self.side.v));
-            // d omega = du dv / r^3 on the side, du = (1 + u^2) times the angle.
-            let area = (1.0 + tu * tu) * (1.0 + tv * tv) * FRAC_PI_4 * FRAC_PI_4 * step.x * step.y;
-            let r = p.length();
-            (p / r, area / (r * r * r))
-        })
+    /// Directions of points in the middle of `count` x `count` parts, each with its solid angle, sr.
+    fn grid(&self, count: u32) -> impl Iterator<Item = (DVec3, f64)> + '_ {
+        let n = f64::from(count);
+        let at =
+            move |k: u32| DVec2::new(f64::from(k % count) + 0.5, f64::from(k / count) + 0.5) / n;
+        (0..count * count).map(move |k| self.sample(at(k), count * count))
+    }
+
+    /// The same of points in no rows, so that edges along the sides are met evenly (the R2 sequence of Roberts 2018).
+    fn scatter(&self, count: u32) -> impl Iterator<Item = (DVec3, f64)> + '_ {
+        let step = DVec2::new(0.754_877_666_246_692_7, 0.569_840_290_998_053_2);
+        let at = move |k: u32| (step * f64::from(k) + 0.5).fract();
+        (0..count * count).map(move |k| self.sample(at(k), count * count))
+    }
+
+    /// The direction of a point in shares of the sides, and its part of the solid angle if there are `count`.
+    fn sample(&self, share: DVec2, count: u32) -> (DVec3, f64) {
+        let sides = self.high - self.low;
+        let p = self.point(self.low + share * sides);
+        let (tu, tv) = (p.dot(self.side.u), p.dot(self.side.v));
+        // d omega = du dv / r^3 on the side of the cube, du = (1 + u^2) times the angle.
+        let angles = sides * FRAC_PI_4;
+        let area = (1.0 + tu * tu) * (1.0 + tv * tv) * angles.x * angles.y / f64::from(count);
+        let r = p.length();
+        (p / r, area / (r * r * r))
+    }
+
+    /// Samples of a sky.
+    fn samples(&self, sky: &SkyNow) -> Box<dyn Iterator<Item = (DVec3, f64)> + '_> {
+        let SkyNow::Picture(picture) = sky else { return Box::new(self.grid(SAMPLES)) };
+        // Eight units of 45 degrees are all columns.
+        let pixels = 0.125 * f64::from(picture.size().0) * (self.high.x - self.low.x);
+        let (least, most) = SAMPLES_OF_PICTURES;
+        Box::new(self.scatter((pixels.ceil() as u32).clamp(least, most)))
     }
 }
 
@@ -182,9 +209,9 @@ struct Mean {
 }
 
 impl Mean {
-    fn of(sky: &SkyNow, cell: &Cell, samples: u32) -> Mean {
+    fn of(sky: &SkyNow, cell: &Cell) -> Mean {
         let (mut sum, mut square, mut all, mut middle) = ([0.0; 3], 0.0, 0.0, DVec3::ZERO);
-        for (direction, angle) in cell.samples(samples) {
+        for (direction, angle) in cell.samples(sky) {
             let radiance = sky.radiance(direction);
             (0..3).for_each(|c| sum[c] += angle * radiance[c]);
             let mean = radiance.iter().sum::<f64>() / 3.0;

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
 use crate::frames::FrameSpec;
+use crate::outside::OutsideFlags;
 
 /// Largest picture side, pixels.
 const SIZE_MAX: u32 = 16_384;
@@ -427,6 +428,8 @@ pub(crate) struct InfoArgs {
     /// Print every note, also where many are of one kind.
     #[arg(long)]
     pub(crate) verbose: bool,
+    #[command(flatten)]
+    pub(crate) outside: OutsideFlags,
 }
 
 /// `relume check`
@@ -479,6 +482,8 @@ pub(crate) struct ClipFlags {
     /// Threads to use; the result has the same bits for any number [default: all cores].
     #[arg(long, value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
+    #[command(flatten)]
+    pub(crate) outside: OutsideFlags,
     /// No progress bar, no warnings, no summary; errors only.
     #[arg(short, long)]
     pub(crate) quiet: bool,
@@ -496,6 +501,7 @@ impl Default for ClipFlags {
             tolerance: None,
             oracle: OracleFlag::Error,
             threads: None,
+            outside: OutsideFlags::default(),
             quiet: false,
             verbose: false,
         }

@@ -18,6 +18,7 @@ use crate::failure::Failure;
 use crate::frames;
 use crate::memory;
 use crate::output::{self, count, counted};
+use crate::outside;
 use crate::scene_file;
 
 /// Default tolerance, relative error of irradiance.
@@ -106,16 +107,31 @@ impl Clip {
         threads: usize,
         tolerance: f64,
     ) -> Result<Clip, Failure> {
+        let tolerance = flags.tolerance.unwrap_or(tolerance);
+        let scene = flags.outside.light(scene, flags.fps, tolerance)?;
         let frames = frames::resolve(flags.frames.as_ref(), scene.motion.duration_s, flags.fps)
             .map_err(|error| Failure::new(error).help("`relume info` lists the frames"))?;
         Ok(Clip {
             scene: Arc::new(scene),
             frames,
             threads,
-            tolerance: flags.tolerance.unwrap_or(tolerance),
+            tolerance,
             shading: Shading::Gouraud,
             flags: flags.clone(),
         })
+    }
+
+    /// The same clip in the light of a default sky, if nothing emits and nothing was said of the light outside: a black
+    /// picture shows nothing.
+    pub(crate) fn lit(self) -> Result<Clip, Failure> {
+        if !outside::is_dark(&self.scene) || !self.flags.outside.is_empty() {
+            return Ok(self);
+        }
+        let (scene, said) = outside::lit_by_default((*self.scene).clone(), self.tolerance)?;
+        if !self.flags.quiet {
+            output::complain(&said);
+        }
+        Ok(Clip { scene: Arc::new(scene), ..self })
     }
 
     /// The same clip with nothing that emits, for form factors.

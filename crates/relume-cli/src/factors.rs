@@ -28,6 +28,10 @@ const ENVIRONMENT: &str = "environment";
 pub(crate) fn factors(args: &FactorsArgs) -> Result<(), Failure> {
     let started = now();
     let format = format_of(args)?;
+    if !args.clip.outside.is_empty() {
+        return Err(Failure::usage("form factors are of the scene alone, without light from outside")
+            .help("leave out --sky, --sun and --environment; what escapes stands in the table as `environment`"));
+    }
     let clip = Clip::of_file(&args.scene, &args.clip, TOLERANCE)?;
     judge(args, format, &clip)?;
     clip.warn_of(args.update);

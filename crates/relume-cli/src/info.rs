@@ -7,6 +7,7 @@ use relume::scene::{
 };
 
 use crate::args::InfoArgs;
+use crate::clip::TOLERANCE;
 use crate::failure::Failure;
 use crate::frames;
 use crate::notes;
@@ -16,8 +17,38 @@ use crate::scene_file;
 /// Runs the command.
 pub(crate) fn info(args: &InfoArgs) -> Result<(), Failure> {
     let scene = scene_file::load(&args.scene, &args.animation, false)?;
-    let text = describe(&scene, args.fps, args.verbose)?;
+    // Of what was read; light from outside is a section of its own.
+    let lit = args.outside.light(scene.clone(), args.fps, TOLERANCE)?;
+    let scene = Scene { motion: lit.motion.clone(), ..scene };
+    let mut text = describe(&scene, args.fps, args.verbose)?;
+    outside(&mut text, &lit).map_err(Failure::new)?;
     output::print(&text)
+}
+
+/// Light from outside at the start.
+fn outside(out: &mut String, scene: &Scene) -> fmt::Result {
+    let Some(outside) = &scene.outside else { return Ok(()) };
+    let distant = scene.patches.iter().filter(|p| scene.is_distant(p.body)).count();
+    writeln!(out, "\noutside (north is -Z, east +X, up +Y)")?;
+    writeln!(out, "  {} stand for it", counted(distant, "polygon"))?;
+    let times = if outside.day.is_some() { vec![0.0, scene.motion.duration_s] } else { vec![0.0] };
+    for time_s in times {
+        let Ok(now) = outside.at(time_s) else { continue };
+        if outside.day.is_some() {
+            writeln!(out, "  at {} s", number(time_s))?;
+        }
+        if let Some([azimuth, elevation]) = now.sun_angles() {
+            writeln!(out, "  sun at azimuth {azimuth:.2}, elevation {elevation:.2} degrees")?;
+        }
+        let [sky, sun] = now.horizontal_w_m2();
+        writeln!(
+            out,
+            "  onto a horizontal surface: sky {} W/m2, sun {} W/m2",
+            triple(sky),
+            triple(sun)
+        )?;
+    }
+    Ok(())
 }
 
 /// The whole text.

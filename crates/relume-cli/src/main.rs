@@ -17,6 +17,7 @@ mod lock;
 mod memory;
 mod notes;
 mod output;
+mod outside;
 mod paper;
 mod probe;
 mod progress;

@@ -84,6 +84,9 @@ pub(crate) struct RunOptions {
     pub(crate) threads: usize,
     /// Limit on the memory of the process.
     pub(crate) max_memory_bytes: Option<u64>,
+    /// Light from outside asked for, as on the command line.
+    #[serde(default)]
+    pub(crate) outside: Option<String>,
     /// How pictures were drawn, if they were.
     pub(crate) picture: Option<PictureOptions>,
 }
@@ -249,6 +252,7 @@ mod tests {
             update: "scratch".into(),
             threads: 2,
             max_memory_bytes: None,
+            outside: None,
             picture: None,
         };
         Report::new(scene, options)

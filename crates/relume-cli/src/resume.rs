@@ -217,6 +217,7 @@ mod tests {
             update: "scratch".into(),
             threads: 2,
             max_memory_bytes: None,
+            outside: None,
             picture: Some(PictureOptions {
                 size: "640x480".into(),
                 shading: Shading::Flat,

@@ -105,6 +105,7 @@ impl Job {
         }
         let read = if self.picture.is_some() { Clip::for_pictures } else { Clip::of_file };
         let clip = read(&self.scene, &self.solve.clip, self.tolerance)?;
+        let clip = if self.picture.is_some() { clip.lit()? } else { clip };
         clip.warn();
         clip.warn_of(self.solve.update);
         let clip = clip.without_dark_sides();
@@ -212,6 +213,7 @@ impl Job {
             update: self.solve.update.name(),
             threads: clip.threads,
             max_memory_bytes: memory::limit_bytes(),
+            outside: flags.outside.describe(),
             picture,
         }
     }

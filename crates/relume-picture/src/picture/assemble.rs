@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
-use relume::scene::PatchId;
+use relume::scene::{Patch, PatchId};
 use relume::session::{Leaf, Snapshot};
 
 use super::gouraud::{self, Triangle};
@@ -132,7 +132,8 @@ impl Drawing {
 /// Distance from `eye` to the farthest corner of a patch that is present, metres.
 fn farthest(snapshot: &Snapshot, eye: DVec3) -> f64 {
     let mut far = 0.0_f64;
-    for patch in &snapshot.scene.patches {
+    let near = |patch: &&Patch| !snapshot.scene.is_distant(patch.body);
+    for patch in snapshot.scene.patches.iter().filter(near) {
         if let Some(pose) = snapshot.poses[patch.body.0 as usize] {
             far = patch.corners_in_body().fold(far, |far, p| far.max(pose.point(p).distance(eye)));
         }
@@ -158,6 +159,9 @@ impl PatchDrawing {
     ) -> Option<PatchDrawing> {
         let patch = &snapshot.scene.patches[id.0 as usize];
         let pose = snapshot.poses[patch.body.0 as usize]?;
+        if snapshot.scene.is_distant(patch.body) {
+            return None;
+        }
         let origin = pose.point(patch.frame.origin);
         if !projector.faces(origin, pose.direction(patch.frame.normal)) {
             return None;

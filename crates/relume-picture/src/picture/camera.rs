@@ -105,7 +105,10 @@ impl View {
     ///
     /// Cost: some 100 tiny rasterisations of all patches.
     pub fn automatic(scene: &Scene) -> View {
-        auto_view::choose(scene)
+        match scene.outside {
+            Some(_) => auto_view::choose(&scene.without_outside()),
+            None => auto_view::choose(scene),
+        }
     }
 
     /// A perspective view from `eye` towards `target` with +Y up (or, looking along Y, -Z up).

@@ -69,6 +69,16 @@ impl Projector {
         DVec4::new(flat.x, flat.y, w, depth)
     }
 
+    /// The unit direction from which a pixel position sees what is far away.
+    pub(crate) fn direction(&self, pixel: DVec2) -> DVec3 {
+        if !self.perspective {
+            return self.forward();
+        }
+        let slope = (pixel - self.centre) / self.scale;
+        let camera = DVec3::new(slope.x, -slope.y, -1.0).normalize();
+        self.world_from_camera.rotation * camera
+    }
+
     /// Whether the side that `normal` points to, of a plane through `point`, faces the camera.
     pub(crate) fn faces(&self, point: DVec3, normal: DVec3) -> bool {
         let towards_camera = if self.perspective {

@@ -2,6 +2,9 @@
 //!
 //! Must not know files. The bits depend on the arguments only, not on the number of threads.
 
+use std::f64::consts::PI;
+
+use relume::scene::outside::OutsideNow;
 use relume::session::Snapshot;
 
 use super::assemble::{Drawing, Fill};
@@ -37,7 +40,7 @@ pub struct Settings {
     pub tone: Tone,
     /// Visibility samples per pixel, 1 to 64.
     pub samples: u32,
-    /// Linear display value, in [0, 1], where nothing is seen.
+    /// Linear display value, in [0, 1], where nothing is seen, not even a sky.
     pub background: [f64; 3],
     /// Whether the outlines of the leaves are drawn over them.
     pub mesh: bool,
@@ -70,8 +73,11 @@ pub fn render(snapshot: &Snapshot, view: &View, settings: &Settings) -> Image {
     let grid = Grid::new(settings.width, settings.height, settings.samples);
     let projector = Projector::new(view, settings.width, settings.height);
     let drawing = Drawing::new(snapshot, &projector, &grid, settings.shading, settings.mesh);
+    // A sun without a place was refused when the scene was made.
+    let outside = snapshot.scene.outside.as_ref().and_then(|o| o.at(snapshot.time_s).ok());
     let shader = Shader {
         drawing: &drawing,
+        outside: outside.map(|outside| (outside, projector)),
         exposure: settings.exposure.resolve(snapshot, view),
         tone: settings.tone,
         background: settings.background,
@@ -84,6 +90,8 @@ pub fn render(snapshot: &Snapshot, view: &View, settings: &Settings) -> Image {
 
 struct Shader<'a> {
     drawing: &'a Drawing,
+    /// What is seen where no surface is.
+    outside: Option<(OutsideNow, Projector)>,
     exposure: f64,
     tone: Tone,
     background: [f64; 3],
@@ -103,7 +111,11 @@ impl Shader<'_> {
 
     /// Linear display values.
     fn display(&self, fragment: &Fragment) -> [f64; 3] {
-        let Some(primitive) = fragment.primitive else { return self.background };
+        let Some(primitive) = fragment.primitive else {
+            let Some((outside, projector)) = &self.outside else { return self.background };
+            let radiance = outside.radiance(projector.direction(fragment.position));
+            return self.tone.map(self.exposure, radiance.map(|l| (PI * l) as f32));
+        };
         let radiosity = self.drawing.seen(primitive, fragment.position);
         let display = self.tone.map(self.exposure, radiosity);
         match self.drawing.fills[primitive] {

@@ -40,6 +40,7 @@ pub(crate) fn empty() -> Scene {
         lights: Vec::new(),
         cameras: Vec::new(),
         motion: Motion::default(),
+        outside: None,
         notes: Vec::new(),
     }
 }
@@ -106,7 +107,7 @@ pub(crate) fn body(scene: &mut Scene, polygons: &[(Vec<DVec3>, MaterialId)]) -> 
         });
     }
     let patches = first..scene.patches.len() as u32;
-    scene.bodies.push(Body { name: format!("body {}", body.0), node, patches });
+    scene.bodies.push(Body { name: format!("body {}", body.0), node, patches, distant: false });
     body
 }
 

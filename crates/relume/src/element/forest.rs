@@ -149,6 +149,10 @@ struct Fixed {
     glows: Vec<bool>,
     /// Area of the patches connected with each patch, itself among them, by patch, m2.
     connected_m2: Vec<f64>,
+    /// Whether a node stands for light from outside, by id; empty if none does.
+    distant: Vec<bool>,
+    /// How many facets receive light: they come before those that are distant.
+    near_facets: usize,
 }
 
 /// Where elements went when the forest was put together: those that stayed keep their order.
@@ -201,22 +205,40 @@ impl Forest {
             counts: Counts::default(),
         };
         forest.push_fixed(Kind::Cluster, NONE, 1);
+        let planted = |distant: bool| -> Vec<u32> {
+            let bodies = (0..).zip(&scene.bodies);
+            let wanted = bodies.filter(|(_, b)| !b.patches.is_empty() && b.distant == distant);
+            wanted.map(|(k, _)| k).collect()
+        };
+        // What is there, the lights, and what is far away.
+        let (near, far) = (planted(false), planted(true));
         let lights = scene.lights.len() as u32;
-        let children = u32::from(!scene.patches.is_empty()) + lights;
+        let first_light = 1 + u32::from(!near.is_empty());
+        let after_lights = first_light + lights;
+        let children = after_lights + u32::from(!far.is_empty()) - 1;
         forest.push_fixed(Kind::Light, 0, children);
         forest.nodes[0].fan = Fan::other(1);
         forest.fixed_mut().child_counts[0] =
             u16::try_from(children).expect("fewer than 65,536 lights");
-        let first_light = 1 + children - lights;
-        for (light, id) in (first_light..=children).enumerate() {
+        for (light, id) in (first_light..after_lights).enumerate() {
             forest.fixed_mut().subjects[id as usize] = light as u32;
             let twins = &mut forest.twins[id as usize];
             (twins.facet, twins.path) = (id, 1);
         }
-        if !scene.patches.is_empty() {
-            forest.plant_bodies(scene, 1);
+        if !near.is_empty() {
+            forest.plant_bodies(scene, &near, 1);
+        }
+        if !far.is_empty() {
+            let first = forest.nodes.len();
+            forest.plant_bodies(scene, &far, after_lights);
+            let mut distant = vec![false; forest.nodes.len()];
+            distant[after_lights as usize] = true;
+            distant[first..].fill(true);
+            forest.fixed_mut().distant = distant;
         }
         forest.fixed_mut().facets.sort_unstable();
+        let near_facets = forest.facets().partition_point(|facet| !forest.is_distant(*facet));
+        forest.fixed_mut().near_facets = near_facets;
         forest.fixed_len = forest.nodes.len() as u32;
         forest.kept_len = forest.fixed_len;
         forest.sum_areas();
@@ -258,11 +280,8 @@ impl Forest {
         Arc::make_mut(&mut self.fixed)
     }
 
-    fn plant_bodies(&mut self, scene: &Scene, at: u32) {
+    fn plant_bodies(&mut self, scene: &Scene, bodies: &[u32], at: u32) {
         let cuts = Cuts::new(scene);
-        let bodies: Vec<u32> = (0..scene.bodies.len() as u32)
-            .filter(|&b| !scene.bodies[b as usize].patches.is_empty())
-            .collect();
         let boxes: Vec<Aabb> = bodies.iter().map(|&b| box_at_start(scene, BodyId(b))).collect();
         let tree = binary_tree(&boxes);
         self.plant(&tree, 0, at, NONE, &mut |forest, leaf, id| {
@@ -348,7 +367,7 @@ impl Forest {
         let mut sums = vec![0.0_f64; self.nodes.len()];
         for id in (0..self.nodes.len()).rev() {
             let id = ElementId(id as u32);
-            if self.kind(id) == Kind::Element {
+            if self.kind(id) == Kind::Element && !self.is_distant(id) {
                 sums[id.0 as usize] = self.shape(id).area();
             }
             if let Some(parent) = self.parent(id) {
@@ -391,6 +410,16 @@ impl Forest {
     /// The quadtree roots, ascending.
     pub fn facets(&self) -> &[ElementId] {
         &self.fixed.facets
+    }
+
+    /// Those of them that receive light, ascending; the others are distant.
+    pub fn near_facets(&self) -> &[ElementId] {
+        &self.fixed.facets[..self.fixed.near_facets]
+    }
+
+    /// Those of them that are distant, ascending.
+    pub fn distant_facets(&self) -> &[ElementId] {
+        &self.fixed.facets[self.fixed.near_facets..]
     }
 
     /// Bytes held by what clones of this forest do not share.
@@ -462,7 +491,7 @@ impl Forest {
         fan.first()..fan.first() + count
     }
 
-    /// Area, m2; 0 for a light. Exact up to single precision.
+    /// Area, m2; 0 for a light and for what is distant. Exact up to single precision.
     #[inline]
     pub fn area_m2(&self, id: ElementId) -> f64 {
         f64::from(self.nodes[id.0 as usize].area_m2)
@@ -595,10 +624,25 @@ impl Forest {
         self.fixed.body_roots[body.0 as usize]
     }
 
-    /// Whether the element may be split once more: paths have room for 15 levels.
+    /// Whether the node stands for light from outside ([`crate::scene::Body::distant`]): it shines, and nothing else.
+    #[inline]
+    pub fn is_distant(&self, id: ElementId) -> bool {
+        self.fixed.distant.get(id.0 as usize).is_some_and(|&distant| distant)
+    }
+
+    /// Whether light is gathered there: an element that is not distant.
+    #[inline]
+    pub fn receives(&self, id: ElementId) -> bool {
+        self.kind(id) == Kind::Element && !self.is_distant(id)
+    }
+
+    /// Whether the element may be split once more: paths have room for 15 levels. What is distant is as small as it is.
     #[inline]
     pub fn can_split(&self, id: ElementId) -> bool {
         let path = self.key(id).path;
+        if self.is_distant(id) {
+            return false;
+        }
         !self.children(id).is_empty() || path.leading_zeros() > 31 - 2 * LEVELS_MAX + 1
     }
 

@@ -42,6 +42,8 @@ pub struct WorldView {
     patches: Vec<WorldPatch>,
     poses: Vec<Option<Pose>>,
     boxes: Vec<Aabb>,
+    /// Of what is distant, by node; empty if nothing is.
+    distant_boxes: Vec<Aabb>,
     local_boxes: Vec<Aabb>,
     far_m: f64,
     world: Occluders,
@@ -104,15 +106,18 @@ impl WorldView {
     pub fn new(scene: &Scene, forest: &Forest, time_s: f64) -> WorldView {
         let poses: Vec<Option<Pose>> =
             (0..scene.bodies.len()).map(|b| scene.pose(BodyId(b as u32), time_s)).collect();
-        let patches = scene.patches.iter().map(|p| world_patch(p, &poses)).collect();
+        let is_distant = |p: &crate::scene::Patch| scene.is_distant(p.body);
+        let patches = scene.patches.iter().map(|p| world_patch(p, &poses, is_distant(p))).collect();
         let still = vec![Some(Pose::IDENTITY); poses.len()];
         let world = Occluders::of(scene, &poses);
         let local = Occluders::of(scene, &still);
-        let boxes = boxes(forest, &poses, &world, scene);
+        let mut boxes = boxes(forest, &poses, &world, scene);
+        let distant_boxes = take_distant(forest, &mut boxes);
         WorldView {
             patches,
             far_m: far(boxes[Forest::ROOT.0 as usize].diagonal()),
             boxes,
+            distant_boxes,
             local_boxes: self::boxes(forest, &still, &local, scene),
             world,
             local,
@@ -145,10 +150,21 @@ impl WorldView {
         self.lights[index].as_ref()
     }
 
-    /// World box of a node of the forest's fixed part; empty while absent and for lights.
+    /// World box of a node of the forest's fixed part as something that may stand in the way; empty while absent, for
+    /// lights, and for what is distant.
     #[inline]
     pub fn fixed_box(&self, id: ElementId) -> &Aabb {
         &self.boxes[id.0 as usize]
+    }
+
+    /// World box of a node of the fixed part as an end of pairs: of what is distant too; empty while absent and for
+    /// lights.
+    #[inline]
+    pub fn end_box(&self, id: ElementId) -> &Aabb {
+        match self.distant_boxes.get(id.0 as usize) {
+            Some(distant) if !distant.is_empty() => distant,
+            _ => self.fixed_box(id),
+        }
     }
 
     /// Box of a node of the fixed part within one body, in that body's frame.
@@ -213,7 +229,14 @@ fn hidden_twins(scene: &Scene) -> Vec<bool> {
     scene.patches.iter().enumerate().map(twin_is_first).collect()
 }
 
-fn world_patch(patch: &crate::scene::Patch, poses: &[Option<Pose>]) -> WorldPatch {
+/// Relative rounding of what is made here in double precision.
+const FINE_ROUNDING: f64 = 1.0 / (1_u64 << 46) as f64;
+
+fn world_patch(
+    patch: &crate::scene::Patch,
+    poses: &[Option<Pose>],
+    is_distant: bool,
+) -> WorldPatch {
     let pose = poses[patch.body.0 as usize].unwrap_or(Pose::IDENTITY);
     let f = patch.frame;
     let reach = patch.corners.iter().fold(0.0_f64, |m, c| m.max(c.x.abs()).max(c.y.abs()));
@@ -227,7 +250,7 @@ fn world_patch(patch: &crate::scene::Patch, poses: &[Option<Pose>]) -> WorldPatc
         },
         body: patch.body,
         twin: patch.twin,
-        rounding_m: reach * ROUNDING,
+        rounding_m: reach * if is_distant { FINE_ROUNDING } else { ROUNDING },
     }
 }
 
@@ -252,13 +275,25 @@ fn boxes(forest: &Forest, poses: &[Option<Pose>], world: &Occluders, scene: &Sce
                 boxes[id as usize] = Aabb::of(corners.iter().copied());
             }
         }
-        if let Some(parent) = forest.parent(element) {
+        // The scene is no larger for what is outside it.
+        let outside = |parent| forest.is_distant(element) && !forest.is_distant(parent);
+        if let Some(parent) = forest.parent(element).filter(|&parent| !outside(parent)) {
             let own = boxes[id as usize];
             let parent_box = &mut boxes[parent.0 as usize];
             *parent_box = parent_box.union(own);
         }
     }
     boxes
+}
+
+/// Takes the boxes of what is distant out of those of all nodes; none if nothing is.
+fn take_distant(forest: &Forest, boxes: &mut [Aabb]) -> Vec<Aabb> {
+    let mut distant = Vec::new();
+    for id in (0..forest.fixed_len()).filter(|&id| forest.is_distant(ElementId(id))) {
+        distant.resize(boxes.len(), Aabb::EMPTY);
+        distant[id as usize] = std::mem::replace(&mut boxes[id as usize], Aabb::EMPTY);
+    }
+    distant
 }
 
 /// An element placed in space for one query.

@@ -13,6 +13,10 @@ pub trait KnownMotion {
     fn body_count(&self) -> usize;
     /// Whether a body is animated at all.
     fn moves(&self, body: BodyId) -> bool;
+    /// Whether a body stands for light from outside: it comes between nothing.
+    fn is_distant(&self, _body: BodyId) -> bool {
+        false
+    }
     /// Where the points of a body can get between two times, the earlier one first.
     fn drift(&self, body: BodyId, span_s: [f64; 2]) -> Drift;
     /// The same of each punctual light.
@@ -29,6 +33,10 @@ impl KnownMotion for Scene {
 
     fn moves(&self, body: BodyId) -> bool {
         Scene::moves(self, body)
+    }
+
+    fn is_distant(&self, body: BodyId) -> bool {
+        Scene::is_distant(self, body)
     }
 
     fn drift(&self, body: BodyId, span_s: [f64; 2]) -> Drift {
@@ -61,6 +69,7 @@ struct Horizon {
     drifts: Vec<Drift>,
     lights: Vec<Drift>,
     widest: Aabb,
+    widest_distant: Aabb,
 }
 
 impl Foresight {
@@ -83,8 +92,13 @@ impl Foresight {
             }
             let drifts: Vec<Drift> = out.bodies.iter().map(|&b| scene.drift(b, span)).collect();
             let lights = scene.light_drifts(span);
-            let widest = drifts.iter().fold(Drift::Rests.reach(), |b, d| b.union(d.reach()));
-            out.horizons.push(Horizon { until, drifts, lights, widest });
+            let widest_of = |distant: bool| {
+                let all = out.bodies.iter().zip(&drifts);
+                let wanted = all.filter(|(body, _)| scene.is_distant(**body) == distant);
+                wanted.fold(Drift::Rests.reach(), |b, (_, d)| b.union(d.reach()))
+            };
+            let (widest, widest_distant) = (widest_of(false), widest_of(true));
+            out.horizons.push(Horizon { until, drifts, lights, widest, widest_distant });
         }
         out
     }
@@ -119,9 +133,14 @@ impl Foresight {
         self.horizons[horizon].lights[light] == Drift::Rests
     }
 
-    /// Displacements of all bodies together.
+    /// Displacements of all bodies together, of those that are distant aside.
     pub fn widest(&self, horizon: usize) -> Aabb {
         self.horizons[horizon].widest
+    }
+
+    /// Displacements of all distant bodies together.
+    pub fn widest_distant(&self, horizon: usize) -> Aabb {
+        self.horizons[horizon].widest_distant
     }
 
     /// The bodies that do not rest up to a horizon.

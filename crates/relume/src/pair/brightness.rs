@@ -18,6 +18,9 @@ pub struct Light {
 impl Light {
     /// The light of a scene in which every surface weighs the same.
     pub const UNIFORM: Light = Light { radiosity: 1.0, reflected: 1.0, irradiance: 1.0 };
+
+    /// The light of what is distant, but for what it emits: nothing arrives there, and no error.
+    pub const DISTANT: Light = Light { radiosity: 0.0, reflected: 0.0, irradiance: f64::INFINITY };
 }
 
 /// Canonical brightness: a pure function of the scene at one instant, never of the running

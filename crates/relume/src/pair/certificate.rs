@@ -76,7 +76,7 @@ impl Outlook for SpaceOutlook<'_> {
             return true;
         }
         // What is absent stays so up to every horizon.
-        let absent = |id| !lit(id) && self.view.fixed_box(self.forest.fixed(id)).is_empty();
+        let absent = |id| !lit(id) && self.view.end_box(self.forest.fixed(id)).is_empty();
         if absent(a) || absent(b) {
             return true;
         }
@@ -98,8 +98,17 @@ impl SpaceOutlook<'_> {
         }
         match self.body(id) {
             Some(body) => self.ahead.drift(h, body) == Drift::Rests,
-            None => self.ahead.widest(h) == Drift::Rests.reach(),
+            None => self.widest(h, id) == Drift::Rests.reach(),
         }
+    }
+
+    /// Displacements of all bodies of a group together.
+    fn widest(&self, h: usize, id: ElementId) -> Aabb {
+        let near = self.ahead.widest(h);
+        if self.forest.is_distant(id) || id == Forest::ROOT {
+            return near.union(self.ahead.widest_distant(h));
+        }
+        near
     }
 
     fn with_ends(
@@ -140,7 +149,7 @@ impl SpaceOutlook<'_> {
             _ => {
                 let (a, b) = (self.forest.fixed(a), self.forest.fixed(b));
                 then(&Ends {
-                    bounds: (*self.view.fixed_box(a), *self.view.fixed_box(b)),
+                    bounds: (*self.view.end_box(a), *self.view.end_box(b)),
                     bodies,
                     // A group may hold its own blockers.
                     patches: (None, None),
@@ -271,7 +280,7 @@ impl SpaceOutlook<'_> {
         let plane = Plane::through(patch.world.origin, patch.world.normal);
         let by = match self.body(b) {
             Some(body) => self.ahead.drift(h, body).reach(),
-            None => self.ahead.widest(h),
+            None => self.widest(h, b),
         };
         let shift = by.difference(&drift.reach()).along(plane.normal).1;
         let elements = [a, b].iter().all(|&id| self.forest.kind(id) == Kind::Element);
@@ -279,7 +288,7 @@ impl SpaceOutlook<'_> {
             let b = WorldElement::new(self.view, self.forest, b, false);
             (b.span(&plane).1, b.rounding_m + patch.rounding_m)
         } else {
-            let bounds = self.view.fixed_box(self.forest.fixed(b));
+            let bounds = self.view.end_box(self.forest.fixed(b));
             let n = plane.normal;
             let corner = DVec3::select(n.cmpge(DVec3::ZERO), bounds.hi, bounds.lo);
             (plane.distance(corner), patch.rounding_m)

@@ -88,13 +88,17 @@ impl Judge for Placed<'_> {
         candidates: &[u32],
         narrowed: &mut Vec<u32>,
     ) -> Judgement {
+        let receives_nothing =
+            |id| self.forest.kind(id) == Kind::Light || self.forest.is_distant(id);
+        if receives_nothing(a) && receives_nothing(b) {
+            return culled(CullReason::NoReceiver);
+        }
         match (self.forest.kind(a), self.forest.kind(b)) {
             (Kind::Element, Kind::Element) => {
                 self.judge_elements((a, b), known, candidates, narrowed)
             }
             (Kind::Element, Kind::Light) => self.judge_light(b, a, Side::A, candidates, narrowed),
             (Kind::Light, Kind::Element) => self.judge_light(a, b, Side::B, candidates, narrowed),
-            (Kind::Light, Kind::Light) => culled(CullReason::NoReceiver),
             _ => self.judge_groups(a, b, candidates, narrowed),
         }
     }
@@ -126,7 +130,9 @@ impl Judge for Placed<'_> {
     ) -> bool {
         match (self.forest.kind(a), self.forest.kind(b)) {
             (Kind::Element, Kind::Element) => {
-                let by_area = matches!(self.oracle, Oracle::FormFactor { .. });
+                // Of what is distant the form-factor oracle goes by what is seen, too.
+                let distant = self.forest.is_distant(a) || self.forest.is_distant(b);
+                let by_area = matches!(self.oracle, Oracle::FormFactor { .. }) && !distant;
                 if !by_area && !self.is_above_coarse(a, b) {
                     return false;
                 }
@@ -224,7 +230,7 @@ impl Placed<'_> {
         candidates: &[u32],
         narrowed: &mut Vec<u32>,
     ) -> Judgement {
-        let (box_a, box_b) = (self.view.fixed_box(a), self.view.fixed_box(b));
+        let (box_a, box_b) = (self.view.end_box(a), self.view.end_box(b));
         let lit = |id| self.forest.kind(id) == Kind::Light;
         if (box_a.is_empty() && !lit(a)) || (box_b.is_empty() && !lit(b)) {
             return culled(CullReason::Absent);
@@ -260,7 +266,8 @@ impl Placed<'_> {
         // pairs below would be made anew.
         let size = |id: ElementId| match self.forest.kind(id) {
             Kind::Element => 0.0,
-            _ => self.forest.area_m2(id),
+            // What is distant has no area: it comes after all that has.
+            _ => self.forest.area_m2(id).max(f64::MIN_POSITIVE),
         };
         let side = if no_smaller(size(a), size(b)) { Side::A } else { Side::B };
         passing(Verdict::Refine(side), 0)
@@ -349,10 +356,11 @@ impl Placed<'_> {
         let key = pair_key(self.forest.key(a), self.forest.key(b));
         let in_contact = met == Meeting::Coplanar;
         let end = |brightness: &Brightness, id, area| End {
-            area,
+            area: if self.forest.is_distant(id) { 0.0 } else { area },
             reference_area: self.reference_area(brightness, id),
             light: brightness.of(self.forest, id),
         };
+        let distant = self.forest.is_distant(a) || self.forest.is_distant(b);
         let mut x = match in_contact {
             true => contact_exchange(place_a, place_b, shaft.contact_m2(blockers)),
             false => exchange_by_points(self.simd, place_a, place_b, met),
@@ -384,6 +392,7 @@ impl Placed<'_> {
         let mut firm = Margin::Firm;
         if let (Oracle::FormFactor { epsilon, min_area_m2 }, Stage::Fine(_)) =
             (self.oracle, self.stage)
+            && !distant
         {
             let areas = (place_a.area, place_b.area);
             let factor = x.area_m2 / areas.0.min(areas.1);
@@ -439,6 +448,7 @@ impl Placed<'_> {
         else {
             let verdict = match self.stage {
                 Stage::Coarse => Verdict::Hold,
+                Stage::Fine(_) if distant => self.by_unevenness((a, b), (place_a, place_b), &x, &v),
                 Stage::Fine(_) => Verdict::Link,
             };
             let carrying = carrying(verdict, &x, &v, (place_a, place_b));
@@ -474,6 +484,24 @@ impl Placed<'_> {
         Judgement { margin, ..carrying(Verdict::Link, &x, &v, (place_a, place_b)) }
     }
 
+    /// The form-factor oracle's verdict on an end and what is distant: no splitting makes the factor smaller, but what
+    /// arrives becomes even.
+    fn by_unevenness(
+        &self,
+        (a, b): (ElementId, ElementId),
+        (place_a, place_b): (&WorldElement, &WorldElement),
+        x: &Exchange,
+        v: &Visibility,
+    ) -> Verdict {
+        let Oracle::FormFactor { epsilon, min_area_m2 } = self.oracle else { return Verdict::Link };
+        let (receiver, place, over, spread, side) = match self.forest.is_distant(a) {
+            true => (b, place_b, &x.over_b, v.spread_b, Side::B),
+            false => (a, place_a, &x.over_a, v.spread_a, Side::A),
+        };
+        let room = place.area > min_area_m2 && self.forest.can_split(receiver);
+        self.refine_if(over.slope.max(spread) > epsilon && room, side)
+    }
+
     /// The share of a receiver's irradiance that a pair brings without occlusion, weighed as errors
     /// are: what V errs by is multiplied with it. The larger of both directions.
     fn brings(
@@ -483,6 +511,9 @@ impl Placed<'_> {
         exchange_area_m2: f64,
     ) -> f64 {
         let one_way = |(receiver, area): (ElementId, f64), source: ElementId| {
+            if self.forest.is_distant(receiver) {
+                return 0.0;
+            }
             let arrives = brightness.of(self.forest, source).radiosity * exchange_area_m2;
             let known = brightness.of(self.forest, receiver).irradiance;
             arrives / known / (area * self.reference_area(brightness, receiver)).sqrt()
@@ -787,14 +818,14 @@ impl<'a> BoxShaft<'a> {
         let (a, b) = (forest.fixed(a), forest.fixed(b));
         let in_body = |_| ShaftOfBoxes::new(view.box_in_body(a), view.box_in_body(b));
         let own = body.map(|body| (body, in_body(body)));
-        let world = (view.fixed_box(a), view.fixed_box(b));
+        let world = (view.end_box(a), view.end_box(b));
         BoxShaft {
             view,
             forest,
             world: ShaftOfBoxes::new(world.0, world.1),
             own,
             patches,
-            keep_m: 0.5 * world.0.union(*world.1).diagonal(),
+            keep_m: 0.5 * world.0.union(*world.1).diagonal().min(view.far_m()),
             // More than the slack of any pair: what lies on an end may hide it.
             margin_m: 5e-7 * view.far_m(),
         }

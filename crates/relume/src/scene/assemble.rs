@@ -54,7 +54,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
         let patches = Range { start: first, end: parts.patches.len() as u32 };
         if !patches.is_empty() {
             let name = draft.nodes[node].name.clone();
-            parts.bodies.push(Body { name, node: NodeId(node as u32), patches });
+            parts.bodies.push(Body { name, node: NodeId(node as u32), patches, distant: false });
         }
     }
     parts.leave_out_specks(&motion)?;
@@ -74,6 +74,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
         lights: draft.lights,
         cameras: draft.cameras,
         motion,
+        outside: None,
         notes,
     })
 }

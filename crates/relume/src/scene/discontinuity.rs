@@ -18,7 +18,7 @@ impl Scene {
         let mut out = vec![Vec::new(); self.patches.len()];
         let bodies = (0..self.bodies.len() as u32).map(BodyId);
         let (moving, at_rest): (Vec<BodyId>, Vec<BodyId>) =
-            bodies.partition(|&body| self.moves(body));
+            bodies.filter(|&body| !self.is_distant(body)).partition(|&body| self.moves(body));
         self.meet(&at_rest, &mut out);
         moving.into_iter().for_each(|body| self.meet(&[body], &mut out));
         out

@@ -32,6 +32,7 @@ mod merge;
 mod mesh_file;
 mod motion;
 mod names;
+pub mod outside;
 mod print;
 mod pyramid;
 mod rigid;
@@ -99,6 +100,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// The node tree and its animation.
     pub motion: Motion,
+    /// The light from outside that distant bodies stand for ([`Scene::with_outside`]).
+    pub outside: Option<Arc<outside::Outside>>,
     /// What was noticed while reading, for `info` and `check`.
     pub notes: Vec<Note>,
 }
@@ -114,6 +117,9 @@ pub struct Body {
     pub node: NodeId,
     /// The patches of this body, a range of [`Scene::patches`].
     pub patches: std::ops::Range<u32>,
+    /// It stands for light from outside, the sky or the sun: so far away that it has no place in the scene. It shines,
+    /// and what reaches it has escaped; it has no share in the scene's extent and area, hides nothing, is lit by nothing.
+    pub distant: bool,
 }
 
 /// A named part of a body: one mesh primitive of one object (node with a mesh).
@@ -297,11 +303,11 @@ impl Scene {
         self.motion.moves(self.bodies[body.0 as usize].node)
     }
 
-    /// The smallest and largest world coordinates of all patches present at `time_s`, metres;
+    /// The smallest and largest world coordinates of all patches present at `time_s`, distant ones aside, metres;
     /// `None` while none is.
     pub fn bounds(&self, time_s: f64) -> Option<(DVec3, DVec3)> {
         let mut bounds: Option<(DVec3, DVec3)> = None;
-        for body in (0..self.bodies.len() as u32).map(BodyId) {
+        for body in (0..self.bodies.len() as u32).map(BodyId).filter(|&b| !self.is_distant(b)) {
             let Some(pose) = self.pose(body, time_s) else { continue };
             for point in self.patches_of(body).flat_map(|(_, p)| p.corners_in_body()) {
                 let p = pose.point(point);
@@ -321,15 +327,32 @@ impl Scene {
         dark
     }
 
+    /// The same scene without the bodies that stand for light from outside, which come last.
+    pub fn without_outside(&self) -> Scene {
+        let mut near = Scene { outside: None, ..self.clone() };
+        near.bodies.retain(|body| !body.distant);
+        let (bodies, patches) =
+            (near.bodies.len(), near.bodies.last().map_or(0, |body| body.patches.end));
+        near.patches.truncate(patches as usize);
+        near.surfaces.retain(|surface| (surface.body.0 as usize) < bodies);
+        near
+    }
+
     /// The patches of a body with their ids.
     pub fn patches_of(&self, body: BodyId) -> impl Iterator<Item = (PatchId, &Patch)> {
         let range = self.bodies[body.0 as usize].patches.clone();
         range.map(|i| (PatchId(i), &self.patches[i as usize]))
     }
 
-    /// Sum of the areas of all patches, m2 (a double-sided polygon counts twice).
+    /// Whether a body stands for light from outside; see [`Body::distant`].
+    pub fn is_distant(&self, body: BodyId) -> bool {
+        self.bodies[body.0 as usize].distant
+    }
+
+    /// Sum of the areas of all patches, distant ones aside, m2 (a double-sided polygon counts twice).
     pub fn area_m2(&self) -> f64 {
-        self.patches.iter().map(Patch::area_m2).sum()
+        let near = self.patches.iter().filter(|p| !self.is_distant(p.body));
+        near.map(Patch::area_m2).sum()
     }
 }
 
@@ -338,6 +361,13 @@ impl Patch {
     pub fn area_m2(&self) -> f64 {
         let n = self.corners.len();
         (0..n).map(|i| self.corners[i].perp_dot(self.corners[(i + 1) % n])).sum::<f64>() / 2.0
+    }
+
+    /// A bound on the form factor from a point of the scene around `centre` to this patch, if it is distant: its area
+    /// over pi times the square of how far its plane is.
+    pub(crate) fn most_factor(&self, centre: DVec3) -> f64 {
+        let far = (self.frame.origin - centre).dot(self.frame.normal);
+        (self.area_m2() / (std::f64::consts::PI * far * far)).min(1.0)
     }
 
     /// Corners in the body's frame, counter-clockwise seen from the front.

@@ -2,6 +2,8 @@
 //!
 //! Without a state to start from, the same edits build it: a cold build is the update of nothing.
 
+use glam::DVec3;
+
 use crate::element::{ElementId, Forest, Kind, WorldView};
 use crate::event::Ticks;
 use crate::pair::{
@@ -84,16 +86,22 @@ impl Session {
             if relit {
                 parents.extend(self.relit_facets(&solved, from_s));
             }
+            parents.retain(|&facet| solved.forest.receives(ElementId(facet)));
         }
-        if self.scene.lights.iter().any(|light| light.is_relit([from_s, time_s])) {
-            // Whoever gathers from a light gathers anew.
-            let lit = (&*self.scene, time_s);
-            coarse::set_lights(lit, &solved.forest, &mut solved.radiosity);
+        let lights = &self.scene.lights;
+        let relights = lights.iter().any(|light| light.is_relit([from_s, time_s]))
+            || self.outside_differs(&solved, &old, from_s);
+        if relights {
+            // Whoever gathers from a light, or from outside, gathers anew: neither knows who that is.
             dirty = Dirty::All;
         }
         report.seconds.judge = clock.lap();
 
         let lit = LitForest::new(&self.scene, &solved.forest, time_s).present_in(&solved.view);
+        if relights {
+            let at = (&*self.scene, time_s);
+            coarse::set_sources(at, (&solved.forest, &lit), &mut solved.radiosity);
+        }
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
         let share = if cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE };
         let residual = self.options.tolerance * share;
@@ -180,10 +188,19 @@ impl Session {
     ) -> f64 {
         let scene = &self.scene;
         let mean = |c: [f64; 3]| c.iter().sum::<f64>() / 3.0;
-        let of_patch = |p: &scene::Patch| p.area_m2() * mean(exitance(p));
+        let area_m2 = scene.area_m2();
+        // Of what moves, patches are placed about its origin, which is the scene's middle.
+        let middle = scene.bounds(0.0).map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
+        let factor = |p: &scene::Patch| {
+            p.most_factor(if scene.moves(p.body) { DVec3::ZERO } else { middle })
+        };
+        let of_patch = |p: &scene::Patch| {
+            let exitance = mean(exitance(p));
+            exitance * if scene.is_distant(p.body) { factor(p) * area_m2 } else { p.area_m2() }
+        };
         let of_light = |light: &scene::Light| {
             let spread = match light.kind {
-                LightKind::Directional => scene.area_m2(),
+                LightKind::Directional => area_m2,
                 LightKind::Point | LightKind::Spot { .. } => 4.0 * std::f64::consts::PI,
             };
             mean(intensity(light)) * spread
@@ -306,6 +323,13 @@ impl Session {
             solved.view.is_present(body) != old.is_present(body)
         };
         forest.facets().iter().filter(toggled).map(|f| f.0).collect()
+    }
+
+    /// Whether what is distant emits otherwise than at `from_s`, or came or went since `old`.
+    fn outside_differs(&self, solved: &Solved, old: &WorldView, from_s: f64) -> bool {
+        let distant = |id: &u32| solved.forest.is_distant(ElementId(*id));
+        self.came_or_went(solved, old).iter().any(distant)
+            || self.relit_facets(solved, from_s).iter().any(distant)
     }
 
     /// Facets that emit otherwise than at `from_s`.

@@ -113,6 +113,10 @@ impl Coarse {
         let mut lights: Vec<f64> = scene.lights.iter().map(intensity).collect();
         let floor = arriving / total_area * DARK_FLOOR;
         let light_of = |(&id, irradiance): (&u32, &f64)| {
+            if seed.is_distant(ElementId(id)) {
+                let radiosity = mean(self.radiosity.radiosity(id));
+                return Light { radiosity, ..Light::DISTANT };
+            }
             let emitted = mean(surfaces.lit(surfaces.facet_of(id)).exitance);
             let radiosity = mean(self.radiosity.radiosity(id));
             let reflected = (radiosity - emitted).max(0.0);
@@ -130,7 +134,12 @@ impl Coarse {
         } else {
             // Nothing emits, or all is hidden: every surface and light weighs the same, and errors are relative to row sums.
             lights.iter_mut().for_each(|i| *i = f64::from(u8::from(*i > 0.0)));
-            vec![Light::UNIFORM; coarse.len()]
+            let uniform = |&id: &u32| match seed.is_distant(ElementId(id)) {
+                true if self.radiosity.radiosity(id) == [0.0; 3] => Light::DISTANT,
+                true => Light { radiosity: 1.0, ..Light::DISTANT },
+                false => Light::UNIFORM,
+            };
+            coarse.iter().map(uniform).collect()
         };
         Brightness::new(known, lights, total_area * REFERENCE_SHARE)
     }
@@ -147,19 +156,22 @@ impl Coarse {
     }
 }
 
-/// A solution to begin with: exitances, and intensities of punctual lights.
+/// A solution to begin with: exitances, and what lights and what is distant send.
 pub(super) fn start(lit: (&Scene, f64), forest: &Forest, surfaces: &LitForest<'_>) -> Radiosity {
     let mut out = Radiosity::new(surfaces);
-    set_lights(lit, forest, &mut out);
+    set_sources(lit, (forest, surfaces), &mut out);
     out
 }
 
-/// Gives the punctual lights the intensities that they have at a time.
-pub(super) fn set_lights(
+/// Gives the punctual lights the intensities that they have at a time, and what is distant its exitance.
+pub(super) fn set_sources(
     (scene, time_s): (&Scene, f64),
-    forest: &Forest,
+    (forest, surfaces): (&Forest, &LitForest<'_>),
     radiosity: &mut Radiosity,
 ) {
+    for facet in forest.distant_facets() {
+        radiosity.set(facet.0, surfaces.lit(facet.0).exitance);
+    }
     for id in 0..forest.fixed_len() {
         if let Some(light) = forest.light(ElementId(id)) {
             radiosity.set(id, scene.lights[light].intensity_at(time_s).map(|x| x as f32));

@@ -163,7 +163,7 @@ impl<'a> Look<'a> {
     fn between(&self, target: PatchId, rounding_m: f64) -> Vec<Occluder> {
         let view = &self.solved.view;
         let root = self.forest.patch_root(target);
-        let (from, to) = (Aabb::of([self.point]), *view.fixed_box(root));
+        let (from, to) = (Aabb::of([self.point]), *view.end_box(root));
         let plane = view.occluder(target).plane;
         let raised = |p: &Plane, by: f64| Plane { normal: p.normal, offset: p.offset + by };
         let front = [raised(&self.tangent, self.slack_m), raised(&plane, rounding_m)];

@@ -112,7 +112,7 @@ impl Reconstruction<'_> {
         found: &mut Vec<(u32, Link)>,
     ) -> bool {
         let forest = &self.solved.forest;
-        if forest.kind(receiver) != Kind::Element || forest.kind(source) != Kind::Element {
+        if !forest.receives(receiver) || forest.kind(source) != Kind::Element {
             return false;
         }
         let sends = self.solved.radiosity.radiosity(source.0);

@@ -24,7 +24,7 @@ pub struct Snapshot {
     pub time_s: f64,
     /// World pose of each body, `None` while absent; indexed by `BodyId`.
     pub poses: Vec<Option<Pose>>,
-    /// Leaf elements of all patches, grouped by patch.
+    /// Leaf elements of all patches, grouped by patch; none of those that are distant.
     pub leaves: Vec<Leaf>,
     /// For each patch the range of its leaves; indexed by `PatchId`, one entry more than patches.
     pub leaf_offsets: Vec<u32>,
@@ -129,7 +129,8 @@ pub(super) fn take(
     let of_patch = |k: usize| {
         let mut out = Vec::new();
         let mut stack = vec![forest.patch_root(PatchId(k as u32))];
-        if !solved.view.is_present(scene.patches[k].body) {
+        let body = scene.patches[k].body;
+        if !solved.view.is_present(body) || scene.is_distant(body) {
             stack.clear();
         }
         while let Some(id) = stack.pop() {

@@ -69,11 +69,11 @@ impl Surfaces for LitForest<'_> {
     }
 
     fn facets(&self) -> &[ElementId] {
-        self.forest.facets()
+        self.forest.near_facets()
     }
 
     fn is_surface(&self, id: u32) -> bool {
-        self.forest.kind(ElementId(id)) == Kind::Element
+        self.forest.receives(ElementId(id))
     }
 
     fn facet_of(&self, id: u32) -> u32 {
@@ -110,7 +110,7 @@ impl Surfaces for LitForest<'_> {
 pub(crate) trait Receivers {
     /// Room for elements: ids are below this.
     fn room(&self) -> usize;
-    /// Whether light is gathered there: an element, not a light.
+    /// Whether light is gathered there: an element, neither a light nor distant.
     fn receives(&self, id: ElementId) -> bool;
     /// Area, m2.
     fn receiving_area_m2(&self, id: ElementId) -> f64;
@@ -122,7 +122,7 @@ impl Receivers for Forest {
     }
 
     fn receives(&self, id: ElementId) -> bool {
-        self.kind(id) == Kind::Element
+        Forest::receives(self, id)
     }
 
     fn receiving_area_m2(&self, id: ElementId) -> f64 {

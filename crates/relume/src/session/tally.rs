@@ -1,6 +1,6 @@
 //! The counters and balances of a frame.
 
-use crate::element::{ElementId, Forest, Kind};
+use crate::element::{ElementId, Forest};
 use crate::pair::PairTree;
 use crate::scene::{BodyId, LightKind, Scene};
 use crate::solver::{Links, Radiosity, Surfaces, row_sums};
@@ -59,12 +59,12 @@ fn balance(scene: &Scene, solved: &Solved) -> (RowSumError, Energy) {
         let patch = forest.patch(*facet).expect("has a patch");
         solved.view.is_present(scene.patches[patch.0 as usize].body)
     };
-    let facets = forest.facets().iter().copied().filter(present);
-    let is_surface = |id: u32| forest.kind(ElementId(id)) == Kind::Element;
+    let facets = forest.near_facets().iter().copied().filter(present);
+    let is_surface = |id: u32| forest.receives(ElementId(id));
     let lit = (&solved.links, &solved.radiosity);
     let (rows, mut energy) = balance_of(&surfaces, lit, facets, &is_surface);
     let lights = lights_w(scene, solved);
-    energy.emitted_w += lights.0;
+    energy.emitted_w += lights.0 + from_outside_w(&surfaces, solved);
     energy.escaped_w += lights.0 - lights.1;
     (rows, energy)
 }
@@ -102,6 +102,20 @@ pub(crate) fn balance_of(
     }
     rows.rms = if area > 0.0 { (rows.rms / area).sqrt() } else { 0.0 };
     (rows, energy)
+}
+
+/// Flux that arrives from what is distant, W: it emits what arrives.
+fn from_outside_w(surfaces: &LitForest<'_>, solved: &Solved) -> f64 {
+    let forest = &solved.forest;
+    let mut sum = 0.0;
+    for link in solved.tree.links() {
+        let exchange = f64::from(link.carried.exchange_area_past_occluders_m2());
+        for end in [link.a, link.b].into_iter().filter(|&end| forest.is_distant(end)) {
+            let exitance = surfaces.lit(surfaces.facet_of(end.0)).exitance;
+            sum += exchange * exitance.iter().copied().map(f64::from).sum::<f64>();
+        }
+    }
+    sum
 }
 
 /// Flux of the punctual lights and the part of it that arrives, W. A directional light emits what
@@ -161,9 +175,9 @@ pub(super) fn suspects(scene: &Scene, solved: &Solved) -> Vec<String> {
 pub(super) fn row_sums_of(scene: &Scene, solved: &Solved) -> Vec<(ElementId, f64)> {
     let forest = &solved.forest;
     let surfaces = LitForest::new(scene, forest, solved.time_s);
-    let is_surface = |id: u32| forest.kind(ElementId(id)) == Kind::Element;
+    let is_surface = |id: u32| forest.receives(ElementId(id));
     let mut out = Vec::with_capacity(forest.counts().leaves as usize);
-    for facet in forest.facets() {
+    for facet in forest.near_facets() {
         let links = (&solved.links, !solved.radiosity.is_bounded());
         row_sums(&surfaces, links, &is_surface, facet.0, &mut |id, sum| {
             out.push((ElementId(id), f64::from(sum)));

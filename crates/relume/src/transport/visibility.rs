@@ -353,7 +353,8 @@ impl<'a> Shaft<'a> {
 
     /// Clusters of this size are small against the shaft, metres.
     fn keep_m(&self) -> f64 {
-        0.25 * ((self.b.centre - self.a.centre).length() + self.a.radius + self.b.radius)
+        let length = (self.b.centre - self.a.centre).length() + self.a.radius + self.b.radius;
+        0.25 * length.min(self.view.far_m())
     }
 
     /// The patches among and below `candidates` that may block segments of this very pair, in the

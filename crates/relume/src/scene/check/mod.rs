@@ -41,6 +41,9 @@ const SUN_HIGH: f64 = 1.4e4;
 pub fn check(scene: &Scene) -> Vec<Note> {
     let mut notes = Vec::new();
     emission(scene, &mut notes);
+    // What is outside is as it should be.
+    let near = scene.outside.as_ref().map(|_| scene.without_outside());
+    let scene = near.as_ref().unwrap_or(scene);
     reflectance(scene, &mut notes);
     units(scene, &mut notes);
     shape::shape(scene, &mut notes);
@@ -79,7 +82,7 @@ fn emission(scene: &Scene, notes: &mut Vec<Note>) {
     if !glows && !shines {
         let message = "nothing emits light, so every picture is black; give a material an emission \
                        (emissiveFactor) or add a point, spot or sun light (area lights are not exported to glTF: \
-                       use an emitting polygon)";
+                       use an emitting polygon), or light it from outside (--sky uniform=1, --sun 135,40)";
         notes.push(note(Severity::Error, "nothing-emits", &scene.name, 0, message.to_owned()));
     }
 }

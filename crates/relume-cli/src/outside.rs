@@ -162,9 +162,8 @@ pub(crate) fn lit_by_default(scene: Scene, fineness: f64) -> Result<(Scene, Stri
 
 /// Whether nothing in a scene ever emits.
 pub(crate) fn is_dark(scene: &Scene) -> bool {
-    let emits = |p: &relume::scene::Patch| scene.materials[p.material.0 as usize].emits();
     let shines = |light: &Light| light.most_intensity().iter().any(|&i| i > 0.0);
-    !scene.patches.iter().any(emits) && !scene.lights.iter().any(shines)
+    !scene.patches.iter().any(|p| scene.patch_emits(p)) && !scene.lights.iter().any(shines)
 }
 
 /// Numbers between commas.

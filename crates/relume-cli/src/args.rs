@@ -9,6 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use relume::session::Update;
 use serde::{Deserialize, Serialize};
 
+use crate::edits::EditFlags;
 use crate::failure::Failure;
 use crate::frames::FrameSpec;
 
@@ -439,8 +440,8 @@ pub(crate) struct CheckArgs {
     pub(crate) verbose: bool,
 }
 
-/// Which animation plays, and what a scene may be read from.
-#[derive(Clone, Debug, Args)]
+/// Which animation plays, what a scene may be read from, and what of it is changed.
+#[derive(Clone, Debug, Default, Args)]
 pub(crate) struct AnimationFlag {
     /// Name of the animation to play; all of them together if left out.
     #[arg(long = "animation", value_name = "NAME")]
@@ -448,6 +449,8 @@ pub(crate) struct AnimationFlag {
     /// Read buffers and images of a glTF file wherever they are: outside its folder, devices, pipes.
     #[arg(long)]
     pub(crate) allow_outside: bool,
+    #[command(flatten)]
+    pub(crate) edits: EditFlags,
 }
 
 /// What is solved, and how finely: what every command that solves takes.
@@ -485,7 +488,7 @@ impl Default for ClipFlags {
         ClipFlags {
             frames: None,
             fps: 24.0,
-            animation: AnimationFlag { name: None, allow_outside: false },
+            animation: AnimationFlag::default(),
             tolerance: None,
             oracle: OracleFlag::Error,
             threads: None,

@@ -75,6 +75,7 @@ impl Clip {
             return Err(Failure::usage("the demonstrations have one animation, without a name")
                 .help("leave out --animation"));
         }
+        flags.animation.edits.refuse_for_a_demo()?;
         let threads = use_threads(flags.threads)?;
         let demo = demo::demo(name);
         let scene = (demo.build)().map_err(scene_file::failure)?;

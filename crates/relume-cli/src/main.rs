@@ -5,6 +5,7 @@ mod bench;
 mod check;
 mod clip;
 mod demo;
+mod edits;
 mod events;
 mod factors;
 mod failure;

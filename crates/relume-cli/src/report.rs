@@ -74,6 +74,9 @@ pub(crate) struct RunOptions {
     pub(crate) fps: f64,
     /// Animation chosen by name.
     pub(crate) animation: Option<String>,
+    /// What of the scene was changed, as on the command line.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) edits: Vec<String>,
     /// Relative error of irradiance aimed at.
     pub(crate) tolerance: f64,
     /// The oracle, as on the command line.
@@ -244,6 +247,7 @@ mod tests {
             frames: "0-4".into(),
             fps: 24.0,
             animation: None,
+            edits: Vec::new(),
             tolerance: 0.02,
             oracle: "error".into(),
             update: "scratch".into(),

@@ -12,10 +12,11 @@ use crate::output;
 
 /// Reads a scene.
 pub(crate) fn load(path: &Path, animation: &AnimationFlag) -> Result<Scene, Failure> {
-    let AnimationFlag { name, allow_outside } = animation.clone();
+    let AnimationFlag { name, allow_outside, edits } = animation.clone();
     memory::at(format_args!("reading {}", path.display()));
     let max_memory_bytes = memory::limit_bytes();
-    let options = ImportOptions { animation: name, allow_outside, max_memory_bytes };
+    let edits = edits.edits();
+    let options = ImportOptions { animation: name, allow_outside, max_memory_bytes, edits };
     let scene = import(path, &options).map_err(failure)?;
     memory::at(format_args!("preparing {}", path.display()));
     Ok(scene)
@@ -40,6 +41,7 @@ pub(crate) fn failure(error: SceneError) -> Failure {
         | SceneError::Hierarchy { remedy, .. }
         | SceneError::NotRigid { remedy, .. }
         | SceneError::Animation { remedy, .. }
+        | SceneError::Edit { remedy, .. }
         | SceneError::Empty { remedy, .. } => remedy,
     };
     match text.strip_suffix(remedy.as_str()) {

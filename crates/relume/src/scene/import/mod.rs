@@ -20,7 +20,7 @@ mod tree;
 use document::Document;
 
 use super::assemble::assemble;
-use super::{Note, Scene, SceneError, Severity, view3d};
+use super::{Edits, Note, Scene, SceneError, Severity, view3d};
 
 /// What to read of a file.
 #[derive(Clone, Debug, Default)]
@@ -33,6 +33,8 @@ pub struct ImportOptions {
     /// Bytes that a file, an image or a list of numbers may need, each by itself: what needs more is refused
     /// before memory is asked for. `None` for no limit.
     pub max_memory_bytes: Option<u64>,
+    /// What of the scene is changed before it is built.
+    pub edits: Edits,
 }
 
 /// Reads a scene from a .glb or .gltf file (glTF 2.0; external and embedded buffers), or a .vs3 file
@@ -56,7 +58,7 @@ pub struct ImportOptions {
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError> {
     if view3d::is_view3d(path) {
         return match &options.animation {
-            None => view3d::import(path, options.max_memory_bytes),
+            None => view3d::import(path, options),
             Some(name) => Err(SceneError::Animation {
                 animation: name.clone(),
                 what: "files of View3D have no animation".into(),
@@ -68,6 +70,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError>
     let mut draft = tree::draft(&document, options)?;
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned());
     draft.name = stem.unwrap_or_else(|| document.file.clone());
+    draft.edits = options.edits.clone();
     assemble(draft)
 }
 

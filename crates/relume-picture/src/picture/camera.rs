@@ -6,7 +6,7 @@ use glam::{DMat3, DVec2, DVec3};
 use relume::geometry::Pose;
 use relume::scene::{Projection, Scene};
 
-use super::auto_view;
+use super::overview::Overview;
 use super::project::Projector;
 
 /// A camera at one instant: a placement and a projection.
@@ -96,16 +96,9 @@ impl Viewpoint {
 }
 
 impl View {
-    /// A sensible view of a scene, fixed over its whole animation; deterministic.
-    ///
-    /// A closed room is seen from inside, a room that is open on a side through the opening,
-    /// objects in open space from outside with the whole animation's bounds in the picture.
-    /// Among the candidates of each kind the one is taken that shows most of the scene's surface
-    /// and fewest backs of faces, judged at three instants of the animation.
-    ///
-    /// Cost: some 100 tiny rasterisations of all patches.
+    /// The view of [`Overview::of`].
     pub fn automatic(scene: &Scene) -> View {
-        auto_view::choose(scene)
+        Overview::of(scene).view
     }
 
     /// A perspective view from `eye` towards `target` with +Y up (or, looking along Y, -Z up).

@@ -42,16 +42,6 @@ impl Projector {
         self.world_from_camera.translation
     }
 
-    /// The unit direction in which the camera looks.
-    pub(crate) fn forward(&self) -> DVec3 {
-        -self.world_from_camera.rotation.z_axis
-    }
-
-    /// Pixels per unit of slope (perspective) or per metre (orthographic).
-    pub(crate) fn scale(&self) -> f64 {
-        self.scale
-    }
-
     /// (X, Y, W, D) of a world point.
     pub(crate) fn project(&self, world: DVec3) -> DVec4 {
         self.place(self.world_from_camera.inverse_point(world), 1.0)

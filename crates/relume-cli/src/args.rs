@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::edits::EditFlags;
 use crate::failure::Failure;
 use crate::frames::FrameSpec;
+use crate::viewing::ViewFlags;
 
 /// Largest picture side, pixels.
 const SIZE_MAX: u32 = 16_384;
@@ -618,9 +619,8 @@ pub(crate) struct PictureFlags {
     /// face's own frame [default: gouraud; flat for `demo room`].
     #[arg(long, value_enum)]
     pub(crate) shading: Option<Shading>,
-    /// Name of the camera in the file [default: the first; an overview where there is none].
-    #[arg(long, value_name = "NAME")]
-    pub(crate) camera: Option<String>,
+    #[command(flatten)]
+    pub(crate) view: ViewFlags,
     /// Exposure in stops, fixed over the clip: at 0 a radiance of 1 W/m2/sr is full white, +1 is twice
     /// as bright. `auto` chooses it once, at the first of the frames of the animation in which most is
     /// emitted, whichever frames are asked for; report.json says what it chose.
@@ -640,7 +640,7 @@ impl Default for PictureFlags {
         PictureFlags {
             size: Size { width: 640, height: 480 },
             shading: None,
-            camera: None,
+            view: ViewFlags::default(),
             exposure: ExposureFlag::Auto,
             mesh: false,
             reconstruct: false,

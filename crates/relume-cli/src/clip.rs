@@ -48,9 +48,19 @@ impl Clip {
     ///
     /// Sets the threads of the process: before anything runs in parallel, as choosing a view does.
     pub(crate) fn of_file(path: &Path, flags: &ClipFlags, tolerance: f64) -> Result<Clip, Failure> {
+        Clip::of_frames(path, flags, tolerance, 1)
+    }
+
+    /// The same with so many frames at least: what moves rests after its last.
+    pub(crate) fn of_frames(
+        path: &Path,
+        flags: &ClipFlags,
+        tolerance: f64,
+        at_least: u32,
+    ) -> Result<Clip, Failure> {
         let threads = use_threads(flags.threads)?;
         let scene = scene_file::load(path, &flags.animation)?;
-        Clip::of_scene(scene, flags, threads, tolerance)
+        Clip::of_scene(scene, flags, threads, (tolerance, at_least))
     }
 
     /// The clip of a scene file or of a demonstration.
@@ -79,7 +89,7 @@ impl Clip {
         let threads = use_threads(flags.threads)?;
         let demo = demo::demo(name);
         let scene = (demo.build)().map_err(scene_file::failure)?;
-        let clip = Clip::of_scene(scene, flags, threads, demo.tolerance)?;
+        let clip = Clip::of_scene(scene, flags, threads, (demo.tolerance, 1))?;
         Ok(Clip { shading: demo.shading, ..clip })
     }
 
@@ -87,10 +97,11 @@ impl Clip {
         scene: Scene,
         flags: &ClipFlags,
         threads: usize,
-        tolerance: f64,
+        (tolerance, at_least): (f64, u32),
     ) -> Result<Clip, Failure> {
-        let frames = frames::resolve(flags.frames.as_ref(), scene.motion.duration_s, flags.fps)
-            .map_err(|error| Failure::new(error).help("`relume info` lists the frames"))?;
+        let frames =
+            frames::resolve(flags.frames.as_ref(), scene.motion.duration_s, flags.fps, at_least)
+                .map_err(|error| Failure::new(error).help("`relume info` lists the frames"))?;
         Ok(Clip {
             scene: Arc::new(scene),
             frames,

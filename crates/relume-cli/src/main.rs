@@ -14,6 +14,7 @@ mod flat;
 mod frames;
 mod info;
 mod interrupt;
+mod light;
 mod lock;
 mod memory;
 mod output;
@@ -28,6 +29,7 @@ mod sensors;
 mod sequence;
 mod strategies;
 mod verify;
+mod viewing;
 
 use std::process::ExitCode;
 

@@ -10,6 +10,7 @@ use crate::args::ProbeArgs;
 use crate::clip::{Clip, TOLERANCE, now, step_failure};
 use crate::failure::Failure;
 use crate::interrupt;
+use crate::light;
 use crate::output::{self, Sink, counted};
 use crate::progress::Progress;
 use crate::sensors::{self, Entry, Sensors};
@@ -19,6 +20,7 @@ pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
     let started = now();
     let sensors = sensors::read(&args.sensors)?;
     let clip = Clip::of_file(&args.scene, &args.clip, TOLERANCE)?;
+    light::required(&clip.scene)?;
     let riders = riders(&clip.scene, &args.sensors, &sensors)?;
     let hidden = inside(&clip, &riders, &args.sensors)?;
     clip.warn();

@@ -100,6 +100,9 @@ pub(crate) struct PictureOptions {
     pub(crate) shading: Shading,
     /// Camera chosen by name.
     pub(crate) camera: Option<String>,
+    /// What else was said of the view, as on the command line.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) view: Vec<String>,
     /// Exposure asked for: `auto` or stops.
     pub(crate) exposure: String,
     /// Exposure used, stops: display value = radiance (W/m2/sr) x 2^EV. `None` until it is known.

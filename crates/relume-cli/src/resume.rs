@@ -222,6 +222,7 @@ mod tests {
                 size: "640x480".into(),
                 shading: Shading::Flat,
                 camera: None,
+                view: Vec::new(),
                 exposure: "auto".into(),
                 exposure_ev: Some(1.25),
                 mesh: false,

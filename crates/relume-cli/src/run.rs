@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use relume::scene::{BodyId, Light, MaterialId, Scene};
 use relume::session::{Energy, Options, Session, SessionError, Snapshot};
 use relume_picture::export::{probe, write_atomically, write_glb};
-use relume_picture::picture::{self, Exposure, Viewpoint};
+use relume_picture::picture::{self, Exposure};
 
 use crate::args::{
     DemoArgs, ExposureFlag, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags, UpdateFlag,
@@ -24,6 +24,7 @@ use crate::events::EventTable;
 use crate::failure::Failure;
 use crate::frames;
 use crate::interrupt;
+use crate::light;
 use crate::lock::Lock;
 use crate::memory;
 use crate::output::{self, count, counted};
@@ -31,6 +32,7 @@ use crate::progress::Progress;
 use crate::report::{PictureOptions, Report, RunOptions, SceneSummary};
 use crate::resume;
 use crate::scene_file;
+use crate::viewing::Viewing;
 
 /// The report is written again after a frame if the last time was this long ago. A run that is
 /// killed outright computes the frames of this time again when it is resumed.
@@ -103,14 +105,18 @@ impl Job {
                 "give the directory of the earlier run with -o, or its report with --report",
             ));
         }
-        let clip = Clip::of_file(&self.scene, &self.solve.clip, self.tolerance)?;
+        let turned = self.picture.as_ref().map(|(_, flags)| flags.view.frames_at_least());
+        let at_least = turned.unwrap_or(1);
+        let clip = Clip::of_frames(&self.scene, &self.solve.clip, self.tolerance, at_least)?;
+        let clip = match &self.picture {
+            Some(_) => light::for_pictures(clip)?,
+            None => light::required(&clip.scene).map(|()| clip)?,
+        };
         clip.warn();
         clip.warn_of(self.solve.update);
         let clip = clip.without_dark_sides();
-        let camera = self.picture.as_ref().map(|(_, flags)| {
-            Viewpoint::new(&clip.scene, flags.camera.as_deref()).map_err(Failure::new)
-        });
-        let camera = camera.transpose()?;
+        let views = self.picture.as_ref().map(|(_, flags)| Viewing::new(&clip.scene, &flags.view));
+        let views = views.transpose()?;
         if let Some((_, flags)) = &self.picture {
             // Not only after the first frame.
             ask_for_picture(flags)?;
@@ -138,7 +144,7 @@ impl Job {
         let mut run = Run {
             job: &self,
             session,
-            camera,
+            views,
             finished,
             progress,
             links: 0,
@@ -192,7 +198,8 @@ impl Job {
         let picture = self.picture.as_ref().map(|(shading, flags)| PictureOptions {
             size: flags.size.to_string(),
             shading: *shading,
-            camera: flags.camera.clone(),
+            camera: flags.view.camera.clone(),
+            view: flags.view.described(),
             exposure: flags.exposure.to_string(),
             exposure_ev: match flags.exposure {
                 ExposureFlag::Auto => None,
@@ -362,7 +369,7 @@ enum Outcome {
 struct Run<'a> {
     job: &'a Job,
     session: Session,
-    camera: Option<Viewpoint>,
+    views: Option<Viewing>,
     /// Locked for as long as an entry takes, since whatever ends the run writes it.
     finished: Arc<Mutex<Finished>>,
     progress: Progress,
@@ -452,10 +459,9 @@ impl Run<'_> {
         frame: u32,
     ) -> Result<Option<(picture::View, PictureOptions, &PictureFlags)>, Failure> {
         let options = self.finished().report.options.picture.clone();
-        let parts = (&self.camera, options, &self.job.picture);
-        let (Some(camera), Some(options), Some((_, flags))) = parts else { return Ok(None) };
-        let time_s = frames::time_of(frame, self.job.solve.clip.fps);
-        let view = camera.at(self.session.scene(), time_s).map_err(Failure::new)?;
+        let parts = (&self.views, options, &self.job.picture);
+        let (Some(views), Some(options), Some((_, flags))) = parts else { return Ok(None) };
+        let view = views.at(self.session.scene(), frame, self.job.solve.clip.fps)?;
         Ok(Some((view, options, flags)))
     }
 
@@ -494,9 +500,12 @@ impl Run<'_> {
 
     fn choose_exposure(&mut self, frame: u32, snapshot: &Snapshot) -> Result<(), Failure> {
         let Some((view, ..)) = self.view(frame)? else { return Ok(()) };
-        let exposure = Exposure::automatic(snapshot, &view);
+        let metered = Exposure::metered(snapshot, &view);
+        if metered.lit < LIT_MIN && !self.job.quiet() {
+            self.progress.suspend(|| output::complain(ALMOST_DARK));
+        }
         if let (Exposure::Fixed(scale), Some(options)) =
-            (exposure, &mut self.finished().report.options.picture)
+            (metered.exposure, &mut self.finished().report.options.picture)
         {
             options.exposure_ev = Some(stops(scale));
         }
@@ -509,6 +518,11 @@ impl Run<'_> {
         clip::step_failure(error, kept)
     }
 }
+
+/// Share of a picture that shows light, below which that is said.
+const LIT_MIN: f64 = 0.01;
+const ALMOST_DARK: &str = "warning: the view sees almost no light: look from elsewhere (--overview, --camera NAME, --eye \
+                           X,Y,Z), or light what it sees (--emit MATERIAL=RADIANCE)";
 
 /// Bytes a pixel while a picture is drawn: in tiles and whole.
 const PIXEL_BYTES: u64 = 6;

@@ -2,7 +2,7 @@
 //!
 //! Must not know pixels, leaves or light.
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use relume::geometry::Pose;
 use relume::scene::{Projection, Scene};
 
@@ -105,13 +105,29 @@ impl View {
     ///
     /// Metres; `yfov` in radians.
     pub fn look_at(eye: DVec3, target: DVec3, yfov: f64) -> View {
+        View::look_at_with_up(eye, target, DVec3::Y, yfov)
+    }
+
+    /// The same with another direction upright in the picture.
+    pub fn look_at_with_up(eye: DVec3, target: DVec3, up: DVec3, yfov: f64) -> View {
         let back = (eye - target).try_normalize().unwrap_or(DVec3::Z);
-        let right = DVec3::Y.cross(back).try_normalize().unwrap_or(DVec3::X);
+        let across = up.normalize_or_zero().cross(back);
+        let right = across.try_normalize().unwrap_or(DVec3::X);
         let rotation = DMat3::from_cols(right, back.cross(right), back);
         View {
             world_from_camera: Pose { rotation, translation: eye },
             projection: Projection::Perspective { yfov, aspect: None },
         }
+    }
+
+    /// The view carried about an axis through a point (world, metres; the axis of unit length), by a share of a
+    /// whole turn, counter-clockwise seen from the axis's end.
+    #[must_use]
+    pub fn turned(&self, about: DVec3, axis: DVec3, turns: f64) -> View {
+        let (sin, cos) = libm::sincos(turns * std::f64::consts::PI);
+        let rotation = DMat3::from_quat(DQuat::from_vec4((axis * sin).extend(cos)));
+        let turn = Pose { rotation, translation: about - rotation * about };
+        View { world_from_camera: turn * self.world_from_camera, ..*self }
     }
 
     /// Width : height that the camera asks for, if it does.

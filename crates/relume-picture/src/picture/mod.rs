@@ -31,7 +31,7 @@ mod render;
 mod tone;
 
 pub use camera::{View, ViewError, Viewpoint};
-pub use exposure::Exposure;
+pub use exposure::{Exposure, Metered};
 pub use image::{Image, WriteError, is_whole_png};
 pub use outline::Outlines;
 pub use overview::Overview;

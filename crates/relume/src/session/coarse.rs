@@ -20,7 +20,7 @@ const REFERENCE_SHARE: f64 = 1.0 / 512.0;
 const SWEEPS: u32 = 8;
 
 /// Errors on dark receivers are measured against at least this share of the mean irradiance.
-const DARK_FLOOR: f64 = 0.1;
+pub(super) const DARK_FLOOR: f64 = 0.1;
 
 /// Share of what would arrive directly if nothing were in the way, below which what arrives is what rounding lets through
 /// between shadows: errors relative to that would have no end. (A lamp outside a closed room.)

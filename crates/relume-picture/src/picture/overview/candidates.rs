@@ -25,9 +25,18 @@ const SPAN: f32 = 0.4;
 /// Instants at which the swept bounds are taken.
 const SWEEP_STEPS: u32 = 64;
 
-/// Heights per length of views from outside, those that people would choose first; the last ones show
-/// what is open or lit from above, from straight above and from below only.
-const SLOPES: [f64; 7] = [0.5, 0.3, 0.8, 0.12, 0.0, 1.8, -0.5];
+/// Heights per length of views from outside, and what each is worth less than those that people would choose;
+/// the last ones are for what is open or lit at the top or from below only.
+const SLOPES: [(f64, f64); 7] =
+    [(0.5, 0.0), (0.3, 0.0), (0.8, 0.05), (0.12, 0.02), (0.0, 0.1), (1.8, 0.2), (-0.5, 0.2)];
+
+/// A view that may be chosen.
+#[derive(Clone, Copy)]
+pub(super) struct Candidate {
+    pub(super) view: View,
+    /// How much its score is less than what it shows: by how odd it is.
+    pub(super) oddness: f64,
+}
 
 /// An axis-aligned box, metres.
 #[derive(Clone, Copy, Debug)]
@@ -71,16 +80,19 @@ impl Bounds {
     }
 
     /// Views from outside that just hold the bounds, all around at several heights.
-    pub(super) fn outside(&self) -> Vec<View> {
-        let around = |slope| {
-            azimuths().map(move |azimuth| self.framing(DVec3::new(azimuth.x, slope, azimuth.y)))
+    pub(super) fn outside(&self) -> Vec<Candidate> {
+        let around = |(slope, oddness)| {
+            azimuths().map(move |azimuth| {
+                let view = self.framing(DVec3::new(azimuth.x, slope, azimuth.y));
+                Candidate { view, oddness }
+            })
         };
         SLOPES.into_iter().flat_map(around).collect()
     }
 
     /// The view from direction `towards_eye` at the least distance that holds the bounds, with a
     /// margin of a twentieth.
-    pub(super) fn framing(&self, towards_eye: DVec3) -> View {
+    fn framing(&self, towards_eye: DVec3) -> View {
         let centre = self.at(0.5, 0.5, 0.5);
         let view = View::look_at(centre + towards_eye, centre, YFOV_OUTSIDE);
         let slope_y = libm::tan(YFOV_OUTSIDE / 2.0) * 0.95;
@@ -96,12 +108,13 @@ impl Bounds {
 
     /// Views from points within the bounds that are in a room: from near the walls across the middle, and
     /// from a grid all around.
-    pub(super) fn inside(&self, stage: &Stage<'_>) -> Vec<View> {
+    pub(super) fn inside(&self, stage: &Stage<'_>) -> Vec<Candidate> {
         let mut views = Vec::new();
         for (eye, targets) in self.across().chain(self.around()) {
             let (enclosure, span) = stage.look_around(eye);
             if enclosure > ROOM && span > SPAN {
-                views.extend(targets.iter().map(|&at| View::look_at(eye, at, YFOV_INSIDE)));
+                let views_from = targets.iter().map(|&at| View::look_at(eye, at, YFOV_INSIDE));
+                views.extend(views_from.map(|view| Candidate { view, oddness: 0.0 }));
             }
         }
         views

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use relume::scene::Scene;
 
 use super::camera::View;
-use candidates::Bounds;
+use candidates::{Bounds, Candidate};
 use score::{Size, Stage};
 
 /// A view chosen for a scene, and whether there is light in it.
@@ -71,16 +71,17 @@ impl Overview {
         order.sort_by(|&a, &b| rough[b].total_cmp(&rough[a]));
         order.truncate(FINALISTS);
         order.sort_unstable();
-        let finalists: Vec<View> = order.iter().map(|&k| views[k]).collect();
-        let view = finalists[first_best(&scores(&stages, &finalists, Size::FINE))];
+        let finalists: Vec<Candidate> = order.iter().map(|&k| views[k]).collect();
+        let view = finalists[first_best(&scores(&stages, &finalists, Size::FINE))].view;
         Overview { view, lit: stages[0].lit_share(&view) }
     }
 }
 
 /// The score of each view, over all instants.
-fn scores(stages: &[Stage<'_>], views: &[View], size: Size) -> Vec<f64> {
-    let of_view = |view: &View| stages.iter().map(|stage| stage.score(view, size)).sum();
-    views.par_iter().map(of_view).collect()
+fn scores(stages: &[Stage<'_>], views: &[Candidate], size: Size) -> Vec<f64> {
+    let score = |of: &Candidate, stage: &Stage<'_>| stage.score(&of.view, size) - of.oddness;
+    let sum = |of: &Candidate| stages.iter().map(|stage| score(of, stage)).sum();
+    views.par_iter().map(sum).collect()
 }
 
 /// The first of the best.

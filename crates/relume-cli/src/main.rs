@@ -27,6 +27,7 @@ mod run;
 mod scene_file;
 mod sensors;
 mod sequence;
+mod size;
 mod strategies;
 mod verify;
 mod viewing;

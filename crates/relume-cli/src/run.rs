@@ -32,6 +32,7 @@ use crate::progress::Progress;
 use crate::report::{PictureOptions, Report, RunOptions, SceneSummary};
 use crate::resume;
 use crate::scene_file;
+use crate::size::Size;
 use crate::viewing::Viewing;
 
 /// The report is written again after a frame if the last time was this long ago. A run that is
@@ -136,7 +137,12 @@ impl Job {
         let events = self.solve.events.as_ref().map(|_| EventTable::new());
         let options = clip.options(self.solve.update, true)?;
         let session = clip.session_with(Options { events: events.is_some(), ..options })?;
+        let size = Size::of(&clip, session.options());
+        if !self.quiet() {
+            size.warn(&clip, pending.len());
+        }
         let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.quiet());
+        progress.watch(session.watch(), size.pairs());
         let paths = (self.report_paths(), self.solve.events.clone());
         let finished = Arc::new(Mutex::new(Finished { report, events, paths }));
         let keep = Arc::clone(&finished);

@@ -141,15 +141,15 @@ impl Preview {
     }
 
     fn brightnesses(&self, reflected: &[f64]) -> Vec<f64> {
-        let weighed = |power: i32| -> f64 {
-            let term = |(p, b): (&Point, &f64)| p.area_m2 * b.powi(power);
-            self.points.iter().zip(reflected).map(term).sum()
-        };
-        // What is met where light is, not where surface is: most of a scene may be dark.
-        let typical = weighed(2) / weighed(1);
+        // What is met where light is, not where surface is, as most of a scene may be dark; and its logarithm,
+        // as there may be bright spots.
+        let lit = || self.points.iter().zip(reflected).filter(|(_, b)| **b > 0.0);
+        let weight: f64 = lit().map(|(point, b)| point.area_m2 * b).sum();
+        let typical =
+            lit().map(|(point, b)| point.area_m2 * b * libm::log2(*b)).sum::<f64>() / weight;
         let of_point = |(point, &b): (&Point, &f64)| match point.emits {
             true => 1.0,
-            false if b > 0.0 => (1.0 + libm::log2(b / typical) / STOPS).clamp(0.0, 1.0),
+            false if b > 0.0 => (1.0 + (libm::log2(b) - typical) / STOPS).clamp(0.0, 1.0),
             false => 0.0,
         };
         self.points.iter().zip(reflected).map(of_point).collect()
@@ -213,10 +213,17 @@ fn on_patch(patch: &Patch, count: usize) -> impl Iterator<Item = DVec2> + '_ {
     })
 }
 
+/// A place on a lamp, and what it stands for.
+struct LampPoint {
+    at: Vec3,
+    normal: Vec3,
+    exitance_w_m2: f64,
+    area_m2: f64,
+}
+
 /// What shines at one instant.
 struct Lamps {
-    /// Places on lamps with normals and flux, W.
-    points: Vec<(Vec3, Vec3, f64)>,
+    points: Vec<LampPoint>,
     /// Lights with where they are and which way they shine; intensity in W/sr or W/m2.
     lights: Vec<(Vec3, Vec3, LightKind, f64)>,
 }
@@ -231,21 +238,23 @@ impl Lamps {
 
     /// Irradiance that comes to a point directly, W/m2.
     fn irradiance(&self, point: &Point, caster: &Caster) -> f64 {
-        let per_m2 = 1.0 / (caster.unit_m() * caster.unit_m());
+        let unit_m2 = caster.unit_m() * caster.unit_m();
         let from = point.at + point.normal * LIFT;
-        // Towards what shines: cosine, distance; nothing where it is behind or hidden.
+        // Towards what shines: direction, cosine, distance squared, m2; nothing where it is behind or hidden.
         let in_sight = |at: Vec3| {
             let way = at - from;
             let (distance, towards) = (way.length().max(NEAREST), way.normalize_or_zero());
             let cosine = towards.dot(point.normal);
             let sees = cosine > 0.0 && caster.is_free(from, towards, way.length() - LIFT);
-            sees.then(|| (towards, f64::from(cosine) / f64::from(distance * distance) * per_m2))
+            sees.then(|| (towards, f64::from(cosine), f64::from(distance * distance) * unit_m2))
         };
-        let of_lamp = |&(at, normal, flux_w): &(Vec3, Vec3, f64)| {
-            let facing = -(at - from).normalize_or_zero().dot(normal);
-            let seen = if facing > 0.0 { in_sight(at) } else { None };
-            seen.map_or(0.0, |(_, per)| {
-                flux_w * std::f64::consts::FRAC_1_PI * f64::from(facing) * per
+        let of_lamp = |lamp: &LampPoint| {
+            let facing = f64::from(-(lamp.at - from).normalize_or_zero().dot(lamp.normal));
+            let seen = if facing > 0.0 { in_sight(lamp.at) } else { None };
+            // As from a disc of its area: never more than it emits, however near.
+            seen.map_or(0.0, |(_, cosine, distance_m2)| {
+                let disc = std::f64::consts::PI * distance_m2 + lamp.area_m2;
+                lamp.exitance_w_m2 * lamp.area_m2 * facing * cosine / disc
             })
         };
         let of_light = |&(at, axis, kind, strength): &(Vec3, Vec3, LightKind, f64)| match kind {
@@ -254,13 +263,15 @@ impl Lamps {
                 let lit = cosine > 0.0 && caster.is_free(from, -axis, f32::INFINITY);
                 if lit { strength * f64::from(cosine) } else { 0.0 }
             }
-            LightKind::Point => in_sight(at).map_or(0.0, |(_, per)| strength * per),
-            LightKind::Spot { inner, outer } => in_sight(at).map_or(0.0, |(towards, per)| {
-                let along = f64::from(-towards.dot(axis));
-                let [full, none] = [inner, outer].map(libm::cos);
-                let share = ((along - none) / (full - none).max(1e-9)).clamp(0.0, 1.0);
-                strength * per * share * share
-            }),
+            LightKind::Point => in_sight(at).map_or(0.0, |(_, cosine, r2)| strength * cosine / r2),
+            LightKind::Spot { inner, outer } => {
+                in_sight(at).map_or(0.0, |(towards, cosine, r2)| {
+                    let along = f64::from(-towards.dot(axis));
+                    let [full, none] = [inner, outer].map(libm::cos);
+                    let share = ((along - none) / (full - none).max(1e-9)).clamp(0.0, 1.0);
+                    strength * cosine / r2 * share * share
+                })
+            }
         };
         self.points.iter().map(of_lamp).sum::<f64>() + self.lights.iter().map(of_light).sum::<f64>()
     }
@@ -272,7 +283,7 @@ fn lamp_points(
     time_s: f64,
     poses: &[Option<Pose>],
     caster: &Caster,
-) -> Vec<(Vec3, Vec3, f64)> {
+) -> Vec<LampPoint> {
     let flux = |patch: &Patch| {
         let exitance = scene.materials[patch.material.0 as usize].exitance_at(time_s);
         let there = poses[patch.body.0 as usize].is_some();
@@ -284,13 +295,15 @@ fn lamp_points(
     let mut sum_w = 0.0;
     for patch in scene.patches.iter().filter(|patch| flux(patch) > 0.0) {
         let Some(pose) = &poses[patch.body.0 as usize] else { continue };
+        let exitance_w_m2 = flux(patch) / patch.area_m2();
         let begun = (sum_w / each_w + 0.5).floor();
         sum_w += flux(patch);
         let count = ((sum_w / each_w + 0.5).floor() - begun) as usize;
         let normal = pose.direction(patch.frame.normal).as_vec3();
         for at in on_patch(patch, count.min(LAMP_POINTS)) {
             let at = caster.place(pose.point(patch.frame.point(at)));
-            points.push((at + normal * LIFT, normal, each_w));
+            let at = at + normal * LIFT;
+            points.push(LampPoint { at, normal, exitance_w_m2, area_m2: each_w / exitance_w_m2 });
         }
     }
     points

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use indicatif::{HumanBytes, HumanDuration};
+use relume::scene::Scene;
 use relume::session::{Estimate, Options};
 
 use crate::clip::Clip;
@@ -18,8 +19,13 @@ pub(crate) struct Size(Estimate);
 impl Size {
     /// Of a clip solved with these options.
     pub(crate) fn of(clip: &Clip, options: &Options) -> Size {
+        Size::of_scene(&clip.scene, clip, options)
+    }
+
+    /// The same of another form of the clip's scene.
+    pub(crate) fn of_scene(scene: &Scene, clip: &Clip, options: &Options) -> Size {
         let first = clip.frames.first().map_or(0.0, |&frame| clip.time_of(frame));
-        Size(Estimate::of(&clip.scene, first, options))
+        Size(Estimate::of(scene, first, options))
     }
 
     /// Pairs that are likely.

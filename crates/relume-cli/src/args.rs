@@ -9,9 +9,11 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use relume::session::Update;
 use serde::{Deserialize, Serialize};
 
+use crate::edits::EditFlags;
 use crate::failure::Failure;
 use crate::frames::FrameSpec;
 use crate::outside::OutsideFlags;
+use crate::viewing::ViewFlags;
 
 /// Largest picture side, pixels.
 const SIZE_MAX: u32 = 16_384;
@@ -445,8 +447,8 @@ pub(crate) struct CheckArgs {
     pub(crate) verbose: bool,
 }
 
-/// Which animation plays, and what a scene may be read from.
-#[derive(Clone, Debug, Args)]
+/// Which animation plays, what a scene may be read from, and what of it is changed.
+#[derive(Clone, Debug, Default, Args)]
 pub(crate) struct AnimationFlag {
     /// Name of the animation to play; if left out all of them together, but of those that move the same things the
     /// first alone.
@@ -455,6 +457,8 @@ pub(crate) struct AnimationFlag {
     /// Read buffers and images of a glTF file wherever they are: outside its folder, devices, pipes.
     #[arg(long)]
     pub(crate) allow_outside: bool,
+    #[command(flatten)]
+    pub(crate) edits: EditFlags,
 }
 
 /// What is solved, and how finely: what every command that solves takes.
@@ -497,7 +501,7 @@ impl Default for ClipFlags {
         ClipFlags {
             frames: None,
             fps: 24.0,
-            animation: AnimationFlag { name: None, allow_outside: false },
+            animation: AnimationFlag::default(),
             tolerance: None,
             oracle: OracleFlag::Error,
             threads: None,
@@ -629,9 +633,8 @@ pub(crate) struct PictureFlags {
     /// face's own frame [default: gouraud; flat for `demo room`].
     #[arg(long, value_enum)]
     pub(crate) shading: Option<Shading>,
-    /// Name of the camera in the file [default: the first; an overview where there is none].
-    #[arg(long, value_name = "NAME")]
-    pub(crate) camera: Option<String>,
+    #[command(flatten)]
+    pub(crate) view: ViewFlags,
     /// Exposure in stops, fixed over the clip: at 0 a radiance of 1 W/m2/sr is full white, +1 is twice
     /// as bright. `auto` chooses it once, at the first of the frames of the animation in which most is
     /// emitted, whichever frames are asked for; report.json says what it chose.
@@ -651,7 +654,7 @@ impl Default for PictureFlags {
         PictureFlags {
             size: Size { width: 640, height: 480 },
             shading: None,
-            camera: None,
+            view: ViewFlags::default(),
             exposure: ExposureFlag::Auto,
             mesh: false,
             reconstruct: false,

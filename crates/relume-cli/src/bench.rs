@@ -8,7 +8,7 @@ use std::path::Path;
 
 use relume::session::Session;
 use relume_picture::export::{probe, write_atomically};
-use relume_picture::picture::{self, Exposure, Viewpoint};
+use relume_picture::picture::{self, Exposure};
 
 use crate::args::{BenchArgs, ExposureFlag, MeasureFlags, PictureFlags, UpdateChoice, UpdateFlag};
 use crate::clip::{self, Clip, fixed, now};
@@ -20,6 +20,7 @@ use crate::output::{self, count, counted};
 use crate::progress::Progress;
 use crate::sequence::{Sequence, Stepping};
 use crate::strategies;
+use crate::viewing::Viewing;
 
 /// What is measured, and what becomes of it.
 pub(crate) struct Plan<'a> {
@@ -264,24 +265,24 @@ impl<'a, Q: Sequence> Bench<'a, Q> {
 struct Drawing<'a> {
     flags: &'a PictureFlags,
     clip: &'a Clip,
-    camera: Viewpoint,
+    views: Viewing,
     /// Chosen at the first picture where the flags say `auto`.
     exposure: Option<Exposure>,
 }
 
 impl<'a> Drawing<'a> {
     fn new(flags: &'a PictureFlags, clip: &'a Clip) -> Result<Drawing<'a>, Failure> {
-        let camera = Viewpoint::new(&clip.scene, flags.camera.as_deref());
+        let views = Viewing::new(&clip.scene, &flags.view)?;
         let exposure = match flags.exposure {
             ExposureFlag::Auto => None,
             ExposureFlag::Stops(stops) => Some(fixed(stops)),
         };
-        Ok(Drawing { flags, clip, camera: camera.map_err(Failure::new)?, exposure })
+        Ok(Drawing { flags, clip, views, exposure })
     }
 
     /// Seconds from the solution to the pixels.
     fn draw(&mut self, session: &Session, time_s: f64) -> Result<f64, Failure> {
-        let view = self.camera.at(&self.clip.scene, time_s).map_err(Failure::new)?;
+        let view = self.views.at_time(&self.clip.scene, time_s)?;
         let flags = self.flags;
         let automatic = || Exposure::automatic(&clip::snapshot(session, flags), &view);
         let exposure = *self.exposure.get_or_insert_with(automatic);

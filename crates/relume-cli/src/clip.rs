@@ -49,27 +49,28 @@ impl Clip {
     ///
     /// Sets the threads of the process: before anything runs in parallel, as choosing a view does.
     pub(crate) fn of_file(path: &Path, flags: &ClipFlags, tolerance: f64) -> Result<Clip, Failure> {
-        Clip::read(path, flags, tolerance, false)
+        Clip::read(path, flags, (tolerance, 1), false)
     }
 
-    /// The same with the images that pictures show.
+    /// The same with the images that pictures show, and with so many frames at least: what moves rests after its last.
     pub(crate) fn for_pictures(
         path: &Path,
         flags: &ClipFlags,
         tolerance: f64,
+        at_least: u32,
     ) -> Result<Clip, Failure> {
-        Clip::read(path, flags, tolerance, true)
+        Clip::read(path, flags, (tolerance, at_least), true)
     }
 
     fn read(
         path: &Path,
         flags: &ClipFlags,
-        tolerance: f64,
+        tolerance_and_frames: (f64, u32),
         pictures: bool,
     ) -> Result<Clip, Failure> {
         let threads = use_threads(flags.threads)?;
         let scene = scene_file::load(path, &flags.animation, pictures)?;
-        Clip::of_scene(scene, flags, threads, tolerance)
+        Clip::of_scene(scene, flags, threads, tolerance_and_frames)
     }
 
     /// The clip of a scene file or of a demonstration.
@@ -94,10 +95,11 @@ impl Clip {
             return Err(Failure::usage("the demonstrations have one animation, without a name")
                 .help("leave out --animation"));
         }
+        flags.animation.edits.refuse_for_a_demo()?;
         let threads = use_threads(flags.threads)?;
         let demo = demo::demo(name);
         let scene = (demo.build)().map_err(scene_file::failure)?;
-        let clip = Clip::of_scene(scene, flags, threads, demo.tolerance)?;
+        let clip = Clip::of_scene(scene, flags, threads, (demo.tolerance, 1))?;
         Ok(Clip { shading: demo.shading, ..clip })
     }
 
@@ -105,12 +107,13 @@ impl Clip {
         scene: Scene,
         flags: &ClipFlags,
         threads: usize,
-        tolerance: f64,
+        (tolerance, at_least): (f64, u32),
     ) -> Result<Clip, Failure> {
         let tolerance = flags.tolerance.unwrap_or(tolerance);
         let scene = flags.outside.light(scene, flags.fps, tolerance)?;
-        let frames = frames::resolve(flags.frames.as_ref(), scene.motion.duration_s, flags.fps)
-            .map_err(|error| Failure::new(error).help("`relume info` lists the frames"))?;
+        let frames =
+            frames::resolve(flags.frames.as_ref(), scene.motion.duration_s, flags.fps, at_least)
+                .map_err(|error| Failure::new(error).help("`relume info` lists the frames"))?;
         Ok(Clip {
             scene: Arc::new(scene),
             frames,
@@ -124,7 +127,7 @@ impl Clip {
     /// The same clip in the light of a default sky, if nothing emits and nothing was said of the light outside: a black
     /// picture shows nothing.
     pub(crate) fn lit(self) -> Result<Clip, Failure> {
-        if !outside::is_dark(&self.scene) || !self.flags.outside.is_empty() {
+        if self.scene.emits() || !self.flags.outside.is_empty() {
             return Ok(self);
         }
         let (scene, said) = outside::lit_by_default((*self.scene).clone(), self.tolerance)?;

@@ -17,6 +17,7 @@ use crate::notes;
 use crate::output::{self, Sink, count, counted};
 use crate::progress::Progress;
 use crate::scene_file;
+use crate::size::Size;
 
 /// What the report calls itself.
 const SCHEMA: &str = "relume-factors/1";
@@ -221,6 +222,11 @@ fn frames(
     let joined = clip.scene.joined();
     let mut sums = PartFactors::new(&clip.scene, &joined, things.grouping.clone());
     let mut session = clip.session_of(joined.scene, args.update)?;
+    let size = Size::of_scene(session.scene(), clip, session.options());
+    if !args.clip.quiet {
+        size.warn(clip, clip.frames.len());
+    }
+    progress.watch(session.watch(), size.pairs());
     let mut before: Option<Factors> = None;
     let mut out: Vec<Frame> = Vec::new();
     for (done, &frame) in clip.frames.iter().enumerate() {

@@ -169,13 +169,15 @@ pub(crate) fn time_of(frame: u32, fps: f64) -> f64 {
     f64::from(frame) / fps
 }
 
-/// The frames to solve, ascending, each once; all of the animation where `spec` is `None`.
+/// The frames to solve, ascending, each once; all of the animation where `spec` is `None`, of which there are
+/// `at_least` so many.
 pub(crate) fn resolve(
     spec: Option<&FrameSpec>,
     duration_s: f64,
     fps: f64,
+    at_least: u32,
 ) -> Result<Vec<u32>, FrameRangeError> {
-    let count = frame_count(duration_s, fps)?;
+    let count = frame_count(duration_s, fps)?.max(at_least);
     let Some(spec) = spec else {
         return Ok((0..count).collect());
     };
@@ -218,7 +220,7 @@ mod tests {
     use super::*;
 
     fn frames(text: &str) -> Vec<u32> {
-        resolve(Some(&text.parse().unwrap()), 100.0, 1.0).unwrap()
+        resolve(Some(&text.parse().unwrap()), 100.0, 1.0, 1).unwrap()
     }
 
     #[test]
@@ -256,11 +258,11 @@ mod tests {
 
     #[test]
     fn whole_animation_by_default() {
-        assert_eq!(resolve(None, 0.0, 24.0).unwrap(), [0]);
-        assert_eq!(resolve(None, 108.0 / 24.0, 24.0).unwrap().len(), 109);
+        assert_eq!(resolve(None, 0.0, 24.0, 1).unwrap(), [0]);
+        assert_eq!(resolve(None, 108.0 / 24.0, 24.0, 1).unwrap().len(), 109);
         // As the file stores it: a 32-bit float a little below 19/24.
-        assert_eq!(resolve(None, f64::from(19.0_f32 / 24.0) - 1e-8, 24.0).unwrap().len(), 20);
-        assert_eq!(resolve(None, 0.99, 1.0).unwrap(), [0]);
+        assert_eq!(resolve(None, f64::from(19.0_f32 / 24.0) - 1e-8, 24.0, 1).unwrap().len(), 20);
+        assert_eq!(resolve(None, 0.99, 1.0, 1).unwrap(), [0]);
         // Of long clips 32 bits tell less.
         for k in [200_000_u32, 999_999, 1_234_567] {
             let end_s = f64::from((f64::from(k) / 120.0) as f32);
@@ -271,7 +273,7 @@ mod tests {
     #[test]
     fn frames_outside_are_refused_with_the_range_there_is() {
         let ask = |text: &str, duration_s| {
-            resolve(Some(&text.parse().unwrap()), duration_s, 24.0).unwrap_err().to_string()
+            resolve(Some(&text.parse().unwrap()), duration_s, 24.0, 1).unwrap_err().to_string()
         };
         assert_eq!(
             ask("0-30", 19.0 / 24.0),
@@ -280,8 +282,8 @@ mod tests {
         assert!(ask("5-4000000000", 1.0).starts_with("frame 4000000000 is outside"));
         assert!(ask("30-40", 1.0).starts_with("frame 30 is outside"));
         assert!(ask("1", 0.0).contains("nothing in the scene is animated"));
-        assert!(resolve(None, 1e12, 24.0).is_err());
-        assert!(resolve(None, f64::INFINITY, 24.0).is_err());
+        assert!(resolve(None, 1e12, 24.0, 1).is_err());
+        assert!(resolve(None, f64::INFINITY, 24.0, 1).is_err());
     }
 
     #[test]

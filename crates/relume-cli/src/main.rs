@@ -5,6 +5,7 @@ mod bench;
 mod check;
 mod clip;
 mod demo;
+mod edits;
 mod events;
 mod factors;
 mod failure;
@@ -13,6 +14,7 @@ mod flat;
 mod frames;
 mod info;
 mod interrupt;
+mod light;
 mod lock;
 mod memory;
 mod notes;
@@ -27,8 +29,10 @@ mod run;
 mod scene_file;
 mod sensors;
 mod sequence;
+mod size;
 mod strategies;
 mod verify;
+mod viewing;
 
 use std::process::ExitCode;
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use clap::Args;
 use relume::scene::outside::{Day, Environment, Outside, SUN_DIAMETER_DEG, Sky, Sun, SunPlace};
-use relume::scene::{Light, Scene};
+use relume::scene::Scene;
 
 use crate::failure::Failure;
 use crate::memory;
@@ -158,12 +158,6 @@ pub(crate) fn lit_by_default(scene: Scene, fineness: f64) -> Result<(Scene, Stri
         scene.name
     );
     Ok((scene.with_outside(outside).map_err(scene_file::failure)?, said))
-}
-
-/// Whether nothing in a scene ever emits.
-pub(crate) fn is_dark(scene: &Scene) -> bool {
-    let shines = |light: &Light| light.most_intensity().iter().any(|&i| i > 0.0);
-    !scene.patches.iter().any(|p| scene.patch_emits(p)) && !scene.lights.iter().any(shines)
 }
 
 /// Numbers between commas.

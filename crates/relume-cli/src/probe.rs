@@ -10,15 +10,18 @@ use crate::args::ProbeArgs;
 use crate::clip::{Clip, TOLERANCE, now, step_failure};
 use crate::failure::Failure;
 use crate::interrupt;
+use crate::light;
 use crate::output::{self, Sink, counted};
 use crate::progress::Progress;
 use crate::sensors::{self, Entry, Sensors};
+use crate::size::Size;
 
 /// Runs the command.
 pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
     let started = now();
     let sensors = sensors::read(&args.sensors)?;
     let clip = Clip::of_file(&args.scene, &args.clip, TOLERANCE)?;
+    light::required(&clip.scene)?;
     let riders = riders(&clip.scene, &args.sensors, &sensors)?;
     let hidden = inside(&clip, &riders, &args.sensors)?;
     clip.warn();
@@ -31,7 +34,12 @@ pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
     let clip = if args.interpolate { clip } else { clip.without_dark_sides() };
     let mut sink = Sink::open(args.output.as_deref())?;
     let mut session = clip.session(args.update, false)?;
+    let size = Size::of(&clip, session.options());
+    if !args.clip.quiet {
+        size.warn(&clip, clip.frames.len());
+    }
     let progress = Progress::new(clip.frames.len(), 0, args.clip.quiet);
+    progress.watch(session.watch(), size.pairs());
     let outcome = frames(&clip, &mut session, &riders, args, &progress, &mut sink);
     progress.clear();
     let done = outcome.map_err(interrupt::keeping_rows)?;

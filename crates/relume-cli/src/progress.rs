@@ -2,11 +2,14 @@
 
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use indicatif::{HumanBytes, HumanCount, HumanDuration, ProgressBar, ProgressStyle};
+use indicatif::{HumanBytes, HumanCount, HumanDuration, ProgressBar, ProgressState, ProgressStyle};
+use relume::session::Watch;
 
 use crate::clip::now;
+use crate::interrupt;
 use crate::memory;
 
 static DONE: AtomicU64 = AtomicU64::new(0);
@@ -36,6 +39,20 @@ pub(crate) struct Progress {
     started: Instant,
     /// Frames finished before this run.
     before: u64,
+    /// What is seen of a frame that is built from nothing, and how many pairs it is likely to have.
+    watched: Watched,
+}
+
+/// Shared with the bar, which looks at each of its ticks.
+type Watched = Arc<Mutex<Option<(Arc<Watch>, f64)>>>;
+
+/// What there is of a frame under way; nothing before there is any.
+fn so_far(pairs: u64, expected: f64, bytes: u64) -> String {
+    if pairs == 0 {
+        return String::new();
+    }
+    let percent = (100.0 * pairs as f64 / expected.max(1.0)).min(99.0);
+    format!(", {} pairs so far (about {percent:.0} %), {}", HumanCount(pairs), HumanBytes(bytes))
 }
 
 impl Progress {
@@ -43,20 +60,36 @@ impl Progress {
     pub(crate) fn new(frames: usize, done: usize, quiet: bool) -> Progress {
         DONE.store(done as u64, Ordering::SeqCst);
         WANTED.store(frames as u64, Ordering::SeqCst);
-        let (started, before) = (now(), done as u64);
+        let (started, before, watched) = (now(), done as u64, Watched::default());
         if quiet || !std::io::stderr().is_terminal() {
-            return Progress { bar: ProgressBar::hidden(), started, before };
+            return Progress { bar: ProgressBar::hidden(), started, before, watched };
         }
-        let style = "{bar:24} {pos}/{len} {msg}, {elapsed} gone{prefix}";
+        let style = "{bar:24} {pos}/{len} {msg}{sofar}, {elapsed} gone{prefix}";
+        let seen = Arc::clone(&watched);
+        let sofar = move |_: &ProgressState, out: &mut dyn std::fmt::Write| {
+            if let Some((watch, expected)) = &*interrupt::locked(&seen) {
+                // A line that cannot be shown is no reason to stop.
+                let _ = out.write_str(&so_far(watch.pairs(), *expected, watch.bytes()));
+            }
+        };
         let bar = ProgressBar::new(frames as u64)
-            .with_style(ProgressStyle::with_template(style).unwrap_or_else(|_| {
-                // The template is a constant; a bar of another look is no reason to fail.
-                ProgressStyle::default_bar()
-            }))
+            .with_style(
+                ProgressStyle::with_template(style)
+                    .unwrap_or_else(|_| {
+                        // The template is a constant; a bar of another look is no reason to fail.
+                        ProgressStyle::default_bar()
+                    })
+                    .with_key("sofar", sofar),
+            )
             .with_position(done as u64)
             .with_message("starting");
         bar.enable_steady_tick(Duration::from_millis(200));
-        Progress { bar, started, before }
+        Progress { bar, started, before, watched }
+    }
+
+    /// Shows what is seen of the next frame, which is built from nothing, and is likely to have so many pairs.
+    pub(crate) fn watch(&self, watch: Arc<Watch>, expected: f64) {
+        *interrupt::locked(&self.watched) = Some((watch, expected));
     }
 
     /// A frame is being computed.
@@ -75,6 +108,7 @@ impl Progress {
     /// A frame is finished.
     pub(crate) fn finish_frame(&self) {
         let done = DONE.fetch_add(1, Ordering::SeqCst) + 1;
+        *interrupt::locked(&self.watched) = None;
         self.bar.inc(1);
         let left = WANTED.load(Ordering::SeqCst).saturating_sub(done);
         self.bar.set_prefix(time_left(done - self.before, left, self.started.elapsed()));
@@ -94,6 +128,13 @@ impl Progress {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_there_is_of_a_frame_is_said() {
+        assert_eq!(so_far(0, 1e6, 0), "");
+        assert_eq!(so_far(250_000, 1e6, 3 << 20), ", 250,000 pairs so far (about 25 %), 3.00 MiB");
+        assert_eq!(so_far(5, 0.0, 1), ", 5 pairs so far (about 99 %), 1 B");
+    }
 
     #[test]
     fn nothing_is_said_of_the_time_left_before_a_frame_is_finished() {

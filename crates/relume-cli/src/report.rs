@@ -74,6 +74,9 @@ pub(crate) struct RunOptions {
     pub(crate) fps: f64,
     /// Animation chosen by name.
     pub(crate) animation: Option<String>,
+    /// What of the scene was changed, as on the command line.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) edits: Vec<String>,
     /// Relative error of irradiance aimed at.
     pub(crate) tolerance: f64,
     /// The oracle, as on the command line.
@@ -100,6 +103,9 @@ pub(crate) struct PictureOptions {
     pub(crate) shading: Shading,
     /// Camera chosen by name.
     pub(crate) camera: Option<String>,
+    /// What else was said of the view, as on the command line.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) view: Vec<String>,
     /// Exposure asked for: `auto` or stops.
     pub(crate) exposure: String,
     /// Exposure used, stops: display value = radiance (W/m2/sr) x 2^EV. `None` until it is known.
@@ -247,6 +253,7 @@ mod tests {
             frames: "0-4".into(),
             fps: 24.0,
             animation: None,
+            edits: Vec::new(),
             tolerance: 0.02,
             oracle: "error".into(),
             update: "scratch".into(),

@@ -212,6 +212,7 @@ mod tests {
             frames: "all".into(),
             fps: 24.0,
             animation: None,
+            edits: Vec::new(),
             tolerance: 0.02,
             oracle: "error".into(),
             update: "scratch".into(),
@@ -222,6 +223,7 @@ mod tests {
                 size: "640x480".into(),
                 shading: Shading::Flat,
                 camera: None,
+                view: Vec::new(),
                 exposure: "auto".into(),
                 exposure_ev: Some(1.25),
                 mesh: false,
@@ -269,6 +271,8 @@ mod tests {
         assert!(text.contains("size was 640x480 and is 320x240 now"), "{text}");
         let text = refusal(|r| r.options.picture.as_mut().unwrap().camera = Some("top".into()));
         assert!(text.contains("camera was nothing and is top now"), "{text}");
+        let text = refusal(|r| r.options.edits = vec!["--hide roof".into()]);
+        assert!(text.contains(r#"edits was nothing and is ["--hide roof"] now"#), "{text}");
         let text = refusal(|r| r.options.picture = None);
         assert!(text.contains("shading was flat and is nothing now"), "{text}");
         let text = refusal(|r| r.version = "9.9.9".into());

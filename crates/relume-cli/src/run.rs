@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use relume::scene::{BodyId, Light, MaterialId, Scene};
 use relume::session::{Energy, Options, Session, SessionError, Snapshot};
 use relume_picture::export::{probe, write_atomically, write_glb};
-use relume_picture::picture::{self, Exposure, Viewpoint};
+use relume_picture::picture::{self, Exposure};
 
 use crate::args::{
     DemoArgs, ExposureFlag, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags, UpdateFlag,
@@ -24,6 +24,7 @@ use crate::events::EventTable;
 use crate::failure::Failure;
 use crate::frames;
 use crate::interrupt;
+use crate::light;
 use crate::lock::Lock;
 use crate::memory;
 use crate::output::{self, count, counted};
@@ -31,6 +32,8 @@ use crate::progress::Progress;
 use crate::report::{PictureOptions, Report, RunOptions, SceneSummary};
 use crate::resume;
 use crate::scene_file;
+use crate::size::Size;
+use crate::viewing::Viewing;
 
 /// The report is written again after a frame if the last time was this long ago. A run that is
 /// killed outright computes the frames of this time again when it is resumed.
@@ -103,16 +106,23 @@ impl Job {
                 "give the directory of the earlier run with -o, or its report with --report",
             ));
         }
-        let read = if self.picture.is_some() { Clip::for_pictures } else { Clip::of_file };
-        let clip = read(&self.scene, &self.solve.clip, self.tolerance)?;
-        let clip = if self.picture.is_some() { clip.lit()? } else { clip };
+        let clip = match &self.picture {
+            Some((_, flags)) => {
+                let at_least = flags.view.frames_at_least();
+                let read =
+                    Clip::for_pictures(&self.scene, &self.solve.clip, self.tolerance, at_least)?;
+                light::for_pictures(read)?
+            }
+            None => {
+                let read = Clip::of_file(&self.scene, &self.solve.clip, self.tolerance)?;
+                light::required(&read.scene).map(|()| read)?
+            }
+        };
         clip.warn();
         clip.warn_of(self.solve.update);
         let clip = clip.without_dark_sides();
-        let camera = self.picture.as_ref().map(|(_, flags)| {
-            Viewpoint::new(&clip.scene, flags.camera.as_deref()).map_err(Failure::new)
-        });
-        let camera = camera.transpose()?;
+        let views = self.picture.as_ref().map(|(_, flags)| Viewing::new(&clip.scene, &flags.view));
+        let views = views.transpose()?;
         if let Some((_, flags)) = &self.picture {
             // Not only after the first frame.
             ask_for_picture(flags)?;
@@ -132,7 +142,12 @@ impl Job {
         let events = self.solve.events.as_ref().map(|_| EventTable::new());
         let options = clip.options(self.solve.update, true)?;
         let session = clip.session_with(Options { events: events.is_some(), ..options })?;
+        let size = Size::of(&clip, session.options());
+        if !self.quiet() {
+            size.warn(&clip, pending.len());
+        }
         let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.quiet());
+        progress.watch(session.watch(), size.pairs());
         let paths = (self.report_paths(), self.solve.events.clone());
         let finished = Arc::new(Mutex::new(Finished { report, events, paths }));
         let keep = Arc::clone(&finished);
@@ -140,7 +155,7 @@ impl Job {
         let mut run = Run {
             job: &self,
             session,
-            camera,
+            views,
             finished,
             progress,
             links: 0,
@@ -194,7 +209,8 @@ impl Job {
         let picture = self.picture.as_ref().map(|(shading, flags)| PictureOptions {
             size: flags.size.to_string(),
             shading: *shading,
-            camera: flags.camera.clone(),
+            camera: flags.view.camera.clone(),
+            view: flags.view.described(),
             exposure: flags.exposure.to_string(),
             exposure_ev: match flags.exposure {
                 ExposureFlag::Auto => None,
@@ -208,6 +224,7 @@ impl Job {
             frames: flags.frames.as_ref().map_or("all".into(), ToString::to_string),
             fps: flags.fps,
             animation: flags.animation.name.clone(),
+            edits: flags.animation.edits.described(),
             tolerance: clip.tolerance,
             oracle: flags.oracle.to_string(),
             update: self.solve.update.name(),
@@ -364,7 +381,7 @@ enum Outcome {
 struct Run<'a> {
     job: &'a Job,
     session: Session,
-    camera: Option<Viewpoint>,
+    views: Option<Viewing>,
     /// Locked for as long as an entry takes, since whatever ends the run writes it.
     finished: Arc<Mutex<Finished>>,
     progress: Progress,
@@ -454,10 +471,9 @@ impl Run<'_> {
         frame: u32,
     ) -> Result<Option<(picture::View, PictureOptions, &PictureFlags)>, Failure> {
         let options = self.finished().report.options.picture.clone();
-        let parts = (&self.camera, options, &self.job.picture);
-        let (Some(camera), Some(options), Some((_, flags))) = parts else { return Ok(None) };
-        let time_s = frames::time_of(frame, self.job.solve.clip.fps);
-        let view = camera.at(self.session.scene(), time_s).map_err(Failure::new)?;
+        let parts = (&self.views, options, &self.job.picture);
+        let (Some(views), Some(options), Some((_, flags))) = parts else { return Ok(None) };
+        let view = views.at(self.session.scene(), frame, self.job.solve.clip.fps)?;
         Ok(Some((view, options, flags)))
     }
 
@@ -496,9 +512,12 @@ impl Run<'_> {
 
     fn choose_exposure(&mut self, frame: u32, snapshot: &Snapshot) -> Result<(), Failure> {
         let Some((view, ..)) = self.view(frame)? else { return Ok(()) };
-        let exposure = Exposure::automatic(snapshot, &view);
+        let metered = Exposure::metered(snapshot, &view);
+        if metered.lit < LIT_MIN && !self.job.quiet() {
+            self.progress.suspend(|| output::complain(ALMOST_DARK));
+        }
         if let (Exposure::Fixed(scale), Some(options)) =
-            (exposure, &mut self.finished().report.options.picture)
+            (metered.exposure, &mut self.finished().report.options.picture)
         {
             options.exposure_ev = Some(stops(scale));
         }
@@ -511,6 +530,11 @@ impl Run<'_> {
         clip::step_failure(error, kept)
     }
 }
+
+/// Share of a picture that shows light, below which that is said.
+const LIT_MIN: f64 = 0.01;
+const ALMOST_DARK: &str = "warning: the view sees almost no light: look from elsewhere (--overview, --camera NAME, --eye \
+                           X,Y,Z), or light what it sees (--emit MATERIAL=RADIANCE)";
 
 /// Bytes a pixel while a picture is drawn: in tiles and whole.
 const PIXEL_BYTES: u64 = 6;

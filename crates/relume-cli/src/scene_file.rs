@@ -17,10 +17,12 @@ pub(crate) fn load(
     animation: &AnimationFlag,
     pictures: bool,
 ) -> Result<Scene, Failure> {
-    let AnimationFlag { name, allow_outside } = animation.clone();
+    let AnimationFlag { name, allow_outside, edits } = animation.clone();
     memory::at(format_args!("reading {}", path.display()));
     let max_memory_bytes = memory::limit_bytes();
-    let options = ImportOptions { animation: name, allow_outside, pictures, max_memory_bytes };
+    let edits = edits.edits();
+    let options =
+        ImportOptions { animation: name, allow_outside, pictures, max_memory_bytes, edits };
     let scene = import(path, &options).map_err(failure)?;
     memory::at(format_args!("preparing {}", path.display()));
     Ok(scene)
@@ -45,6 +47,7 @@ pub(crate) fn failure(error: SceneError) -> Failure {
         | SceneError::Material { remedy, .. }
         | SceneError::Hierarchy { remedy, .. }
         | SceneError::Animation { remedy, .. }
+        | SceneError::Edit { remedy, .. }
         | SceneError::Empty { remedy, .. } => remedy,
     };
     match text.strip_suffix(remedy.as_str()) {

@@ -5,7 +5,9 @@ mod common;
 use common::*;
 use glam::{DQuat, DVec2, DVec3};
 use relume::scene::Projection;
-use relume_picture::picture::{Exposure, Image, Settings, Shading, Tone, View, Viewpoint, render};
+use relume_picture::picture::{
+    Exposure, Image, Metered, Settings, Shading, Tone, View, Viewpoint, render,
+};
 
 const GREY: [f32; 3] = [0.5; 3];
 
@@ -218,6 +220,39 @@ fn exposure_puts_surfaces_in_the_middle_and_lets_lamps_clip() {
         assert!(clipped > 0 && clipped * 20 < image.pixels.len(), "{clipped}");
         assert_eq!(dark, 0);
     }
+}
+
+#[test]
+fn exposure_stops_at_what_the_solution_tells() {
+    let scene = room(&[]);
+    let view = View::look_at(v(2.0, 1.5, 4.9), v(2.0, 0.0, 0.0), 0.8);
+    let metered = |radiosity: f32| {
+        let dim = snapshot(&scene, uneven, |_, _, _| [radiosity; 3]);
+        let dim = relume::session::Snapshot { error_w_m2: 0.01, ..dim };
+        Exposure::metered(&dim, &view)
+    };
+    let scale = |m: Metered| match m.exposure {
+        Exposure::Fixed(scale) => scale / std::f64::consts::PI,
+        Exposure::Automatic => panic!("it is fixed"),
+    };
+    // Per radiosity: middle grey, and then no brighter than a tenth for what it may be off by.
+    assert!((scale(metered(1.0)) - 0.2).abs() < 1e-3 && metered(1.0).lit == 1.0);
+    assert!((scale(metered(0.015)) - 10.0).abs() < 1e-6 && metered(0.015).lit == 1.0);
+    for noise in [0.005, 1e-10, 0.0] {
+        assert!(
+            (scale(metered(noise)) - 10.0).abs() < 1e-6 && metered(noise).lit == 0.0,
+            "{noise}"
+        );
+    }
+}
+
+#[test]
+fn a_view_is_carried_about_an_axis() {
+    let view = View::look_at_with_up(v(3.0, 0.0, 0.0), v(1.0, 0.0, 0.0), DVec3::Z, 1.0);
+    let turned = view.turned(v(1.0, 0.0, 0.0), DVec3::Z, 0.25);
+    assert!((turned.world_from_camera.translation - v(1.0, 2.0, 0.0)).length() < 1e-12);
+    let upright = turned.project(v(1.0, 0.0, 0.5), 100, 100).unwrap();
+    assert!((upright.x - 50.0).abs() < 1e-9 && upright.y < 49.0, "{upright}");
 }
 
 #[test]

@@ -83,7 +83,7 @@ pub(crate) fn flat(args: &FlatArgs) -> Result<(), Failure> {
             100.0 * BRIGHT
         ));
     }
-    let frames = resolve(args.frames.as_ref(), scene.duration_s(), args.fps)
+    let frames = resolve(args.frames.as_ref(), scene.duration_s(), args.fps, 1)
         .map_err(|error| Failure::new(error).help("choose other --frames"))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let run = Run { scene: Arc::new(scene), name, args, frames };

@@ -2,11 +2,11 @@
 //!
 //! Must not know pixels, leaves or light.
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use relume::geometry::Pose;
 use relume::scene::{Projection, Scene};
 
-use super::auto_view;
+use super::overview::Overview;
 use super::project::Projector;
 
 /// A camera at one instant: a placement and a projection.
@@ -96,32 +96,38 @@ impl Viewpoint {
 }
 
 impl View {
-    /// A sensible view of a scene, fixed over its whole animation; deterministic.
-    ///
-    /// A closed room is seen from inside, a room that is open on a side through the opening,
-    /// objects in open space from outside with the whole animation's bounds in the picture.
-    /// Among the candidates of each kind the one is taken that shows most of the scene's surface
-    /// and fewest backs of faces, judged at three instants of the animation.
-    ///
-    /// Cost: some 100 tiny rasterisations of all patches.
+    /// The view of [`Overview::of`].
     pub fn automatic(scene: &Scene) -> View {
-        match scene.outside {
-            Some(_) => auto_view::choose(&scene.without_outside()),
-            None => auto_view::choose(scene),
-        }
+        Overview::of(scene).view
     }
 
     /// A perspective view from `eye` towards `target` with +Y up (or, looking along Y, -Z up).
     ///
     /// Metres; `yfov` in radians.
     pub fn look_at(eye: DVec3, target: DVec3, yfov: f64) -> View {
+        View::look_at_with_up(eye, target, DVec3::Y, yfov)
+    }
+
+    /// The same with another direction upright in the picture.
+    pub fn look_at_with_up(eye: DVec3, target: DVec3, up: DVec3, yfov: f64) -> View {
         let back = (eye - target).try_normalize().unwrap_or(DVec3::Z);
-        let right = DVec3::Y.cross(back).try_normalize().unwrap_or(DVec3::X);
+        let across = up.normalize_or_zero().cross(back);
+        let right = across.try_normalize().unwrap_or(DVec3::X);
         let rotation = DMat3::from_cols(right, back.cross(right), back);
         View {
             world_from_camera: Pose { rotation, translation: eye },
             projection: Projection::Perspective { yfov, aspect: None },
         }
+    }
+
+    /// The view carried about an axis through a point (world, metres; the axis of unit length), by a share of a
+    /// whole turn, counter-clockwise seen from the axis's end.
+    #[must_use]
+    pub fn turned(&self, about: DVec3, axis: DVec3, turns: f64) -> View {
+        let (sin, cos) = libm::sincos(turns * std::f64::consts::PI);
+        let rotation = DMat3::from_quat(DQuat::from_vec4((axis * sin).extend(cos)));
+        let turn = Pose { rotation, translation: about - rotation * about };
+        View { world_from_camera: turn * self.world_from_camera, ..*self }
     }
 
     /// Width : height that the camera asks for, if it does.

@@ -30,28 +30,58 @@ const MIDDLE: f64 = 0.2;
 /// Display value that all but the brightest 2 % stay below.
 const BRIGHT: f64 = 0.9;
 
+/// Display value that what the solution does not tell stays below.
+const UNTOLD: f64 = 0.1;
+
+/// An exposure, and how much there is to see with it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Metered {
+    /// [`Exposure::Fixed`].
+    pub exposure: Exposure,
+    /// Share of the picture that shows more light than the solution may be off by, lamps included.
+    pub lit: f64,
+}
+
 impl Exposure {
     /// The exposure that suits what is seen of a snapshot: [`Exposure::Fixed`] for the whole clip.
     ///
     /// The log-average luminance of the visible surfaces that do not emit becomes a middle grey
     /// (0.2), or less where more than 2 % of them would exceed 0.9. Lamps do not count, unless
-    /// nothing else is lit; then the brightest becomes 0.9. Deterministic.
+    /// nothing else is lit; then the brightest becomes 0.9. Never so bright that
+    /// [`Snapshot::error_w_m2`] shows as more than 0.1: a dark view stays dark. Deterministic.
     pub fn automatic(snapshot: &Snapshot, view: &View) -> Exposure {
+        Exposure::metered(snapshot, view).exposure
+    }
+
+    /// The same, with how much is lit.
+    pub fn metered(snapshot: &Snapshot, view: &View) -> Metered {
+        let untold = snapshot.error_w_m2 / PI;
         let mut lit = Vec::new();
-        let mut lamp_max = 0.0_f64;
-        for (luminance, emits) in visible_radiances(snapshot, view) {
-            if emits {
-                lamp_max = lamp_max.max(luminance);
-            } else if luminance > 0.0 {
-                lit.push(luminance);
+        let (mut lamps, mut lamp_max, mut pixels) = (0, 0.0_f64, 0);
+        for seen in visible_radiances(snapshot, view) {
+            pixels += 1;
+            match seen {
+                Some((luminance, true)) => {
+                    lamps += 1;
+                    lamp_max = lamp_max.max(luminance);
+                }
+                Some((luminance, false)) if luminance > untold => lit.push(luminance),
+                _ => {}
             }
         }
         lit.sort_by(f64::total_cmp);
-        let Some(&bright) = lit.get((lit.len() * 98 / 100).min(lit.len().saturating_sub(1))) else {
-            return Exposure::Fixed(if lamp_max > 0.0 { BRIGHT / lamp_max } else { 1.0 });
+        let most = if untold > 0.0 { UNTOLD / untold } else { f64::INFINITY };
+        let scale = match lit.get((lit.len() * 98 / 100).min(lit.len().saturating_sub(1))) {
+            Some(&bright) => {
+                let log_mean = lit.iter().map(|&l| libm::log(l)).sum::<f64>() / lit.len() as f64;
+                (MIDDLE / libm::exp(log_mean)).min(BRIGHT / bright).min(most)
+            }
+            None if lamp_max > 0.0 => BRIGHT / lamp_max,
+            None if most.is_finite() => most,
+            None => 1.0,
         };
-        let log_mean = lit.iter().map(|&l| libm::log(l)).sum::<f64>() / lit.len() as f64;
-        Exposure::Fixed((MIDDLE / libm::exp(log_mean)).min(BRIGHT / bright))
+        let lit = (lit.len() + lamps) as f64 / f64::from(pixels.max(1));
+        Metered { exposure: Exposure::Fixed(scale), lit }
     }
 
     /// Display value per W/m2/sr for this picture.
@@ -66,8 +96,9 @@ impl Exposure {
     }
 }
 
-/// Luminance of the radiance (W/m2/sr) at the pixels of a small picture, and whether it is a lamp.
-fn visible_radiances(snapshot: &Snapshot, view: &View) -> Vec<(f64, bool)> {
+/// Luminance of the radiance (W/m2/sr) at the pixels of a small picture, and whether it is a lamp;
+/// `None` where nothing is seen.
+fn visible_radiances(snapshot: &Snapshot, view: &View) -> Vec<Option<(f64, bool)>> {
     let aspect = view.aspect().filter(|a| a.is_normal()).unwrap_or(4.0 / 3.0).clamp(0.25, 4.0);
     let (width, height) = ((120.0 * aspect) as u32, 120);
     let grid = Grid::new(width, height, 1);
@@ -78,11 +109,10 @@ fn visible_radiances(snapshot: &Snapshot, view: &View) -> Vec<(f64, bool)> {
         let now = scene.exitance_at(&scene.patches[patch.0 as usize], snapshot.time_s);
         now.iter().any(|&m| m > 0.0)
     };
-    let pixels = rasterise(&grid, &drawing.primitives, |fragments| {
+    rasterise(&grid, &drawing.primitives, |fragments| {
         fragments[0].primitive.map(|p| {
             let radiance = luminance(drawing.radiosity(p, fragments[0].position)) / PI;
             (radiance, emits(drawing.patches[p]))
         })
-    });
-    pixels.into_iter().flatten().collect()
+    })
 }

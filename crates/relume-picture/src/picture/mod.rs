@@ -8,7 +8,7 @@
 //! | file | one sentence |
 //! |---|---|
 //! | `camera` | where the picture is taken from: [`Viewpoint`], [`View`] |
-//! | `auto_view` | a sensible [`View`] for a scene without a camera |
+//! | `overview` | a view that finds the light, for a scene without a camera: [`Overview`] |
 //! | `project` | world to pixels, near clipping, and pixels back to a patch's plane |
 //! | `outline` | edges of polygons, for line drawings: [`Outlines`] |
 //! | `gouraud` | sample points of a patch, triangulated in the patch's own frame |
@@ -19,12 +19,12 @@
 //! | `image` | pixels and PNG files |
 
 mod assemble;
-mod auto_view;
 mod camera;
 mod exposure;
 mod gouraud;
 mod image;
 mod outline;
+mod overview;
 mod printed;
 mod project;
 mod raster;
@@ -32,8 +32,9 @@ mod render;
 mod tone;
 
 pub use camera::{View, ViewError, Viewpoint};
-pub use exposure::Exposure;
+pub use exposure::{Exposure, Metered};
 pub use image::{Image, WriteError, is_whole_png};
 pub use outline::Outlines;
+pub use overview::Overview;
 pub use render::{Settings, Shading, render};
 pub use tone::Tone;

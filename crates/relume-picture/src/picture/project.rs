@@ -42,16 +42,6 @@ impl Projector {
         self.world_from_camera.translation
     }
 
-    /// The unit direction in which the camera looks.
-    pub(crate) fn forward(&self) -> DVec3 {
-        -self.world_from_camera.rotation.z_axis
-    }
-
-    /// Pixels per unit of slope (perspective) or per metre (orthographic).
-    pub(crate) fn scale(&self) -> f64 {
-        self.scale
-    }
-
     /// (X, Y, W, D) of a world point.
     pub(crate) fn project(&self, world: DVec3) -> DVec4 {
         self.place(self.world_from_camera.inverse_point(world), 1.0)
@@ -72,7 +62,7 @@ impl Projector {
     /// The unit direction from which a pixel position sees what is far away.
     pub(crate) fn direction(&self, pixel: DVec2) -> DVec3 {
         if !self.perspective {
-            return self.forward();
+            return -self.world_from_camera.rotation.z_axis;
         }
         let slope = (pixel - self.centre) / self.scale;
         let camera = DVec3::new(slope.x, -slope.y, -1.0).normalize();

@@ -223,7 +223,8 @@ pub(crate) fn snapshot(
         }
         leaf_offsets.push(leaves.len() as u32);
     }
-    Snapshot { scene: Arc::new(scene.clone()), time_s: 0.0, poses, leaves, leaf_offsets }
+    let scene = Arc::new(scene.clone());
+    Snapshot { scene, time_s: 0.0, error_w_m2: 0.0, poses, leaves, leaf_offsets }
 }
 
 /// Splits unevenly, so that there are T-vertices everywhere.

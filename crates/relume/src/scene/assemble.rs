@@ -10,6 +10,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec2, DVec3};
 
 use super::draft::{Draft, DraftNode, DraftSurface};
+use super::edit;
 use super::flatten::{Flaw, flatten, seen_from_behind};
 use super::limits::{COORDINATE_MAX_M, EMISSION_MAX, EXTENT_MIN_M, SPECK, is_place};
 use super::names::Names;
@@ -22,12 +23,14 @@ use crate::geometry::Pose;
 
 /// Checks the draft and makes the scene of it.
 pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
+    let mut notes = std::mem::take(&mut draft.notes);
+    unique_names(&mut draft, &mut notes);
+    let edits = std::mem::take(&mut draft.edits);
+    edit::apply(&mut draft, &edits)?;
     check_materials(&draft.materials)?;
     check_glows(&draft)?;
     check_lights(&draft)?;
     start_glows(&mut draft);
-    let mut notes = std::mem::take(&mut draft.notes);
-    unique_names(&mut draft, &mut notes);
     let Rigid { nodes, residuals, held } = without_scales(&draft)?;
     let duration_s = duration_s(&draft);
     let motion = Motion { duration_s, nodes, animation: draft.animation.clone() };

@@ -72,8 +72,8 @@ impl Scene {
         scene
     }
 
-    /// Whether anything emits at any time.
-    fn emits(&self) -> bool {
+    /// Whether any surface or light emits at any time.
+    pub fn emits(&self) -> bool {
         (0..self.patches.len() as u32).any(|p| self.glows(PatchId(p)))
             || self.lights.iter().any(|l| l.most_intensity().iter().any(|&i| i > 0.0))
     }

@@ -7,7 +7,9 @@ use std::sync::Arc;
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::{Camera, Light, Material, MaterialId, Note, Print, RotationTrack, Tint, TintId, Track};
+use super::{
+    Camera, Edits, Light, Material, MaterialId, Note, Print, RotationTrack, Tint, TintId, Track,
+};
 
 /// Everything of a scene, unchecked.
 #[derive(Default)]
@@ -23,6 +25,8 @@ pub(super) struct Draft {
     /// No animation ends earlier than this, seconds, even if nothing moves any more.
     pub(super) end_s: f64,
     pub(super) notes: Vec<Note>,
+    /// What is to be changed before anything is checked.
+    pub(super) edits: Edits,
 }
 
 /// A node with its scale and what hangs on it.

@@ -126,6 +126,14 @@ pub enum SceneError {
         /// What to do.
         remedy: String,
     },
+    /// A change that was asked for concerns nothing that the scene has.
+    #[error("{what}; {remedy}")]
+    Edit {
+        /// What is not there, and what is.
+        what: String,
+        /// What to do.
+        remedy: String,
+    },
     /// There is no polygon to light.
     #[error("scene `{scene}` has no polygon to light: {what}; {remedy}")]
     Empty {

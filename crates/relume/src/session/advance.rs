@@ -234,7 +234,11 @@ impl Session {
         level: Level,
         record_and_fresh: (Record, &[PairId]),
     ) -> Result<Changes, OutOfMemory> {
-        let may_go_on = budget::within(self.options.max_memory_bytes);
+        let within = budget::within(self.options.max_memory_bytes);
+        let may_go_on = |tree: &PairTree, elements: usize, scratch: u64| {
+            self.watch.see(tree.len() as u64, budget::bytes_of(tree, elements, scratch));
+            within(tree, elements, scratch)
+        };
         let stage = match level {
             Level::Coarse => Stage::Coarse,
             Level::Fine => Stage::Fine(&solved.coarse.brightness),

@@ -14,8 +14,11 @@ const ELEMENT_BYTES: u64 = 122;
 /// and radiosities that may be still to come.
 pub(crate) fn within(max_memory_bytes: Option<u64>) -> impl Fn(&PairTree, usize, u64) -> bool {
     let limit = max_memory_bytes.unwrap_or(u64::MAX);
-    move |tree, elements, scratch| {
-        let pairs = tree.used_bytes() + tree.len() as u64 * PAIR_LINKS_BYTES;
-        pairs + elements as u64 * ELEMENT_BYTES + scratch <= limit
-    }
+    move |tree, elements, scratch| bytes_of(tree, elements, scratch) <= limit
+}
+
+/// Bytes of a tree, elements and scratch, with what is still to come of them.
+pub(crate) fn bytes_of(tree: &PairTree, elements: usize, scratch: u64) -> u64 {
+    let pairs = tree.used_bytes() + tree.len() as u64 * PAIR_LINKS_BYTES;
+    pairs + elements as u64 * ELEMENT_BYTES + scratch
 }

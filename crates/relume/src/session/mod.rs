@@ -17,6 +17,7 @@ pub(crate) mod budget;
 mod coarse;
 mod compact;
 mod compare;
+mod estimate;
 mod events;
 mod factors;
 mod gather;
@@ -30,8 +31,10 @@ mod snapshot;
 mod solution;
 mod surfaces;
 mod tally;
+mod watch;
 
 pub use compare::{Difference, RadiosityGap, Which, compare, radiosity_gap};
+pub use estimate::Estimate;
 pub use events::{Event, EventKind};
 pub use factors::{Closure, Factors, Grouping, Open, PartFactors};
 pub use gather::Sensor;
@@ -41,6 +44,7 @@ pub use options::{Options, Oracle, Update};
 pub use report::{Energy, FrameReport, PairCounts, RowSumError, Seconds};
 pub use snapshot::{Leaf, Snapshot};
 pub use solution::Solution;
+pub use watch::Watch;
 
 // Flatland's session shares these.
 pub(crate) use ahead::{Ahead, most_mean, while_extrapolated};
@@ -116,6 +120,8 @@ pub struct Session {
     /// Coarse elements of the seed by number; none for oracles that ask for no brightness.
     coarse_ids: Vec<u32>,
     solved: Option<Solved>,
+    /// What others may see of a step under way.
+    watch: Arc<Watch>,
     /// Time that `moved` compares with, where it is not that of the last step.
     came_from: Option<f64>,
 }
@@ -171,12 +177,18 @@ impl Session {
             Oracle::FormFactor { .. } => Vec::new(),
         };
         let simd = Simd::detect();
-        Ok(Session { scene, options, simd, seed, coarse_ids, solved: None, came_from: None })
+        let (watch, solved, came_from) = (Arc::default(), None, None);
+        Ok(Session { scene, options, simd, seed, coarse_ids, solved, watch, came_from })
     }
 
     /// The scene being solved.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
+    }
+
+    /// What can be seen of a step while it is under way, from any thread.
+    pub fn watch(&self) -> Arc<Watch> {
+        Arc::clone(&self.watch)
     }
 
     /// The options it is solved with.

@@ -12,6 +12,7 @@ use crate::scene::{PatchId, Scene};
 use crate::solver::{Links, Radiosity, Surfaces};
 
 use super::bends::Bends;
+use super::coarse::DARK_FLOOR;
 use super::surfaces::LitForest;
 use super::{Session, Solved};
 
@@ -22,6 +23,9 @@ pub struct Snapshot {
     pub scene: Arc<Scene>,
     /// Time in the animation, seconds.
     pub time_s: f64,
+    /// What radiosities may be off by where little light arrives, W/m2: errors there are kept to the tolerance of a
+    /// tenth of the mean irradiance, not of their own. What is darker than this the solution does not tell.
+    pub error_w_m2: f64,
     /// World pose of each body, `None` while absent; indexed by `BodyId`.
     pub poses: Vec<Option<Pose>>,
     /// Leaf elements of all patches, grouped by patch; none of those that are distant.
@@ -149,11 +153,26 @@ pub(super) fn take(
         end
     }));
     let leaves = by_patch.concat();
+    let error = session.options.tolerance * DARK_FLOOR;
     Snapshot {
         scene: Arc::clone(scene),
         time_s: solved.time_s,
+        error_w_m2: error * mean_irradiance_w_m2(&leaves),
         poses: solved.view.poses().to_vec(),
         leaves,
         leaf_offsets,
     }
+}
+
+/// Mean over the area and the channels.
+fn mean_irradiance_w_m2(leaves: &[Leaf]) -> f64 {
+    let area_m2 = |leaf: &Leaf| {
+        let [a, b, c, d] = leaf.corners;
+        (c - a).perp_dot(d - b) / 2.0
+    };
+    let arriving = |leaf: &Leaf| {
+        area_m2(leaf) * leaf.irradiance.iter().map(|&h| f64::from(h)).sum::<f64>() / 3.0
+    };
+    let whole_m2: f64 = leaves.iter().map(area_m2).sum();
+    if whole_m2 > 0.0 { leaves.iter().map(arriving).sum::<f64>() / whole_m2 } else { 0.0 }
 }

@@ -5,6 +5,7 @@
 #![allow(clippy::disallowed_methods)]
 
 mod broken;
+mod edits;
 mod files;
 mod gltf;
 mod meshes;

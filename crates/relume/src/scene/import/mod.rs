@@ -33,7 +33,7 @@ use document::Document;
 
 use super::assemble::assemble;
 use super::mesh_file::Format;
-use super::{Note, Scene, SceneError, Severity, mesh_file, view3d};
+use super::{Edits, Note, Scene, SceneError, Severity, mesh_file, view3d};
 
 /// What to read of a file.
 #[derive(Clone, Debug, Default)]
@@ -48,6 +48,8 @@ pub struct ImportOptions {
     /// Bytes that a file, an image or a list of numbers may need, each by itself: what needs more is refused
     /// before memory is asked for. `None` for no limit.
     pub max_memory_bytes: Option<u64>,
+    /// What of the scene is changed before it is built.
+    pub edits: Edits,
 }
 
 /// Reads a scene from a .glb or .gltf file (glTF 2.0; external, embedded and compressed buffers), a .vs3 file
@@ -73,7 +75,7 @@ pub struct ImportOptions {
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError> {
     if view3d::is_view3d(path) {
         return match &options.animation {
-            None => view3d::import(path, options.max_memory_bytes),
+            None => view3d::import(path, options),
             Some(name) => Err(no_animation(name, "View3D")),
         };
     }
@@ -87,6 +89,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError>
     let mut draft = tree::draft(&document, options)?;
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned());
     draft.name = stem.unwrap_or_else(|| document.file.clone());
+    draft.edits = options.edits.clone();
     assemble(draft)
 }
 

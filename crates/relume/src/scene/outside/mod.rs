@@ -185,6 +185,12 @@ impl OutsideNow {
         [sky, sun]
     }
 
+    /// Irradiance of the sun at normal incidence, W/m2, and the unit vector towards it, while it is up.
+    pub fn sun_beam(&self) -> Option<(DVec3, [f64; 3])> {
+        let (towards, cosine, radiance) = self.sun.filter(|sun| sun.0.y > 0.0)?;
+        Some((towards, radiance.map(|l| PI * (1.0 - cosine * cosine) * l)))
+    }
+
     /// Radiance from a direction (a unit vector), W/m2/sr, linear RGB: what a camera sees there.
     pub fn radiance(&self, direction: DVec3) -> [f64; 3] {
         if let Some((towards, cosine, radiance)) = self.sun

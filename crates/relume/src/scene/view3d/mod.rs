@@ -12,7 +12,9 @@ use super::assemble::assemble;
 use super::draft::{Draft, DraftNode, DraftSurface};
 use super::flatten::{Flaw, flatten};
 use super::names::Names;
-use super::{Material, MaterialId, Note, Scene, SceneError, Severity, SurfaceId};
+use super::{
+    Edits, ImportOptions, Material, MaterialId, Note, Scene, SceneError, Severity, SurfaceId,
+};
 
 mod carve;
 mod read;
@@ -36,18 +38,18 @@ pub(super) fn is_view3d(path: &Path) -> bool {
 ///
 /// # Errors
 /// What View3D would not take either, and masking surfaces: with the line and the remedy.
-pub(super) fn import(path: &Path, max_memory_bytes: Option<u64>) -> Result<Scene, SceneError> {
+pub(super) fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError> {
     let file = path.display().to_string();
     // What cannot be measured cannot be read either.
     let length = std::fs::metadata(path).map_or(0, |m| m.len());
-    SceneError::unless_fits(&file, "the file", length, max_memory_bytes)?;
+    SceneError::unless_fits(&file, "the file", length, options.max_memory_bytes)?;
     let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
         file: file.clone(),
         source,
         remedy: "check the path and its permissions".into(),
     })?;
     let stem = path.file_stem().map_or_else(|| file.clone(), |s| s.to_string_lossy().into_owned());
-    scene(&stem, &String::from_utf8_lossy(&bytes)).map_err(|error| match error {
+    scene(&stem, &String::from_utf8_lossy(&bytes), &options.edits).map_err(|error| match error {
         Refused::Text(Wrong { line, what, remedy }) => {
             SceneError::View3d { file, line, what, remedy }
         }
@@ -68,7 +70,7 @@ impl From<Wrong> for Refused {
     }
 }
 
-fn scene(name: &str, text: &str) -> Result<Scene, Refused> {
+fn scene(name: &str, text: &str, edits: &Edits) -> Result<Scene, Refused> {
     let file = read::read(text)?;
     check(&file.surfaces)?;
     let mut notes = notes_of(&file);
@@ -116,6 +118,7 @@ fn scene(name: &str, text: &str) -> Result<Scene, Refused> {
         nodes: vec![node],
         materials: materials.list,
         notes,
+        edits: edits.clone(),
         ..Draft::default()
     };
     let mut scene = assemble(draft).map_err(Refused::Scene)?;

@@ -22,7 +22,7 @@ S 6 7 8 4 3 0 0 1.00 black
 ";
 
 fn read(text: &str) -> Scene {
-    scene("case", text).unwrap()
+    scene("case", text, &Edits::default()).unwrap()
 }
 
 fn names(scene: &Scene) -> Vec<&str> {
@@ -125,7 +125,7 @@ fn what_is_wrong_is_said_with_its_line() {
         ("F 3a\nS 1 R 0 0 0.5 a\n0 0 0 0 0 1\n".into(), 2, "1 numbers are missing"),
         ("F 3a\nS 1 C 0 0 0.5 a\n0 0 0 0 0 1 1\n".into(), 2, "the shape is `C`"),
     ] {
-        match scene("case", &text) {
+        match scene("case", &text, &Edits::default()) {
             Err(Refused::Text(wrong)) => {
                 let said = format!("{}: {}", wrong.line, wrong.what);
                 assert!(

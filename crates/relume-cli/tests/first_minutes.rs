@@ -1,0 +1,129 @@
+//! The first commands that somebody types at a file of others: light where there is none, views, sizes.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use common::{json, relume, text};
+use glam::{DQuat, DVec3};
+use relume::scene::SceneBuilder;
+use relume_picture::export::write_glb;
+
+/// A dark room with a crate in it, of which nothing emits, in a file.
+fn dark_room(dir: &Path) -> PathBuf {
+    let mut b = SceneBuilder::new("cellar");
+    let wall = b.material("whitewash", [0.7; 3], [0.0; 3]);
+    let wood = b.material("wood", [0.4, 0.3, 0.2], [0.0; 3]);
+    let room = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.cuboid_inward(room, "walls", wall, DVec3::ZERO, DVec3::new(4.0, 3.0, 4.0));
+    let crate_ = b.node("crate", None, DVec3::new(1.0, 0.5, 1.0), DQuat::IDENTITY);
+    b.cuboid(crate_, "crate", wood, DVec3::ZERO, DVec3::ONE);
+    let path = dir.join("cellar.glb");
+    write_glb(&b.build().unwrap(), &path).unwrap();
+    path
+}
+
+#[test]
+fn nothing_is_solved_where_nothing_emits() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = dark_room(dir.path());
+    let out = dir.path().join("out");
+    let sensors = dir.path().join("sensors.txt");
+    std::fs::write(&sensors, "2 1 2 0 1 0\n").unwrap();
+    for command in [
+        vec!["render", text(&scene), "-o", text(&out)],
+        vec!["solve", text(&scene)],
+        vec!["probe", text(&scene), text(&sensors)],
+    ] {
+        let texts =
+            ["nothing in cellar emits light", "--emit MATERIAL=RADIANCE", "`whitewash`, `wood`"];
+        relume(&command).fails(1, &texts);
+    }
+    assert!(!out.exists());
+    relume(&["factors", text(&scene), "--tolerance", "0.3"]).succeeds();
+}
+
+#[test]
+fn a_material_that_is_told_to_shine_lights_the_scene() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = dark_room(dir.path());
+    let out = dir.path().join("out");
+    let render = |more: &[&str]| {
+        let always =
+            ["render", text(&scene), "-o", text(&out), "--size", "64x48", "--tolerance", "0.3"];
+        relume(&[&always[..], more].concat())
+    };
+    render(&["--emit", "wod=1"])
+        .fails(1, &["no material is called `wod`; there are `wood`, `whitewash`"]);
+    render(&["--hide", "rom"]).fails(1, &["no node is called `rom`; there are"]);
+    render(&["--emit", "wood"]).fails(2, &["lamp=40"]);
+    render(&["--reflect", "wood=1.5"]).fails(1, &["`wood`: its reflectance is to be 1.5"]);
+    render(&["--emit", "wood=2", "--reflect", "white*=0.5,0.5,0.25"]).succeeds();
+    let report = json(&out.join("report.json"));
+    // 6 m2, of which the floor has none: pi L A = 12 pi in each of three channels.
+    let emitted = report["frames"][0]["energy"]["emitted_w"].as_f64().unwrap();
+    assert!((emitted / (3.0 * 12.0 * std::f64::consts::PI) - 1.0).abs() < 1e-5, "{emitted}");
+    assert_eq!(report["options"]["edits"][0], "--emit wood=2");
+    render(&["--emit", "wood=3", "--resume"]).fails(1, &["edits was"]);
+    relume(&["info", text(&scene), "--emit", "wood=2"])
+        .says(&["wood", "emits (6.283, 6.283, 6.283)"]);
+    relume(&["verify", "--demo", "room", "--hide", "lamp"]).fails(2, &["relume demo"]);
+}
+
+#[test]
+fn a_still_scene_on_a_turntable_is_solved_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = dark_room(dir.path());
+    let out = dir.path().join("out");
+    relume(&[
+        "render",
+        text(&scene),
+        "-o",
+        text(&out),
+        "--size",
+        "64x48",
+        "--tolerance",
+        "0.3",
+        "--emit",
+        "wood=2",
+        "--turntable",
+        "3",
+        "--eye",
+        "2,1.5,9",
+        "--look-at",
+        "2,1,2",
+    ])
+    .says(&["3 frames"]);
+    let report = json(&out.join("report.json"));
+    let frames = report["frames"].as_array().unwrap();
+    assert_eq!(frames.len(), 3);
+    assert!(frames[0]["examined"].as_u64().unwrap() > 0);
+    assert!(frames[1..].iter().all(|f| f["examined"] == 0 && f["hash"] == frames[0]["hash"]));
+    let picture = |k: u32| std::fs::read(out.join(format!("frame-000{k}.png"))).unwrap();
+    assert!(picture(0) != picture(1) && picture(1) != picture(2));
+}
+
+#[test]
+fn a_view_into_the_dark_is_said_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = dark_room(dir.path());
+    let out = dir.path().join("out");
+    let away = ["--eye", "2,1.5,9", "--look-at", "2,1.5,20", "--turntable", "2"];
+    let render = [
+        "render",
+        text(&scene),
+        "-o",
+        text(&out),
+        "--size",
+        "64x48",
+        "--tolerance",
+        "0.3",
+        "--emit",
+        "wood=2",
+    ];
+    let ran = relume(&[&render[..], &away[..]].concat()).succeeds();
+    assert_eq!(ran.err.matches("the view sees almost no light").count(), 1, "{}", ran.err);
+    assert!(ran.err.contains("--overview"), "{}", ran.err);
+    let ran = relume(&render).succeeds();
+    assert!(!ran.err.contains("almost no light"), "{}", ran.err);
+}

@@ -1,0 +1,357 @@
+//! A rough solution at one instant: what the light does on some thousand points, well enough to tell
+//! what is lit from what is dark.
+//!
+//! Direct light from points on lamps and from punctual lights, by one shadow ray each; then bounces along
+//! fixed rays from point to point. Luminance only. Must not be used for anything but choosing a view.
+
+use glam::{DVec2, DVec3, Vec3};
+use rayon::prelude::*;
+use relume::geometry::Pose;
+use relume::scene::outside::OutsideNow;
+use relume::scene::{Light, LightKind, Patch, PatchId, Scene};
+
+use super::super::tone::luminance;
+use super::caster::{Caster, LIFT};
+
+/// Points on surfaces, besides one on every patch; and on one patch at most.
+const POINTS: f64 = 4096.0;
+const POINTS_OF_PATCH: usize = 64;
+
+/// Points on lamps.
+const LAMP_POINTS: usize = 32;
+
+/// The strongest punctual lights, those that count.
+const LIGHTS: usize = 64;
+
+/// Rays for bounces: from each point, and from all of them.
+const RAYS: (usize, usize) = (16, 1 << 17);
+
+/// Bounces that are followed.
+const BOUNCES: usize = 4;
+
+/// Lamps are no nearer than this to what they light, in units of the scene.
+const NEAREST: f32 = 1e-3;
+
+/// Golden ratio's fraction, and the fractions of its plastic sister: sequences that spread evenly
+/// (M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018).
+const GOLDEN: f64 = 0.618_033_988_749_895;
+const PLASTIC: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
+
+/// A point on the front of a patch.
+struct Point {
+    at: Vec3,
+    normal: Vec3,
+    /// Share of its patch, m2.
+    area_m2: f64,
+    reflectance: f64,
+    emits: bool,
+}
+
+/// The rough solution.
+pub(super) struct Preview {
+    points: Vec<Point>,
+    /// For each patch the range of its points; one entry more than patches.
+    offsets: Vec<u32>,
+    /// How bright a point is in the eye of a picture exposed for what is lit: 1 at the typical radiosity, 0
+    /// eight stops below it.
+    pub(super) brightness: Vec<f64>,
+    /// Whether anything is lit at all.
+    pub(super) is_lit: bool,
+}
+
+/// Rays from a point that look for the sky.
+const SKY_RAYS: usize = 16;
+
+/// Stops below the typical radiosity at which a surface counts as black.
+const STOPS: f64 = 8.0;
+
+impl Preview {
+    /// Of a scene and the light from outside at `time_s`; `poses` by body.
+    pub(super) fn new(
+        (scene, sky): (&Scene, Option<&OutsideNow>),
+        time_s: f64,
+        poses: &[Option<Pose>],
+        caster: &Caster,
+    ) -> Preview {
+        let (points, offsets) = spread(scene, time_s, poses, caster);
+        let mut preview = Preview { brightness: Vec::new(), is_lit: false, points, offsets };
+        let lamps = Lamps::new(scene, time_s, poses, caster);
+        let from_sky = |k: usize| sky.map_or(0.0, |sky| preview.from_sky(sky, caster, k));
+        let direct: Vec<f64> = (0..preview.points.len())
+            .into_par_iter()
+            .map(|k| lamps.irradiance(&preview.points[k], caster) + from_sky(k))
+            .collect();
+        if direct.iter().all(|&e| e == 0.0) {
+            preview.brightness = vec![1.0; preview.points.len()];
+            return preview;
+        }
+        let reflected = preview.bounce(scene, caster, &direct);
+        preview.is_lit = true;
+        preview.brightness = preview.brightnesses(&reflected);
+        preview
+    }
+
+    /// Area that a point stands for, m2.
+    pub(super) fn area_m2(&self, point: usize) -> f64 {
+        self.points[point].area_m2
+    }
+
+    /// Points in all.
+    pub(super) fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether a point is on a lamp.
+    pub(super) fn emits(&self, point: usize) -> bool {
+        self.points[point].emits
+    }
+
+    /// The point of a patch that is nearest to a place on it.
+    pub(super) fn point_at(&self, patch: PatchId, place: Vec3) -> usize {
+        let [from, to] = [0, 1].map(|k| self.offsets[patch.0 as usize + k] as usize);
+        let off = |k: &usize| self.points[*k].at.distance_squared(place);
+        (from..to).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(from)
+    }
+
+    /// Reflected radiosity of each point after some bounces, W/m2.
+    fn bounce(&self, scene: &Scene, caster: &Caster, direct: &[f64]) -> Vec<f64> {
+        let rays = (RAYS.1 / self.points.len().max(1)).clamp(2, RAYS.0);
+        let seen: Vec<Vec<usize>> = (0..self.points.len())
+            .into_par_iter()
+            .map(|k| self.in_sight(scene, caster, k, rays))
+            .collect();
+        let mut reflected = vec![0.0; self.points.len()];
+        for _ in 0..=BOUNCES {
+            let next = |k: usize| {
+                let indirect = seen[k].iter().map(|&other| reflected[other]).sum::<f64>();
+                self.points[k].reflectance * (direct[k] + indirect / rays as f64)
+            };
+            reflected = (0..self.points.len()).map(next).collect();
+        }
+        reflected
+    }
+
+    /// Irradiance at a point from the sky and the sun, W/m2: the sun's where its rays arrive, the sky's by what rays meet
+    /// nothing.
+    fn from_sky(&self, sky: &OutsideNow, caster: &Caster, k: usize) -> f64 {
+        let point = &self.points[k];
+        let is_open = |towards: &Vec3| {
+            caster.is_free(point.at + point.normal * LIFT, *towards, f32::INFINITY)
+        };
+        let grey = |l: [f64; 3]| luminance(l.map(|l| l as f32));
+        let count = SKY_RAYS as f64;
+        let open = self.directions(k, SKY_RAYS).filter(is_open);
+        let sum = open.map(|towards| grey(sky.radiance(towards.as_dvec3()))).sum::<f64>();
+        let sun = sky.sun_beam().map_or(0.0, |(towards, beam_w_m2)| {
+            let towards = towards.as_vec3();
+            let cosine = f64::from(point.normal.dot(towards)).max(0.0);
+            if cosine > 0.0 && is_open(&towards) { grey(beam_w_m2) * cosine } else { 0.0 }
+        });
+        std::f64::consts::PI * sum / count + sun
+    }
+
+    /// Directions from a point, spread by the cosine.
+    fn directions(&self, k: usize, rays: usize) -> impl Iterator<Item = Vec3> + '_ {
+        let normal = self.points[k].normal;
+        let (u, v) = normal.any_orthonormal_pair();
+        (0..rays).map(move |j| {
+            let share = (j as f64 + 0.5) / rays as f64;
+            let turns = j as f64 * GOLDEN + k as f64 * PLASTIC[0];
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * turns.fract());
+            let (up, out) = ((1.0 - share).sqrt() as f32, share.sqrt() as f32);
+            let towards = u * (cos as f32 * out) + v * (sin as f32 * out) + normal * up;
+            towards.normalize()
+        })
+    }
+
+    /// Points on what rays from a point meet, the rays spread by the cosine.
+    fn in_sight(&self, scene: &Scene, caster: &Caster, k: usize, rays: usize) -> Vec<usize> {
+        let point = &self.points[k];
+        let met = |towards: Vec3| {
+            let hit = caster.first(scene, point.at + point.normal * LIFT, towards)?;
+            Some(self.point_at(hit.front?, point.at + towards * hit.distance))
+        };
+        self.directions(k, rays).filter_map(met).collect()
+    }
+
+    fn brightnesses(&self, reflected: &[f64]) -> Vec<f64> {
+        // What is met where light is, not where surface is, as most of a scene may be dark; and its logarithm,
+        // as there may be bright spots.
+        let lit = || self.points.iter().zip(reflected).filter(|(_, b)| **b > 0.0);
+        let weight: f64 = lit().map(|(point, b)| point.area_m2 * b).sum();
+        let typical =
+            lit().map(|(point, b)| point.area_m2 * b * libm::log2(*b)).sum::<f64>() / weight;
+        let of_point = |(point, &b): (&Point, &f64)| match point.emits {
+            true => 1.0,
+            false if b > 0.0 => (1.0 + (libm::log2(b) - typical) / STOPS).clamp(0.0, 1.0),
+            false => 0.0,
+        };
+        self.points.iter().zip(reflected).map(of_point).collect()
+    }
+}
+
+/// Points on all patches that are present, and where those of each patch begin.
+fn spread(
+    scene: &Scene,
+    time_s: f64,
+    poses: &[Option<Pose>],
+    caster: &Caster,
+) -> (Vec<Point>, Vec<u32>) {
+    let mut points = Vec::new();
+    let mut offsets = vec![0];
+    let whole_m2 = scene.area_m2();
+    for patch in &scene.patches {
+        if let Some(pose) = &poses[patch.body.0 as usize] {
+            let area_m2 = patch.area_m2();
+            let count = (area_m2 / whole_m2 * POINTS).ceil() as usize;
+            let count = count.clamp(1, POINTS_OF_PATCH);
+            let emits = scene.exitance_at(patch, time_s).iter().any(|&m| m > 0.0);
+            for at in on_patch(patch, count) {
+                points.push(Point {
+                    at: caster.place(pose.point(patch.frame.point(at))),
+                    normal: pose.direction(patch.frame.normal).as_vec3(),
+                    area_m2: area_m2 / count as f64,
+                    reflectance: scene.reflectance(patch).iter().sum::<f64>() / 3.0,
+                    emits,
+                });
+            }
+        }
+        offsets.push(points.len() as u32);
+    }
+    (points, offsets)
+}
+
+/// Points spread evenly over a patch, in its frame.
+fn on_patch(patch: &Patch, count: usize) -> impl Iterator<Item = DVec2> + '_ {
+    let origin = patch.corners[0];
+    let fan: Vec<(f64, DVec2, DVec2)> = patch.corners[1..]
+        .windows(2)
+        .map(|pair| (pair[0] - origin, pair[1] - origin))
+        .map(|(b, c)| (b.perp_dot(c).abs(), b, c))
+        .collect();
+    let whole: f64 = fan.iter().map(|t| t.0).sum();
+    (0..count).map(move |k| {
+        let mut left = (k as f64 + 0.5) / count as f64 * whole;
+        let mut at = 0;
+        while at + 1 < fan.len() && left > fan[at].0 {
+            left -= fan[at].0;
+            at += 1;
+        }
+        let (_, b, c) = fan[at];
+        // A parallelogram folded onto its half.
+        let [u, v] = PLASTIC.map(|step| ((k + 1) as f64 * step).fract());
+        let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+        let (u, v) = if count == 1 { (1.0 / 3.0, 1.0 / 3.0) } else { (u, v) };
+        origin + b * u + c * v
+    })
+}
+
+/// A place on a lamp, and what it stands for.
+struct LampPoint {
+    at: Vec3,
+    normal: Vec3,
+    exitance_w_m2: f64,
+    area_m2: f64,
+}
+
+/// What shines at one instant.
+struct Lamps {
+    points: Vec<LampPoint>,
+    /// Lights with where they are and which way they shine; intensity in W/sr or W/m2.
+    lights: Vec<(Vec3, Vec3, LightKind, f64)>,
+}
+
+impl Lamps {
+    fn new(scene: &Scene, time_s: f64, poses: &[Option<Pose>], caster: &Caster) -> Lamps {
+        Lamps {
+            points: lamp_points(scene, time_s, poses, caster),
+            lights: lights(scene, time_s, caster),
+        }
+    }
+
+    /// Irradiance that comes to a point directly, W/m2.
+    fn irradiance(&self, point: &Point, caster: &Caster) -> f64 {
+        let unit_m2 = caster.unit_m() * caster.unit_m();
+        let from = point.at + point.normal * LIFT;
+        // Towards what shines: direction, cosine, distance squared, m2; nothing where it is behind or hidden.
+        let in_sight = |at: Vec3| {
+            let way = at - from;
+            let (distance, towards) = (way.length().max(NEAREST), way.normalize_or_zero());
+            let cosine = towards.dot(point.normal);
+            let sees = cosine > 0.0 && caster.is_free(from, towards, way.length() - LIFT);
+            sees.then(|| (towards, f64::from(cosine), f64::from(distance * distance) * unit_m2))
+        };
+        let of_lamp = |lamp: &LampPoint| {
+            let facing = f64::from(-(lamp.at - from).normalize_or_zero().dot(lamp.normal));
+            let seen = if facing > 0.0 { in_sight(lamp.at) } else { None };
+            // As from a disc of its area: never more than it emits, however near.
+            seen.map_or(0.0, |(_, cosine, distance_m2)| {
+                let disc = std::f64::consts::PI * distance_m2 + lamp.area_m2;
+                lamp.exitance_w_m2 * lamp.area_m2 * facing * cosine / disc
+            })
+        };
+        let of_light = |&(at, axis, kind, strength): &(Vec3, Vec3, LightKind, f64)| match kind {
+            LightKind::Directional => {
+                let cosine = -axis.dot(point.normal);
+                let lit = cosine > 0.0 && caster.is_free(from, -axis, f32::INFINITY);
+                if lit { strength * f64::from(cosine) } else { 0.0 }
+            }
+            LightKind::Point => in_sight(at).map_or(0.0, |(_, cosine, r2)| strength * cosine / r2),
+            LightKind::Spot { inner, outer } => {
+                in_sight(at).map_or(0.0, |(towards, cosine, r2)| {
+                    let along = f64::from(-towards.dot(axis));
+                    let [full, none] = [inner, outer].map(libm::cos);
+                    let share = ((along - none) / (full - none).max(1e-9)).clamp(0.0, 1.0);
+                    strength * cosine / r2 * share * share
+                })
+            }
+        };
+        self.points.iter().map(of_lamp).sum::<f64>() + self.lights.iter().map(of_light).sum::<f64>()
+    }
+}
+
+/// Points on lamps, as many on each as it has of the flux.
+fn lamp_points(
+    scene: &Scene,
+    time_s: f64,
+    poses: &[Option<Pose>],
+    caster: &Caster,
+) -> Vec<LampPoint> {
+    let flux = |patch: &Patch| {
+        let exitance = scene.exitance_at(patch, time_s);
+        let there = poses[patch.body.0 as usize].is_some();
+        if there { patch.area_m2() * luminance(exitance.map(|m| m as f32)) } else { 0.0 }
+    };
+    let whole_w: f64 = scene.patches.iter().map(flux).sum();
+    let each_w = whole_w / LAMP_POINTS as f64;
+    let mut points = Vec::new();
+    let mut sum_w = 0.0;
+    for patch in scene.patches.iter().filter(|patch| flux(patch) > 0.0) {
+        let Some(pose) = &poses[patch.body.0 as usize] else { continue };
+        let exitance_w_m2 = flux(patch) / patch.area_m2();
+        let begun = (sum_w / each_w + 0.5).floor();
+        sum_w += flux(patch);
+        let count = ((sum_w / each_w + 0.5).floor() - begun) as usize;
+        let normal = pose.direction(patch.frame.normal).as_vec3();
+        for at in on_patch(patch, count.min(LAMP_POINTS)) {
+            let at = caster.place(pose.point(patch.frame.point(at)));
+            let at = at + normal * LIFT;
+            points.push(LampPoint { at, normal, exitance_w_m2, area_m2: each_w / exitance_w_m2 });
+        }
+    }
+    points
+}
+
+/// The strongest lights that are there.
+fn lights(scene: &Scene, time_s: f64, caster: &Caster) -> Vec<(Vec3, Vec3, LightKind, f64)> {
+    let of_light = |light: &Light| {
+        let pose = scene.motion.pose(light.node, time_s)?;
+        let strength = luminance(light.intensity_at(time_s).map(|i| i as f32));
+        let axis = pose.direction(DVec3::NEG_Z).as_vec3();
+        (strength > 0.0).then(|| (caster.place(pose.translation), axis, light.kind, strength))
+    };
+    let mut lights: Vec<_> = scene.lights.iter().filter_map(of_light).collect();
+    lights.sort_by(|one, other| other.3.total_cmp(&one.3));
+    lights.truncate(LIGHTS);
+    lights
+}

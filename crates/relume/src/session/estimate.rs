@@ -1,0 +1,193 @@
+//! How much there is to solve, said beforehand.
+//!
+//! What decides is how many pairs of patches face each other: all of them are judged, whatever the tolerance, and
+//! most of them become links. What refinement adds is small for many patches, and large for few. The numbers
+//! were fitted to scenes measured (docs/performance.md). Nothing that is solved depends on an estimate.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::scene::{BodyId, Scene};
+
+use super::Options;
+
+/// Pairs of patches that are tried at most: of more, an even share.
+const TRIED: u64 = 4_000_000;
+
+/// How much there is to solve in one frame from scratch: ranges from low to high, within which four of five scenes
+/// measured were.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// Patches that are present.
+    pub patches: u64,
+    /// Pairs of them that face each other.
+    pub facing: u64,
+    /// Pairs that are looked at and kept, links among them.
+    pub pairs: [u64; 2],
+    /// Memory of the engine, bytes.
+    pub bytes: [u64; 2],
+    /// Seconds of one core.
+    pub core_seconds: [f64; 2],
+    /// Whether refinement makes most of it, at worst: then a coarser tolerance helps.
+    pub by_refinement: bool,
+}
+
+/// A patch in the world: its plane and its corners.
+struct Placed {
+    normal: DVec3,
+    offset_m: f64,
+    corners: Vec<DVec3>,
+}
+
+impl Placed {
+    /// Whether any part of another patch is in front of this one; touching is not.
+    fn faces(&self, other: &Placed, slack_m: f64) -> bool {
+        other.corners.iter().any(|corner| self.normal.dot(*corner) > self.offset_m + slack_m)
+    }
+}
+
+/// All patches that are there at a time.
+fn placed(scene: &Scene, time_s: f64) -> Vec<Placed> {
+    let mut placed = Vec::new();
+    for body in (0..scene.bodies.len() as u32).map(BodyId) {
+        let Some(pose) = scene.pose(body, time_s) else { continue };
+        placed.extend(scene.patches_of(body).map(|(_, patch)| {
+            let normal = pose.direction(patch.frame.normal);
+            let offset_m = normal.dot(pose.point(patch.frame.origin));
+            let corners = patch.corners_in_body().map(|p| pose.point(p)).collect();
+            Placed { normal, offset_m, corners }
+        }));
+    }
+    placed
+}
+
+/// Pairs that face each other, counted or, of more than `tried`, estimated.
+fn count_facing(placed: &[Placed], slack_m: f64, tried: u64) -> u64 {
+    let count = placed.len() as u64;
+    let all = count * count.saturating_sub(1) / 2;
+    // Every stride-th partner of each patch, counted from another one each time.
+    let stride = all.div_ceil(tried).max(1) as usize;
+    let of_patch = |k: usize| {
+        let partners = placed[k + 1..].iter().skip(k % stride).step_by(stride);
+        let both =
+            |other: &&Placed| placed[k].faces(other, slack_m) && other.faces(&placed[k], slack_m);
+        partners.filter(both).count() as u64
+    };
+    let found: u64 = (0..placed.len()).into_par_iter().map(of_patch).sum();
+    (found * stride as u64).min(all)
+}
+
+impl Estimate {
+    /// Of a scene at `time_s`, solved from scratch with these options.
+    ///
+    /// Cost: some million tests of two polygons at most.
+    pub fn of(scene: &Scene, time_s: f64, options: &Options) -> Estimate {
+        let placed = placed(scene, time_s);
+        let extent_m = scene.bounds(time_s).map_or(0.0, |(low, high)| low.distance(high));
+        let facing = count_facing(&placed, 1e-6 * extent_m, TRIED);
+        Estimate::from_counts(facing, placed.len() as u64, options.tolerance)
+    }
+
+    /// See [`PAIRS_OF_PATCHES`] and what follows it.
+    fn from_counts(facing: u64, patches: u64, tolerance: f64) -> Estimate {
+        let n = patches as f64;
+        let base = n * (n - 1.0).max(0.0) / 2.0 + PAIRS_OF_FACING * facing as f64;
+        let finer = |(fixed, of_patch): (f64, f64)| {
+            let refined = (fixed + of_patch * n) * FITTED_AT / tolerance;
+            refined.min(facing as f64 * REFINED_MOST)
+        };
+        let pairs = [0, 1].map(|k| PAIRS_OF_PATCHES[k] * base + finer(REFINED[k]));
+        Estimate {
+            patches,
+            facing,
+            pairs: pairs.map(|pairs| pairs as u64),
+            bytes: [0, 1].map(|k| (pairs[k] * BYTES[k]) as u64),
+            core_seconds: [0, 1].map(|k| pairs[k] * SECONDS[k]),
+            by_refinement: 2.0 * finer(REFINED[1]) > pairs[1],
+        }
+    }
+}
+
+/// Pairs for each pair of patches, low and high; those that face each other bring some more.
+const PAIRS_OF_PATCHES: [f64; 2] = [0.8, 1.3];
+const PAIRS_OF_FACING: f64 = 1.7;
+
+/// Pairs that refinement adds at the tolerance [`FITTED_AT`], and for each patch: low and high. In inverse proportion
+/// to the tolerance; for each pair that faces at most [`REFINED_MOST`].
+const REFINED: [(f64, f64); 2] = [(0.0, 100.0), (50_000.0, 1_500.0)];
+const FITTED_AT: f64 = 0.02;
+const REFINED_MOST: f64 = 1e4;
+
+/// Bytes and seconds of one core for a pair, low and high.
+const BYTES: [f64; 2] = [55.0, 200.0];
+const SECONDS: [f64; 2] = [8e-6, 45e-6];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SceneBuilder;
+    use crate::session::Session;
+
+    use std::sync::Arc;
+
+    use glam::DQuat;
+
+    /// A floor with so many crates on it, under a lamp.
+    fn crates(rows: u32) -> Scene {
+        let mut b = SceneBuilder::new("crates");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let lamp = b.material("lamp", [0.5; 3], [9.0; 3]);
+        let node = b.node("hall", None, DVec3::ZERO, DQuat::IDENTITY);
+        let side_m = f64::from(rows) * 2.0;
+        b.cuboid_inward(node, "walls", grey, DVec3::ZERO, DVec3::new(side_m, 3.0, side_m));
+        let down = [(0.4, 0.4), (0.6, 0.4), (0.6, 0.6), (0.4, 0.6)];
+        let corners = down.map(|(x, z)| DVec3::new(x * side_m, 2.9, z * side_m));
+        b.polygon(node, "lamp", lamp, &corners);
+        for (i, k) in (0..rows).flat_map(|i| (0..rows).map(move |k| (i, k))) {
+            let low = DVec3::new(f64::from(i) * 2.0 + 0.5, 0.0, f64::from(k) * 2.0 + 0.5);
+            b.cuboid(node, &format!("crate {i} {k}"), grey, low, low + DVec3::ONE);
+        }
+        b.build().unwrap()
+    }
+
+    #[test]
+    fn pairs_and_memory_of_scenes_are_within_what_was_estimated() {
+        for (rows, tolerance) in [(1, 0.1), (2, 0.3), (4, 0.3), (4, 0.1)] {
+            let scene = crates(rows);
+            let options = Options { tolerance, ..Options::default() };
+            let estimate = Estimate::of(&scene, 0.0, &options);
+            assert_eq!(estimate.patches, scene.patches.len() as u64);
+            let mut session = Session::new(Arc::new(scene), options).unwrap();
+            let found = session.step(0, 0.0).unwrap().pairs;
+            let found = found.active + found.refined + found.culled;
+            let [low, high] = estimate.pairs;
+            assert!(
+                (low..=high).contains(&found),
+                "{rows} rows at {tolerance}: {found} {estimate:?}"
+            );
+            let bytes = session.memory_bytes();
+            assert!(bytes <= estimate.bytes[1], "{rows} rows at {tolerance}: {bytes} {estimate:?}");
+            // What could be seen meanwhile.
+            assert_eq!(session.watch().pairs(), found);
+        }
+    }
+
+    #[test]
+    fn an_even_share_of_many_pairs_stands_for_all() {
+        let placed = placed(&crates(6), 0.0);
+        let whole = count_facing(&placed, 1e-9, u64::MAX);
+        let share = count_facing(&placed, 1e-9, 1_000);
+        let off = share as f64 / whole as f64 - 1.0;
+        assert!(whole > 1_000 && off.abs() < 0.15, "{share} of {whole}");
+        // Two crates side by side: one side of each.
+        assert_eq!(count_facing(&placed[0..0], 1e-9, 10), 0);
+    }
+
+    #[test]
+    fn halls_of_thousands_of_polygons_are_no_matter_of_tolerance() {
+        let estimate = Estimate::from_counts(90_000_000, 33_000, 0.1);
+        assert!(estimate.pairs[0] > 400_000_000 && !estimate.by_refinement, "{estimate:?}");
+        assert!(Estimate::from_counts(40, 16, 0.005).by_refinement);
+        assert_eq!(Estimate::from_counts(0, 1, 0.02).pairs, [0, 0]);
+    }
+}

@@ -6,8 +6,8 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use clap::Args;
-use relume::scene::outside::{Day, Environment, Outside, SUN_DIAMETER_DEG, Sky, Sun, SunPlace};
 use relume::scene::Scene;
+use relume::scene::outside::{Day, Environment, Outside, SUN_DIAMETER_DEG, Sky, Sun, SunPlace};
 
 use crate::failure::Failure;
 use crate::memory;

@@ -76,10 +76,10 @@ impl Preview {
         let (points, offsets) = spread(scene, time_s, poses, caster);
         let mut preview = Preview { brightness: Vec::new(), is_lit: false, points, offsets };
         let lamps = Lamps::new(scene, time_s, poses, caster);
-        let from_sky = |k: usize| sky.map_or(0.0, |sky| preview.from_sky(sky, caster, k));
+        let of_sky = |k: usize| sky.map_or(0.0, |sky| preview.sky_irradiance(sky, caster, k));
         let direct: Vec<f64> = (0..preview.points.len())
             .into_par_iter()
-            .map(|k| lamps.irradiance(&preview.points[k], caster) + from_sky(k))
+            .map(|k| lamps.irradiance(&preview.points[k], caster) + of_sky(k))
             .collect();
         if direct.iter().all(|&e| e == 0.0) {
             preview.brightness = vec![1.0; preview.points.len()];
@@ -133,7 +133,7 @@ impl Preview {
 
     /// Irradiance at a point from the sky and the sun, W/m2: the sun's where its rays arrive, the sky's by what rays meet
     /// nothing.
-    fn from_sky(&self, sky: &OutsideNow, caster: &Caster, k: usize) -> f64 {
+    fn sky_irradiance(&self, sky: &OutsideNow, caster: &Caster, k: usize) -> f64 {
         let point = &self.points[k];
         let is_open = |towards: &Vec3| {
             caster.is_free(point.at + point.normal * LIFT, *towards, f32::INFINITY)

@@ -822,7 +822,7 @@ struct PatchCuts<'a> {
 const CUT_SHARE: f64 = 0.25;
 
 /// Polygons of a smaller share of the scene's area are not cut: light jumps from one to the next anyway.
-const CUT_LEAST: f64 = 1.0 / 512.0;
+const CUT_LEAST: f64 = 1.0 / 64.0;
 
 impl Cuts {
     fn new(scene: &Scene) -> Cuts {

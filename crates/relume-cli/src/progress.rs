@@ -51,8 +51,11 @@ fn so_far(pairs: u64, expected: f64, bytes: u64) -> String {
     if pairs == 0 {
         return String::new();
     }
-    let percent = (100.0 * pairs as f64 / expected.max(1.0)).min(99.0);
-    format!(", {} pairs so far (about {percent:.0} %), {}", HumanCount(pairs), HumanBytes(bytes))
+    let share = match pairs as f64 / expected.max(1.0) {
+        share if share <= 1.0 => format!("about {:.0} %", 100.0 * share),
+        _ => "more than estimated".to_owned(),
+    };
+    format!(", {} pairs so far ({share}), {}", HumanCount(pairs), HumanBytes(bytes))
 }
 
 impl Progress {
@@ -133,7 +136,7 @@ mod tests {
     fn what_there_is_of_a_frame_is_said() {
         assert_eq!(so_far(0, 1e6, 0), "");
         assert_eq!(so_far(250_000, 1e6, 3 << 20), ", 250,000 pairs so far (about 25 %), 3.00 MiB");
-        assert_eq!(so_far(5, 0.0, 1), ", 5 pairs so far (about 99 %), 1 B");
+        assert_eq!(so_far(5, 0.0, 1), ", 5 pairs so far (more than estimated), 1 B");
     }
 
     #[test]

@@ -47,8 +47,8 @@ impl Exposure {
     ///
     /// The log-average luminance of the visible surfaces that do not emit becomes a middle grey
     /// (0.2), or less where more than 2 % of them would exceed 0.9. Lamps do not count, unless
-    /// nothing else is lit; then the brightest becomes 0.9. Never so bright that
-    /// [`Snapshot::error_w_m2`] shows as more than 0.1: a dark view stays dark. Deterministic.
+    /// nothing else is lit; then the brightest becomes 0.9. What is darker than [`Snapshot::error_w_m2`] counts as
+    /// that, and it never shows as more than 0.1: a dark view stays dark. Deterministic.
     pub fn automatic(snapshot: &Snapshot, view: &View) -> Exposure {
         Exposure::metered(snapshot, view).exposure
     }
@@ -57,7 +57,7 @@ impl Exposure {
     pub fn metered(snapshot: &Snapshot, view: &View) -> Metered {
         let untold = snapshot.error_w_m2 / PI;
         let mut lit = Vec::new();
-        let (mut lamps, mut lamp_max, mut pixels) = (0, 0.0_f64, 0);
+        let (mut lamps, mut lamp_max, mut told, mut pixels) = (0, 0.0_f64, 0, 0);
         for seen in visible_radiances(snapshot, view) {
             pixels += 1;
             match seen {
@@ -65,7 +65,10 @@ impl Exposure {
                     lamps += 1;
                     lamp_max = lamp_max.max(luminance);
                 }
-                Some((luminance, false)) if luminance > untold => lit.push(luminance),
+                Some((luminance, false)) if luminance > 0.0 => {
+                    told += u32::from(luminance > untold);
+                    lit.push(luminance.max(untold));
+                }
                 _ => {}
             }
         }
@@ -80,7 +83,7 @@ impl Exposure {
             None if most.is_finite() => most,
             None => 1.0,
         };
-        let lit = (lit.len() + lamps) as f64 / f64::from(pixels.max(1));
+        let lit = f64::from(told + lamps) / f64::from(pixels.max(1));
         Metered { exposure: Exposure::Fixed(scale), lit }
     }
 

@@ -19,7 +19,7 @@ pub struct ElementId(pub u32);
 pub enum Kind {
     /// A group of nodes: the scene, a group of bodies, a body, or a part of its hierarchy.
     Cluster,
-    /// A planar polygon with more than four corners: a group of coplanar nodes.
+    /// A planar polygon with more than four corners, or one that lines of contact cut: a group of coplanar nodes.
     Polygon,
     /// A triangle or quadrilateral: the root of a quadtree or a node of it.
     Element,

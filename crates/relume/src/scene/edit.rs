@@ -3,11 +3,13 @@
 //! Names are those that the scene has in the end (and `relume info` lists), so that files and code are
 //! edited alike. Must not know file formats.
 
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use super::SceneError;
 use super::draft::Draft;
 use super::limits::EMISSION_MAX;
+use super::{Tint, TintId};
 
 /// Changes to a scene before it is built, in this order: nodes are hidden, then materials changed; of
 /// several changes to one thing the last counts.
@@ -48,9 +50,10 @@ pub(super) fn apply(draft: &mut Draft, edits: &Edits) -> Result<(), SceneError> 
             let what = format!("its radiance is to be {bad} W/m2/sr");
             return Err(material_error(pattern, what, &format!("choose from 0 to {most:.1e}")));
         }
-        for material in materials(draft, pattern)? {
-            let material = &mut draft.materials[material];
+        for index in materials(draft, pattern)? {
+            let material = &mut draft.materials[index];
             (material.exitance, material.glow) = (radiance.map(|l| PI * l), None);
+            retint(draft, index, |tint| tint.emission = [1.0; 3]);
         }
     }
     for (pattern, reflectance) in &edits.reflect {
@@ -61,9 +64,26 @@ pub(super) fn apply(draft: &mut Draft, edits: &Edits) -> Result<(), SceneError> 
         }
         for material in materials(draft, pattern)? {
             draft.materials[material].reflectance = *reflectance;
+            retint(draft, material, |tint| tint.reflectance = *reflectance);
         }
     }
     Ok(())
+}
+
+/// Changes how the polygons of a material differ from it: those of others that look alike stay as they are.
+fn retint(draft: &mut Draft, material: usize, change: impl Fn(&mut Tint)) {
+    let mut changed: BTreeMap<TintId, TintId> = BTreeMap::new();
+    let surfaces = draft.nodes.iter_mut().flat_map(|node| &mut node.surfaces);
+    for surface in surfaces.filter(|surface| surface.material.0 as usize == material) {
+        for tint in surface.tints.iter_mut().flatten() {
+            *tint = *changed.entry(*tint).or_insert_with(|| {
+                let mut new = draft.tints[tint.0 as usize];
+                change(&mut new);
+                draft.tints.push(new);
+                TintId(draft.tints.len() as u32 - 1)
+            });
+        }
+    }
 }
 
 fn material_error(name: &str, what: String, remedy: &str) -> SceneError {

@@ -21,7 +21,7 @@ const SWEEPS: u32 = 8;
 
 /// Errors on dark receivers are measured against at least this share of the mean irradiance: a room into which light comes
 /// through a door that is ajar is some 200 times darker than the one beside it, and keeps the tolerance.
-pub(super) const DARK_FLOOR: f64 = 1e-3;
+const DARK_FLOOR: f64 = 1e-3;
 
 /// Share of what would arrive directly if nothing were in the way, below which what arrives is what rounding lets through
 /// between shadows: errors relative to that would have no end. (A lamp outside a closed room.)

@@ -14,8 +14,7 @@ use super::Options;
 /// Pairs of patches that are tried at most: of more, an even share.
 const TRIED: u64 = 4_000_000;
 
-/// How much there is to solve in one frame from scratch: ranges from low to high, within which four of five scenes
-/// measured were.
+/// How much there is to solve in one frame from scratch: ranges from low to high, rough; scenes were met that are outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// Patches that are present.
@@ -49,7 +48,7 @@ impl Placed {
 /// All patches that are there at a time.
 fn placed(scene: &Scene, time_s: f64) -> Vec<Placed> {
     let mut placed = Vec::new();
-    for body in (0..scene.bodies.len() as u32).map(BodyId) {
+    for body in (0..scene.bodies.len() as u32).map(BodyId).filter(|&b| !scene.is_distant(b)) {
         let Some(pose) = scene.pose(body, time_s) else { continue };
         placed.extend(scene.patches_of(body).map(|(_, patch)| {
             let normal = pose.direction(patch.frame.normal);
@@ -114,7 +113,7 @@ const PAIRS_OF_FACING: f64 = 1.7;
 
 /// Pairs that refinement adds at the tolerance [`FITTED_AT`], and for each patch: low and high. In inverse proportion
 /// to the tolerance; for each pair that faces at most [`REFINED_MOST`].
-const REFINED: [(f64, f64); 2] = [(0.0, 100.0), (50_000.0, 1_500.0)];
+const REFINED: [(f64, f64); 2] = [(0.0, 100.0), (70_000.0, 2_000.0)];
 const FITTED_AT: f64 = 0.02;
 const REFINED_MOST: f64 = 1e4;
 

@@ -12,7 +12,6 @@ use crate::scene::{PatchId, Scene};
 use crate::solver::{Links, Radiosity, Surfaces};
 
 use super::bends::Bends;
-use super::coarse::DARK_FLOOR;
 use super::surfaces::LitForest;
 use super::{Session, Solved};
 
@@ -105,6 +104,10 @@ impl Snapshot {
     }
 }
 
+/// Share of the tolerance, relative to the mean irradiance, below which a picture shows nothing but the errors of a solution: that of
+/// dark places is smaller than the oracle allows elsewhere.
+const VISIBLE: f64 = 0.05;
+
 /// The leaves of a solved forest with a solution over it.
 pub(super) fn take(
     session: &Session,
@@ -153,7 +156,7 @@ pub(super) fn take(
         end
     }));
     let leaves = by_patch.concat();
-    let error = session.options.tolerance * DARK_FLOOR;
+    let error = session.options.tolerance * VISIBLE;
     Snapshot {
         scene: Arc::clone(scene),
         time_s: solved.time_s,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use relume::scene::{Patch, Scene};
+use relume::scene::{Edits, ImportOptions, Patch, Scene, import};
 use serde_json::{Value, json};
 
 use super::gltf::Gltf;
@@ -433,4 +433,24 @@ fn webp_images_are_read_and_of_ktx2_the_tool_is_named() {
     assert_eq!(colours(&scene), [[0.5; 3]]);
     let said = &with_code(&scene.notes, "texture")[0].message;
     assert!(said.contains("base colour") && said.contains("ktx extract"), "{said}");
+}
+
+/// What is asked for counts for every patch of a material, whatever its texture says there.
+#[test]
+fn edits_of_a_textured_material_hold_for_all_its_patches() {
+    let mut g = Sheet::new(2, |x, y| [x, y]).gltf(base(json!({})));
+    paint(&mut g, [2, 2], &[RED, GREEN, BLUE, WHITE], CLAMP);
+    let edits = Edits {
+        emit: vec![("sheet".into(), [3.0; 3])],
+        reflect: vec![("sheet".into(), [0.25; 3])],
+        ..Edits::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let options = ImportOptions { edits, ..ImportOptions::default() };
+    let scene = import(&g.write(folder.path(), "scene"), &options).unwrap();
+    assert!(scene.patches.len() > 1);
+    for patch in &scene.patches {
+        assert_eq!(scene.reflectance(patch), [0.25; 3]);
+        assert_eq!(scene.exitance_at(patch, 0.0), [3.0 * PI; 3]);
+    }
 }

@@ -107,7 +107,8 @@ pub(super) fn import(
         Format::Stl => stl::read(bytes, &stem, &folder),
         Format::Ply => ply::read(&bytes, &stem, &folder),
     }?;
-    assemble(draft(contents, stem, format)?)
+    let draft = draft(contents, stem, format)?;
+    assemble(Draft { edits: options.edits.clone(), ..draft })
 }
 
 /// An error about the content of a file.

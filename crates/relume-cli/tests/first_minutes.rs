@@ -31,12 +31,16 @@ fn nothing_is_solved_where_nothing_emits() {
     let sensors = dir.path().join("sensors.txt");
     std::fs::write(&sensors, "2 1 2 0 1 0\n").unwrap();
     for command in [
-        vec!["render", text(&scene), "-o", text(&out)],
+        vec!["render", text(&scene), "-o", text(&out), "--sky", "uniform=0"],
         vec!["solve", text(&scene)],
         vec!["probe", text(&scene), text(&sensors)],
     ] {
-        let texts =
-            ["nothing in cellar emits light", "--emit MATERIAL=RADIANCE", "`whitewash`, `wood`"];
+        let texts = [
+            "nothing in cellar emits light",
+            "--sky uniform=1",
+            "--emit MATERIAL=RADIANCE",
+            "`whitewash`, `wood`",
+        ];
         relume(&command).fails(1, &texts);
     }
     assert!(!out.exists());

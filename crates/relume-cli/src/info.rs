@@ -177,7 +177,10 @@ fn emitters(out: &mut String, scene: &Scene) -> fmt::Result {
         )?;
     }
     if none {
-        writeln!(out, "  none: `render` lights it with a uniform sky, unless it is told --sky, --sun, --environment or --emit")?;
+        writeln!(
+            out,
+            "  none: `render` lights it with a uniform sky, unless it is told --sky, --sun, --environment or --emit"
+        )?;
     }
     Ok(())
 }

@@ -27,7 +27,7 @@ fn commands(format: Format, random: &mut Random) -> Vec<Vec<String>> {
     let coarse = "--frames 0 --tolerance 0.5 --threads 1 --max-memory 1G --quiet";
     match format {
         Format::Glb | Format::Gltf => match random.below(8) {
-            0 => vec![of("info FILE"), of(&format!("solve FILE {coarse}"))],
+            0 => vec![of("info FILE"), of(&format!("solve FILE --sky uniform=1 {coarse}"))],
             1 => vec![of(&format!("factors FILE {coarse}"))],
             2 => vec![of(&format!("probe FILE SENSORS {coarse}"))],
             3..=4 => vec![of("check FILE")],

@@ -224,3 +224,30 @@ fn r7_a_lamp_outside_a_closed_room_refines_nothing_without_end() {
     b.polygon(node, "lamp", lamp, &facing_up([-0.375, 0.375], [-0.375, 0.375], 0.0));
     is_dark_and_small(b);
 }
+
+#[test]
+fn r8_no_light_leaks_under_a_wall() {
+    // Elements across the wall's foot carried the mean of the bright and of the dark side, and sent it to both.
+    let mut b = SceneBuilder::new("two rooms");
+    let white = b.material("white", [0.7; 3], [0.0; 3]);
+    let wall = b.double_sided_material("wall", [0.7; 3], [0.0; 3]);
+    let lamp = b.material("lamp", [0.0; 3], [90.0; 3]);
+    let node = b.node("rooms", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.cuboid_inward(node, "room", white, DVec3::ZERO, v(6.2, 3.0, 2.6));
+    // A slot at the top lets a little light through.
+    let corners = [v(3.0, 0.0, 0.0), v(3.0, 3.0, 0.0), v(3.0, 3.0, 2.5), v(3.0, 0.0, 2.5)];
+    b.polygon(node, "wall", wall, &corners);
+    let down = [v(1.0, 1.0, 2.0), v(1.0, 2.0, 2.0), v(2.0, 2.0, 2.0), v(2.0, 1.0, 2.0)];
+    b.polygon(node, "lamp", lamp, &down);
+    let scene = Arc::new(b.build().unwrap());
+    let dark = |tolerance| {
+        let mut session = Session::new(Arc::clone(&scene), at_tolerance(tolerance)).unwrap();
+        session.step(0, 0.0).unwrap();
+        let beside = session.irradiance_at(v(3.4, 1.5, 0.0), DVec3::Z)[0];
+        [beside, session.irradiance_at(v(5.5, 1.5, 0.0), DVec3::Z)[0]]
+    };
+    let (coarse, fine) = (dark(0.1), dark(0.01));
+    for (coarse, fine) in coarse.iter().zip(fine) {
+        assert!((coarse / fine - 1.0).abs() < 0.1, "{coarse} at 0.1, {fine} at 0.01");
+    }
+}

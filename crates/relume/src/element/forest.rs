@@ -225,12 +225,13 @@ impl Forest {
             let twins = &mut forest.twins[id as usize];
             (twins.facet, twins.path) = (id, 1);
         }
+        let cuts = Cuts::new(scene);
         if !near.is_empty() {
-            forest.plant_bodies(scene, &near, 1);
+            forest.plant_bodies((scene, &cuts), &near, 1);
         }
         if !far.is_empty() {
             let first = forest.nodes.len();
-            forest.plant_bodies(scene, &far, after_lights);
+            forest.plant_bodies((scene, &cuts), &far, after_lights);
             let mut distant = vec![false; forest.nodes.len()];
             distant[after_lights as usize] = true;
             distant[first..].fill(true);
@@ -280,12 +281,11 @@ impl Forest {
         Arc::make_mut(&mut self.fixed)
     }
 
-    fn plant_bodies(&mut self, scene: &Scene, bodies: &[u32], at: u32) {
-        let cuts = Cuts::new(scene);
+    fn plant_bodies(&mut self, (scene, cuts): (&Scene, &Cuts), bodies: &[u32], at: u32) {
         let boxes: Vec<Aabb> = bodies.iter().map(|&b| box_at_start(scene, BodyId(b))).collect();
         let tree = binary_tree(&boxes);
         self.plant(&tree, 0, at, NONE, &mut |forest, leaf, id| {
-            forest.plant_body((scene, &cuts), bodies[leaf as usize], id);
+            forest.plant_body((scene, cuts), bodies[leaf as usize], id);
         });
     }
 

@@ -139,7 +139,7 @@ pub fn split_convex(corners: &[DVec2]) -> (Vec<DVec2>, Vec<DVec2>) {
                 continue;
             }
             let (one, two) = parts(corners, i, j);
-            let (a, b) = (area2(&one), area2(&two));
+            let (a, b) = (2.0 * polygon_area(&one), 2.0 * polygon_area(&two));
             // Uneven areas and long chords both cost.
             let cost = (a - b).abs() + (corners[i] - corners[j]).length_squared();
             if cost < best.0 {
@@ -155,8 +155,10 @@ fn parts(corners: &[DVec2], i: usize, j: usize) -> (Vec<DVec2>, Vec<DVec2>) {
     (corners[i..=j].to_vec(), two)
 }
 
-fn area2(corners: &[DVec2]) -> f64 {
-    (0..corners.len()).map(|i| corners[i].perp_dot(corners[(i + 1) % corners.len()])).sum()
+/// Area of a polygon by the shoelace formula, in the square of its unit; exact up to rounding.
+pub fn polygon_area(corners: &[DVec2]) -> f64 {
+    let n = corners.len();
+    (0..n).map(|i| corners[i].perp_dot(corners[(i + 1) % n])).sum::<f64>() * 0.5
 }
 
 #[cfg(test)]
@@ -179,7 +181,7 @@ mod tests {
             .map(|k| DVec2::from_angle(f64::from(k) * std::f64::consts::TAU / 32.0))
             .collect();
         let (one, two) = split_convex(&disc);
-        assert!((area2(&one) + area2(&two) - area2(&disc)).abs() < 1e-14);
-        assert!((area2(&one) / area2(&disc) - 0.5).abs() < 0.05);
+        assert!((polygon_area(&one) + polygon_area(&two) - polygon_area(&disc)).abs() < 1e-14);
+        assert!((polygon_area(&one) / polygon_area(&disc) - 0.5).abs() < 0.05);
     }
 }

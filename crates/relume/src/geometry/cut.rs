@@ -2,6 +2,8 @@
 
 use glam::DVec2;
 
+use super::polygon_area;
+
 /// A straight line on a plane, from one point to another, metres.
 pub type Segment = [DVec2; 2];
 
@@ -12,7 +14,7 @@ const LINES_MAX: usize = 256;
 const SLIVER: f64 = 1e-4;
 
 /// The part of a line within a convex polygon; `None` where there is no more than rounding, or where it runs along an
-/// edge of the polygon. `slack_m` is what rounding may amount to.
+/// edge of the polygon. `slack_m`, metres, is what rounding may amount to.
 pub fn segment_within(polygon: &[DVec2], [p, q]: Segment, slack_m: f64) -> Option<Segment> {
     let mut range = (0.0_f64, 1.0_f64);
     for (a, edge) in edges(polygon) {
@@ -33,7 +35,8 @@ pub fn segment_within(polygon: &[DVec2], [p, q]: Segment, slack_m: f64) -> Optio
 }
 
 /// The two parts of a convex polygon on both sides of the line that most of `segments` lies on, if those cover at least
-/// `share` of the polygon's chord along it.
+/// `share` of the polygon's chord along it; `None` if no line does, or if less than a ten-thousandth of the area would be
+/// cut off. `slack_m`, metres, is what rounding may amount to. Cost: the square of the lines, of which the 256 longest count.
 pub fn cut_along(
     polygon: &[DVec2],
     segments: &[Segment],
@@ -126,12 +129,6 @@ fn halves(polygon: &[DVec2], [p, q]: Segment, slack_m: f64) -> (Vec<DVec2>, Vec<
         }
     }
     (left, right)
-}
-
-/// Area of a polygon, m2.
-pub fn polygon_area(polygon: &[DVec2]) -> f64 {
-    let n = polygon.len();
-    (0..n).map(|i| polygon[i].perp_dot(polygon[(i + 1) % n])).sum::<f64>() * 0.5
 }
 
 #[cfg(test)]

@@ -8,8 +8,8 @@ mod cut;
 mod pose;
 
 pub use bounds::{Aabb, ShaftOfBoxes, shaft_meets_box};
-pub use convex::{ConvexPolygon, Plane, split_convex};
-pub use cut::{Segment, cut_along, polygon_area, segment_within};
+pub use convex::{ConvexPolygon, Plane, polygon_area, split_convex};
+pub use cut::{Segment, cut_along, segment_within};
 pub use pose::Pose;
 
 /// How far apart equal areas may be for rounding, relative: files hold corners in single precision.

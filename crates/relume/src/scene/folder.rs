@@ -3,7 +3,7 @@
 //! Must not know what is in them.
 
 use std::io::Read;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::SceneError;
 
@@ -16,6 +16,23 @@ pub(super) struct Folder {
     pub(super) allow_outside: bool,
     /// Bytes that a file may need by itself.
     pub(super) max_memory_bytes: Option<u64>,
+}
+
+/// The bytes of a scene file and its name without ending, if they fit into so many bytes.
+pub(super) fn read_scene(
+    path: &Path,
+    max_memory_bytes: Option<u64>,
+) -> Result<(Vec<u8>, String), SceneError> {
+    let file = path.display().to_string();
+    // What cannot be measured cannot be read either.
+    let length = std::fs::metadata(path).map_or(0, |m| m.len());
+    SceneError::unless_fits(&file, "the file", length, max_memory_bytes)?;
+    let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
+        file: file.clone(),
+        source,
+        remedy: "check the path and its permissions".into(),
+    })?;
+    Ok((bytes, path.file_stem().map_or(file, |s| s.to_string_lossy().into_owned())))
 }
 
 impl Folder {

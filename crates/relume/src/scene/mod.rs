@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use crate::geometry::Pose;
+use crate::geometry::{Pose, polygon_area};
 
 mod assemble;
 mod builder;
@@ -361,8 +361,7 @@ impl Scene {
 impl Patch {
     /// Area by the shoelace formula, m2; exact up to rounding.
     pub fn area_m2(&self) -> f64 {
-        let n = self.corners.len();
-        (0..n).map(|i| self.corners[i].perp_dot(self.corners[(i + 1) % n])).sum::<f64>() / 2.0
+        polygon_area(&self.corners)
     }
 
     /// A bound on the form factor from a point of the scene around `centre` to this patch, if it is distant: its area

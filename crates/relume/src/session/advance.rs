@@ -82,11 +82,11 @@ impl Session {
 
         let mut dirty = self.edit_links(&mut solved, &changes, cold, &mut report);
         if let Dirty::Some { parents, .. } = &mut dirty {
-            parents.extend(self.came_or_went(&solved, &old));
+            let facets = solved.forest.near_facets();
+            parents.extend(self.came_or_went(&solved, &old, facets));
             if relit {
-                parents.extend(self.relit_facets(&solved, from_s));
+                parents.extend(self.relit_facets(&solved, from_s, facets));
             }
-            parents.retain(|&facet| solved.forest.receives(ElementId(facet)));
         }
         let lights = &self.scene.lights;
         let relights = lights.iter().any(|light| light.is_relit([from_s, time_s]))
@@ -318,26 +318,26 @@ impl Session {
         }
     }
 
-    /// Facets of bodies that appeared or vanished since `old`: what they emit did too.
-    fn came_or_went(&self, solved: &Solved, old: &WorldView) -> Vec<u32> {
+    /// Those of some facets whose bodies appeared or vanished since `old`: what they emit did too.
+    fn came_or_went(&self, solved: &Solved, old: &WorldView, of: &[ElementId]) -> Vec<u32> {
         let forest = &solved.forest;
         let toggled = |facet: &&ElementId| {
             let patch = forest.patch(**facet).expect("a facet has a patch");
             let body = solved.view.patch(patch).body;
             solved.view.is_present(body) != old.is_present(body)
         };
-        forest.facets().iter().filter(toggled).map(|f| f.0).collect()
+        of.iter().filter(toggled).map(|f| f.0).collect()
     }
 
     /// Whether what is distant emits otherwise than at `from_s`, or came or went since `old`.
     fn outside_differs(&self, solved: &Solved, old: &WorldView, from_s: f64) -> bool {
-        let distant = |id: &u32| solved.forest.is_distant(ElementId(*id));
-        self.came_or_went(solved, old).iter().any(distant)
-            || self.relit_facets(solved, from_s).iter().any(distant)
+        let distant = solved.forest.distant_facets();
+        !self.came_or_went(solved, old, distant).is_empty()
+            || !self.relit_facets(solved, from_s, distant).is_empty()
     }
 
-    /// Facets that emit otherwise than at `from_s`.
-    fn relit_facets(&self, solved: &Solved, from_s: f64) -> Vec<u32> {
+    /// Those of some facets that emit otherwise than at `from_s`.
+    fn relit_facets(&self, solved: &Solved, from_s: f64, of: &[ElementId]) -> Vec<u32> {
         let forest = &solved.forest;
         let times = [from_s, solved.time_s];
         let relit: Vec<bool> = self.scene.materials.iter().map(|m| m.is_relit(times)).collect();
@@ -345,7 +345,7 @@ impl Session {
             let patch = forest.patch(**facet).expect("a facet has a patch");
             relit[self.scene.patches[patch.0 as usize].material.0 as usize]
         };
-        forest.facets().iter().filter(is_relit).map(|f| f.0).collect()
+        of.iter().filter(is_relit).map(|f| f.0).collect()
     }
 
     /// The coarse solution, where there is one; else exitances.

@@ -14,7 +14,8 @@ use super::Options;
 /// Pairs of patches that are tried at most: of more, an even share.
 const TRIED: u64 = 4_000_000;
 
-/// How much there is to solve in one frame from scratch: ranges from low to high, rough; scenes were met that are outside.
+/// How much there is to solve in one frame from scratch: rough ranges from low to high, which do not hold every
+/// scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// Patches that are present.
@@ -178,7 +179,6 @@ mod tests {
         let share = count_facing(&placed, 1e-9, 1_000);
         let off = share as f64 / whole as f64 - 1.0;
         assert!(whole > 1_000 && off.abs() < 0.15, "{share} of {whole}");
-        // Two crates side by side: one side of each.
         assert_eq!(count_facing(&placed[0..0], 1e-9, 10), 0);
     }
 

@@ -22,8 +22,8 @@ pub struct Snapshot {
     pub scene: Arc<Scene>,
     /// Time in the animation, seconds.
     pub time_s: f64,
-    /// What radiosities may be off by where little light arrives, W/m2: errors there are kept to the tolerance of a
-    /// tenth of the mean irradiance, not of their own. What is darker than this the solution does not tell.
+    /// What radiosities may be off by where little light arrives, W/m2: a share of the tolerance times the mean irradiance,
+    /// rough. Pictures show nothing darker than this.
     pub error_w_m2: f64,
     /// World pose of each body, `None` while absent; indexed by `BodyId`.
     pub poses: Vec<Option<Pose>>,
@@ -104,8 +104,7 @@ impl Snapshot {
     }
 }
 
-/// Share of the tolerance, relative to the mean irradiance, below which a picture shows nothing but the errors of a solution: that of
-/// dark places is smaller than the oracle allows elsewhere.
+/// Error of a solution in dark places, in tolerances of the mean irradiance. Not calibrated.
 const VISIBLE: f64 = 0.05;
 
 /// The leaves of a solved forest with a solution over it.

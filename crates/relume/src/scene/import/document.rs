@@ -8,7 +8,7 @@ use std::path::Path;
 use super::draco::Streams;
 use super::{ImportOptions, base64, json};
 use crate::scene::SceneError;
-use crate::scene::folder::Folder;
+use crate::scene::folder::{Folder, read_scene};
 
 /// Extensions that may be required: handled, or without effect on diffuse light.
 const KNOWN: [&str; 26] = [
@@ -57,14 +57,7 @@ impl Document {
     /// Reads the file and checks that it is glTF 2.0 and needs nothing that is not supported.
     pub(super) fn open(path: &Path, options: &ImportOptions) -> Result<Document, SceneError> {
         let file = path.display().to_string();
-        // What cannot be measured cannot be read either.
-        let length = std::fs::metadata(path).map_or(0, |m| m.len());
-        SceneError::unless_fits(&file, "the file", length, options.max_memory_bytes)?;
-        let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
-            file: file.clone(),
-            source,
-            remedy: "check the path; scenes are .glb or .gltf files".into(),
-        })?;
+        let (bytes, _) = read_scene(path, options.max_memory_bytes)?;
         let (text, binary) = split_glb(&file, bytes)?;
         let mut root = parse(&file, &text)?;
         let streams = Streams::of(&mut root);

@@ -9,7 +9,7 @@ use glam::{DQuat, DVec3};
 
 use super::assemble::assemble;
 use super::draft::{Draft, DraftNode, DraftSurface};
-use super::folder::Folder;
+use super::folder::{Folder, read_scene};
 use super::import::ImportOptions;
 use super::merge::merge;
 use super::{Material, MaterialId, Note, Scene, SceneError, Severity};
@@ -86,22 +86,13 @@ pub(super) fn import(
     format: Format,
     options: &ImportOptions,
 ) -> Result<Scene, SceneError> {
-    let file = path.display().to_string();
     let folder = Folder {
-        file: file.clone(),
+        file: path.display().to_string(),
         directory: path.parent().unwrap_or(Path::new("")).to_owned(),
         allow_outside: options.allow_outside,
         max_memory_bytes: options.max_memory_bytes,
     };
-    // What cannot be measured cannot be read either.
-    let length = std::fs::metadata(path).map_or(0, |m| m.len());
-    SceneError::unless_fits(&file, "the file", length, options.max_memory_bytes)?;
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
-        file: file.clone(),
-        source,
-        remedy: "check the path and its permissions".into(),
-    })?;
-    let stem = path.file_stem().map_or_else(|| file.clone(), |s| s.to_string_lossy().into_owned());
+    let (bytes, stem) = read_scene(path, options.max_memory_bytes)?;
     let contents = match format {
         Format::Obj => obj::read(&bytes, &stem, &folder),
         Format::Stl => stl::read(bytes, &stem, &folder),

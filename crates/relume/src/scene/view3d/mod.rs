@@ -11,6 +11,7 @@ use glam::{DQuat, DVec3};
 use super::assemble::assemble;
 use super::draft::{Draft, DraftNode, DraftSurface};
 use super::flatten::{Flaw, flatten};
+use super::folder::read_scene;
 use super::names::Names;
 use super::{
     Edits, ImportOptions, Material, MaterialId, Note, Scene, SceneError, Severity, SurfaceId,
@@ -40,15 +41,7 @@ pub(super) fn is_view3d(path: &Path) -> bool {
 /// What View3D would not take either, and masking surfaces: with the line and the remedy.
 pub(super) fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError> {
     let file = path.display().to_string();
-    // What cannot be measured cannot be read either.
-    let length = std::fs::metadata(path).map_or(0, |m| m.len());
-    SceneError::unless_fits(&file, "the file", length, options.max_memory_bytes)?;
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
-        file: file.clone(),
-        source,
-        remedy: "check the path and its permissions".into(),
-    })?;
-    let stem = path.file_stem().map_or_else(|| file.clone(), |s| s.to_string_lossy().into_owned());
+    let (bytes, stem) = read_scene(path, options.max_memory_bytes)?;
     scene(&stem, &String::from_utf8_lossy(&bytes), &options.edits).map_err(|error| match error {
         Refused::Text(Wrong { line, what, remedy }) => {
             SceneError::View3d { file, line, what, remedy }

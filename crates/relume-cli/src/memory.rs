@@ -63,7 +63,11 @@ pub(crate) fn limit_bytes() -> Option<u64> {
 
 /// The limit for one of several, bytes, where the others hold so many.
 pub(crate) fn left_beside(bytes: u64) -> Option<u64> {
-    limit_bytes().map(|limit| limit.saturating_sub(bytes))
+    left_of(limit_bytes(), bytes)
+}
+
+fn left_of(limit_bytes: Option<u64>, others_bytes: u64) -> Option<u64> {
+    limit_bytes.map(|limit| limit.saturating_sub(others_bytes))
 }
 
 /// Says what is under way: `frame 3`, ``reading `room.glb` ``.
@@ -134,6 +138,13 @@ fn status(name: &str) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sessions_side_by_side_have_one_limit() {
+        assert_eq!(left_of(None, 7), None);
+        assert_eq!(left_of(Some(10), 7), Some(3));
+        assert_eq!(left_of(Some(10), 12), Some(0));
+    }
 
     #[cfg(target_os = "linux")]
     #[test]

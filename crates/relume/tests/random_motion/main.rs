@@ -6,6 +6,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod judge;
+mod pinned;
 mod recipe;
 
 use std::ops::Range;

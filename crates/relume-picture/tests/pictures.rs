@@ -4,7 +4,7 @@ mod common;
 
 use common::*;
 use glam::{DQuat, DVec2, DVec3};
-use relume::scene::Projection;
+use relume::scene::{BodyId, Held, Projection};
 use relume_picture::picture::{
     Exposure, Image, Metered, Settings, Shading, Tone, View, Viewpoint, render,
 };
@@ -182,7 +182,8 @@ fn the_bits_do_not_depend_on_threads_or_repetition() {
 fn a_body_may_be_absent_and_a_scene_empty() {
     let scene = room(&[]);
     let mut snapshot = snapshot(&scene, uneven, |_, _, _| GREY);
-    snapshot.poses = vec![None; 2];
+    let hidden = (0..2).map(|body| (BodyId(body), false)).collect();
+    snapshot.world = scene.at_but(0.0, &Held { presence: hidden, ..Held::default() });
     let view = View::automatic(&scene);
     let image =
         render(&snapshot, &view, &Settings { background: [0.0, 1.0, 0.0], ..Settings::default() });

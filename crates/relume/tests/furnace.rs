@@ -66,7 +66,7 @@ fn off_in(snapshot: &Snapshot, counts: impl Fn(&str, DVec3) -> bool) -> Off {
     let (mut total, mut squares, mut first) = (0.0, 0.0, 0.0);
     for (k, patch) in snapshot.scene.patches.iter().enumerate() {
         let surface = &snapshot.scene.surfaces[patch.surface.0 as usize].name;
-        let pose = snapshot.poses[patch.body.0 as usize].unwrap();
+        let pose = snapshot.world.pose(patch.body).unwrap();
         if !counts(surface, pose.direction(patch.frame.normal)) {
             continue;
         }

@@ -134,7 +134,7 @@ fn farthest(snapshot: &Snapshot, eye: DVec3) -> f64 {
     let mut far = 0.0_f64;
     let near = |patch: &&Patch| !snapshot.scene.is_distant(patch.body);
     for patch in snapshot.scene.patches.iter().filter(near) {
-        if let Some(pose) = snapshot.poses[patch.body.0 as usize] {
+        if let Some(pose) = snapshot.world.pose(patch.body) {
             far = patch.corners_in_body().fold(far, |far, p| far.max(pose.point(p).distance(eye)));
         }
     }
@@ -158,7 +158,7 @@ impl PatchDrawing {
         outlines: bool,
     ) -> Option<PatchDrawing> {
         let patch = &snapshot.scene.patches[id.0 as usize];
-        let pose = snapshot.poses[patch.body.0 as usize]?;
+        let pose = snapshot.world.pose(patch.body)?;
         if snapshot.scene.is_distant(patch.body) {
             return None;
         }

@@ -109,7 +109,7 @@ fn visible_radiances(snapshot: &Snapshot, view: &View) -> Vec<Option<(f64, bool)
     let drawing = Drawing::new(snapshot, &projector, &grid, Shading::Flat, false);
     let emits = |patch: PatchId| {
         let scene = &snapshot.scene;
-        let now = scene.exitance_at(&scene.patches[patch.0 as usize], snapshot.time_s);
+        let now = snapshot.world.exitance(scene, &scene.patches[patch.0 as usize]);
         now.iter().any(|&m| m > 0.0)
     };
     rasterise(&grid, &drawing.primitives, |fragments| {

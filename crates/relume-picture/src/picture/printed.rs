@@ -30,16 +30,19 @@ const BLACK: f64 = 1e-6;
 impl Shown {
     /// `None` for a patch that looks the same everywhere.
     pub(super) fn new(snapshot: &Snapshot, id: PatchId, plane: SeenPlane) -> Option<Shown> {
-        let scene = &snapshot.scene;
+        let (scene, now) = (&snapshot.scene, &snapshot.world);
         let patch = &scene.patches[id.0 as usize];
+        if now.reflectance(scene, patch) != scene.reflectance(patch) {
+            // A reflectance by hand is in place of the texture.
+            return None;
+        }
         Some(Shown {
             print: patch.print.clone()?,
             plane,
             frame: patch.frame,
             reflectance: scene.reflectance(patch),
-            exitance: scene.exitance_at(patch, snapshot.time_s),
-            exitance_of_white: scene.materials[patch.material.0 as usize]
-                .exitance_at(snapshot.time_s),
+            exitance: now.exitance(scene, patch),
+            exitance_of_white: now.material_exitance(patch.material),
         })
     }
 

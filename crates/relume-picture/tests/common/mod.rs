@@ -189,12 +189,11 @@ pub(crate) fn snapshot(
     refine: impl Fn(DVec3, f64, u32) -> bool,
     radiosity: impl Fn(DVec3, DVec3, &Material) -> [f32; 3],
 ) -> Snapshot {
-    let poses: Vec<_> =
-        (0..scene.bodies.len()).map(|b| scene.pose(BodyId(b as u32), 0.0)).collect();
+    let world = scene.at(0.0);
     let mut leaves = Vec::new();
     let mut leaf_offsets = vec![0];
     for patch in &scene.patches {
-        let pose = poses[patch.body.0 as usize].expect("present");
+        let pose = world.pose(patch.body).expect("present");
         let mut stack: Vec<([DVec2; 4], u32)> = match patch.corners[..] {
             [a, b, c, d] => vec![([a, b, c, d], 0)],
             [a, b, c] => vec![([a, b, c, c], 0)],
@@ -224,7 +223,7 @@ pub(crate) fn snapshot(
         leaf_offsets.push(leaves.len() as u32);
     }
     let scene = Arc::new(scene.clone());
-    Snapshot { scene, time_s: 0.0, error_w_m2: 0.0, poses, leaves, leaf_offsets }
+    Snapshot { scene, time_s: 0.0, error_w_m2: 0.0, world, leaves, leaf_offsets }
 }
 
 /// Splits unevenly, so that there are T-vertices everywhere.

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::forest::{ElementId, Forest, Kind};
 use super::split::{Shape, bilinear};
 use crate::geometry::{Aabb, Plane, Pose};
-use crate::scene::{BodyId, Frame, Light, LightKind, PatchId, Scene};
+use crate::scene::{BodyId, Frame, Light, LightId, LightKind, PatchId, Scene, World};
 
 /// Relative rounding of what files hold: coordinates in single precision.
 const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
@@ -102,10 +102,9 @@ impl Occluders {
 }
 
 impl WorldView {
-    /// The scene at `time_s`. Cost: proportional to the patches.
-    pub fn new(scene: &Scene, forest: &Forest, time_s: f64) -> WorldView {
-        let poses: Vec<Option<Pose>> =
-            (0..scene.bodies.len()).map(|b| scene.pose(BodyId(b as u32), time_s)).collect();
+    /// The scene as it is in a world. Cost: proportional to the patches.
+    pub fn new(scene: &Scene, forest: &Forest, now: &World) -> WorldView {
+        let poses = now.poses().to_vec();
         let is_distant = |p: &crate::scene::Patch| scene.is_distant(p.body);
         let patches = scene.patches.iter().map(|p| world_patch(p, &poses, is_distant(p))).collect();
         let still = vec![Some(Pose::IDENTITY); poses.len()];
@@ -121,16 +120,19 @@ impl WorldView {
             local_boxes: self::boxes(forest, &still, &local, scene),
             world,
             local,
-            lights: scene.lights.iter().map(|l| world_light(scene, l, time_s)).collect(),
+            lights: (0..)
+                .zip(&scene.lights)
+                .map(|(k, l)| world_light(l, now.light_pose(LightId(k))))
+                .collect(),
             present: poses.iter().map(Option::is_some).collect(),
             hidden_twin: hidden_twins(scene),
             poses,
         }
     }
 
-    /// A punctual light at `time_s`, `None` while absent.
-    pub fn light_at(scene: &Scene, light: &Light, time_s: f64) -> Option<WorldLight> {
-        world_light(scene, light, time_s)
+    /// A punctual light in a world, `None` while absent.
+    pub fn light_in(scene: &Scene, now: &World, light: LightId) -> Option<WorldLight> {
+        world_light(&scene.lights[light.0 as usize], now.light_pose(light))
     }
 
     /// World pose of each body, `None` while absent.
@@ -254,8 +256,8 @@ fn world_patch(
     }
 }
 
-fn world_light(scene: &Scene, light: &Light, time_s: f64) -> Option<WorldLight> {
-    let pose = scene.motion.pose(light.node, time_s)?;
+fn world_light(light: &Light, pose: Option<Pose>) -> Option<WorldLight> {
+    let pose = pose?;
     Some(WorldLight {
         position: pose.translation,
         direction: pose.direction(DVec3::NEG_Z),

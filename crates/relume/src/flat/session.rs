@@ -8,7 +8,7 @@ use crate::event::Ticks;
 use crate::pair::{Carried, LinkEvent, OutOfMemory, PairHash, PairTree, Record, update};
 use crate::session::{
     Ahead, Clock, ElementName, Event, FrameReport, Memory, PairCounts, Receivers, Solution, Update,
-    apply_edits, balance_of, budget, links_of, most_mean, while_extrapolated, with_names,
+    Void, apply_edits, balance_of, budget, links_of, most_mean, while_extrapolated, with_names,
 };
 use crate::solver::{Dirty, Links, Lit, Place, Radiosity, Surfaces};
 
@@ -229,7 +229,9 @@ impl FlatSession {
         let clocked = (&mut solved.ticks, &mut solved.tree);
         let ahead = match cold {
             true => Ahead::default(),
-            false => Ahead::new(self.options.update, &*self.scene, clocked, times_s, false),
+            false => {
+                Ahead::new(self.options.update, &*self.scene, clocked, times_s, Void::default())
+            }
         };
         let extrapolates = ahead.lookahead.is_some();
         report.seconds.predict = clock.lap();

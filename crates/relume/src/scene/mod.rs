@@ -43,6 +43,7 @@ mod tint;
 mod topology;
 mod view3d;
 mod weld;
+mod world;
 
 pub use builder::SceneBuilder;
 pub use check::check;
@@ -56,6 +57,7 @@ pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
 pub use print::{Print, Printed};
 pub use solid::{Enclosure, Solid, SolidEdge, SolidFace, Solids};
 pub use tint::Tint;
+pub use world::{Held, World};
 
 /// Index of a [`Body`] in [`Scene::bodies`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -76,6 +78,10 @@ pub struct SurfaceId(pub u32);
 /// Index of a [`Tint`] in [`Scene::tints`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TintId(pub u32);
+
+/// Index of a [`Light`] in [`Scene::lights`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct LightId(pub u32);
 
 /// Everything that is lit, as read and validated. Immutable.
 #[derive(Clone, Debug)]
@@ -308,9 +314,18 @@ impl Scene {
     /// The smallest and largest world coordinates of all patches present at `time_s`, distant ones aside, metres;
     /// `None` while none is.
     pub fn bounds(&self, time_s: f64) -> Option<(DVec3, DVec3)> {
+        self.bounds_of(|body| self.pose(body, time_s))
+    }
+
+    /// The same of those that are present in a world.
+    pub fn bounds_in(&self, now: &World) -> Option<(DVec3, DVec3)> {
+        self.bounds_of(|body| now.pose(body))
+    }
+
+    fn bounds_of(&self, pose: impl Fn(BodyId) -> Option<Pose>) -> Option<(DVec3, DVec3)> {
         let mut bounds: Option<(DVec3, DVec3)> = None;
         for body in (0..self.bodies.len() as u32).map(BodyId).filter(|&b| !self.is_distant(b)) {
-            let Some(pose) = self.pose(body, time_s) else { continue };
+            let Some(pose) = pose(body) else { continue };
             for point in self.patches_of(body).flat_map(|(_, p)| p.corners_in_body()) {
                 let p = pose.point(point);
                 bounds = Some(bounds.map_or((p, p), |(min, max)| (min.min(p), max.max(p))));

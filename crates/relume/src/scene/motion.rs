@@ -94,6 +94,13 @@ impl Motion {
         self.upward(node).fold(Pose::IDENTITY, |pose, n| n.local_pose(time_s) * pose)
     }
 
+    /// Where a node is in the frame of one above it.
+    pub(super) fn place_on(&self, above: NodeId, node: NodeId, time_s: f64) -> Pose {
+        let between = self.ids_upward(node).take_while(|&id| id != above);
+        let locals = between.map(|id| self.nodes[id.0 as usize].local_pose(time_s));
+        locals.fold(Pose::IDENTITY, |pose, local| local * pose)
+    }
+
     /// The times between which anything moves: nothing does before the first and after the last.
     pub(super) fn span_s(&self) -> [f64; 2] {
         let slides = self.nodes.iter().filter_map(|n| n.translation_track.as_ref());
@@ -104,8 +111,12 @@ impl Motion {
 
     /// The node, its parent, and so on up to the root.
     pub(super) fn upward(&self, node: NodeId) -> impl Iterator<Item = &Node> + '_ {
-        let get = |id: NodeId| &self.nodes[id.0 as usize];
-        std::iter::successors(Some(get(node)), move |n| n.parent.map(get))
+        self.ids_upward(node).map(|id| &self.nodes[id.0 as usize])
+    }
+
+    /// The ids of these.
+    pub(super) fn ids_upward(&self, node: NodeId) -> impl Iterator<Item = NodeId> + '_ {
+        std::iter::successors(Some(node), |n| self.nodes[n.0 as usize].parent)
     }
 
     /// Whether the node or one of its ancestors is animated.

@@ -9,44 +9,35 @@ use crate::event::Ticks;
 use crate::pair::{
     Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Record, Since, Stage, update,
 };
-use crate::scene::{self, BodyId, LightKind};
+use crate::scene::{self, BodyId, LightId, LightKind, World};
 use crate::solver::{Dirty, Links, Radiosity};
 
-use super::ahead::{Ahead, most_mean, while_extrapolated};
+use super::ahead::{Ahead, Void, most_mean, while_extrapolated};
 use super::budget;
 use super::coarse::{self, Coarse};
+use super::promise::Promise;
 use super::report::FrameReport;
 use super::surfaces::{LitForest, apply_edits, links_of};
-use super::{Clock, FOLLOWED_SHARE, RESIDUAL_SHARE, Session, SessionError, Solved, tally};
+use super::{Clock, FOLLOWED_SHARE, Next, RESIDUAL_SHARE, Session, SessionError, Solved, tally};
 
 impl Session {
-    /// Whether nothing at all differs between the last state and this time.
-    pub(super) fn is_still(&self, last: &Solved, time_s: f64) -> bool {
-        let bodies = (0..self.scene.bodies.len())
-            .all(|b| last.view.poses()[b] == self.scene.pose(BodyId(b as u32), time_s));
-        bodies
-            && !self.scene.is_relit([last.time_s, time_s])
-            && self.scene.lights.iter().enumerate().all(|(k, light)| {
-                last.view.light(k) == WorldView::light_at(&self.scene, light, time_s).as_ref()
-            })
-    }
-
-    /// The state at `report.time_s`, from the last one if there is one. `from` is the time that
-    /// dynamic links are counted from where there is none.
+    /// The state in a world, from the last one if there is one.
     pub(super) fn advance(
         &self,
         last: Option<Solved>,
-        from: Option<f64>,
+        next: &Next,
         mut report: FrameReport,
     ) -> Result<Solved, SessionError> {
         let mut clock = Clock::start();
-        let (time_s, frame) = (report.time_s, report.frame);
         let cold = last.is_none();
-        let mut solved = last.unwrap_or_else(|| self.blank(time_s));
-        let view = WorldView::new(&self.scene, &solved.forest, time_s);
+        let mut solved = last.unwrap_or_else(|| self.blank(next));
+        let now = &next.world;
+        let view = WorldView::new(&self.scene, &solved.forest, now);
         let old = std::mem::replace(&mut solved.view, view);
-        let from_s = std::mem::replace(&mut solved.time_s, time_s);
-        let relit = cold || self.scene.is_relit([from_s, time_s]);
+        let before = std::mem::replace(&mut solved.world, now.clone());
+        let from_s = std::mem::replace(&mut solved.time_s, next.time_s);
+        let held = std::mem::replace(&mut solved.held, self.held.clone());
+        let relit = cold || now.any_relit(&before);
         let mut since =
             (!cold).then(|| Since::new(&self.scene, &solved.forest, &old, &solved.view));
         report.seconds.moving = clock.lap();
@@ -54,10 +45,13 @@ impl Session {
             true => Ahead::default(),
             false => Ahead::new(
                 self.options.update,
-                &*self.scene,
+                &Promise { scene: &self.scene, held: &self.held },
                 (&mut solved.ticks, &mut solved.tree),
-                [from_s, time_s],
-                old.far_m() != solved.view.far_m(),
+                [from_s, next.time_s],
+                Void {
+                    rounding: old.far_m() != solved.view.far_m(),
+                    promise: !held.promises_as(&self.held),
+                },
             ),
         };
         report.seconds.predict = clock.lap();
@@ -66,7 +60,7 @@ impl Session {
         let bring = |solved: &mut Solved, since: Option<&Since<'_>>, level, fresh: &[PairId]| {
             let record = Record { edits: !cold, events: !cold && self.options.events };
             let found = self.update(solved, (since, &ahead), level, (record, fresh));
-            found.map_err(|OutOfMemory| self.too_large(solved, frame))
+            found.map_err(|OutOfMemory| self.too_large(solved, next.frame))
         };
         if !self.coarse_ids.is_empty() {
             changes = bring(&mut solved, since.as_ref(), Level::Coarse, &[])?;
@@ -85,56 +79,52 @@ impl Session {
             let facets = solved.forest.near_facets();
             parents.extend(self.came_or_went(&solved, &old, facets));
             if relit {
-                parents.extend(self.relit_facets(&solved, from_s, facets));
+                parents.extend(self.relit_facets(&solved, &before, facets));
             }
         }
-        let lights = &self.scene.lights;
-        let relights = lights.iter().any(|light| light.is_relit([from_s, time_s]))
-            || self.outside_differs(&solved, &old, from_s);
+        let relights = now.lights_differ(&before) || self.outside_differs(&solved, &old, &before);
         if relights {
             // Whoever gathers from a light, or from outside, gathers anew: neither knows who that is.
             dirty = Dirty::All;
         }
         report.seconds.judge = clock.lap();
 
-        let lit = LitForest::new(&self.scene, &solved.forest, time_s).present_in(&solved.view);
+        let lit = LitForest::new(&self.scene, &solved.forest, now).present_in(&solved.view);
         if relights {
-            let at = (&*self.scene, time_s);
-            coarse::set_sources(at, (&solved.forest, &lit), &mut solved.radiosity);
+            coarse::set_sources(now, (&solved.forest, &lit), &mut solved.radiosity);
         }
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
         let share = if cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE };
         let residual = self.options.tolerance * share;
-        let shines = |(k, light): (usize, &scene::Light)| {
-            solved.view.light(k).is_some() && light.intensity_at(time_s).iter().any(|&i| i > 0.0)
+        let shines = |&light: &LightId| {
+            now.light_pose(light).is_some() && now.intensity(light).iter().any(|&i| i > 0.0)
         };
-        let lamps = self.scene.lights.iter().enumerate().any(shines);
+        let lamps = (0..self.scene.lights.len() as u32).map(LightId).any(|light| shines(&light));
         if lit.is_dark() && !lamps {
             // What is left of earlier light would fade for ever.
-            let none = (&*self.scene, time_s);
-            solved.radiosity = coarse::start(none, &solved.forest, &lit);
+            solved.radiosity = coarse::start(now, &solved.forest, &lit);
         } else if solved.is_settled() {
-            let bound = (residual, most_mean(self.most_mean_w_m2()));
+            let bound = (residual, most_mean(self.most_mean_w_m2(now)));
             solved.radiosity.solve_bounded(&lit, &solved.links, dirty, bound);
             if !solved.radiosity.has_settled() {
                 return Err(SessionError::Unsettled {
-                    frame,
+                    frame: next.frame,
                     residual: solved.radiosity.residual,
                     surfaces: tally::suspects(&self.scene, &solved),
                 });
             }
         } else {
-            let brightened = self.brightened(solved.sound_time_s, time_s);
+            let brightened = self.brightened(&solved.sound_world, now);
             // From nothing on, no growth is too much.
             let mean = solved.sound_mean_w_m2 * brightened;
             let mean = if mean > 0.0 { mean } else { f64::INFINITY };
-            let stop = while_extrapolated(residual, mean, self.most_mean_w_m2());
+            let stop = while_extrapolated(residual, mean, self.most_mean_w_m2(now));
             solved.radiosity.solve(&lit, &solved.links, dirty, stop);
         }
         report.seconds.solve = clock.lap();
         if solved.is_settled() {
             solved.sound_mean_w_m2 = solved.radiosity.mean_w_m2(&lit);
-            solved.sound_time_s = time_s;
+            solved.sound_world = now.clone();
         }
         solved.compact();
 
@@ -146,10 +136,11 @@ impl Session {
             let most = self.unbalanced_max();
             if solved.is_settled() && (share > most || share.is_nan()) {
                 let surfaces = tally::suspects(&self.scene, &solved);
-                return Err(SessionError::Unbalanced { frame, share, surfaces });
+                return Err(SessionError::Unbalanced { frame: next.frame, share, surfaces });
             }
         }
         if cold {
+            let from = next.from.as_ref();
             report.dynamic_links = from.map_or(0, |from| self.dynamic_links(&solved, from));
         }
         report.seconds.total = clock.total();
@@ -165,26 +156,31 @@ impl Session {
         }
     }
 
-    /// A bound on the mean radiosity of the scene at any time: all that can be emitted, over what is
+    /// A bound on the mean radiosity in a world and at any time of the clip: all that can be emitted, over what is
     /// absorbed at least.
-    fn most_mean_w_m2(&self) -> f64 {
+    fn most_mean_w_m2(&self, now: &World) -> f64 {
         let scene = &self.scene;
-        let rho = scene.patches.iter().flat_map(|p| scene.reflectance(p)).fold(0.0, f64::max);
-        let emitted_w = self.emitted_w(|p| scene.most_exitance(p), scene::Light::most_intensity);
+        let rho = scene.patches.iter().flat_map(|p| now.reflectance(scene, p)).fold(0.0, f64::max);
+        let most = |one: [f64; 3], other: [f64; 3]| [0, 1, 2].map(|c| one[c].max(other[c]));
+        let emitted_w = self.emitted_w(
+            |p| most(scene.most_exitance(p), now.exitance(scene, p)),
+            |k| most(scene.lights[k.0 as usize].most_intensity(), now.intensity(k)),
+        );
         emitted_w / self.scene.area_m2() / (1.0 - rho)
     }
 
-    /// How many times as much the scene emits now as at another time, present or not.
-    fn brightened(&self, since_s: f64, now_s: f64) -> f64 {
-        let at = |t: f64| self.emitted_w(|p| self.scene.exitance_at(p, t), |l| l.intensity_at(t));
-        if self.scene.is_relit([since_s, now_s]) { at(now_s) / at(since_s) } else { 1.0 }
+    /// How many times as much the scene emits in a world as in another, present or not.
+    fn brightened(&self, since: &World, now: &World) -> f64 {
+        let emitted_w =
+            |w: &World| self.emitted_w(|p| w.exitance(&self.scene, p), |k| w.intensity(k));
+        if now.any_relit(since) { emitted_w(now) / emitted_w(since) } else { 1.0 }
     }
 
     /// What all surfaces and lights emit, W, with given exitances and intensities.
     fn emitted_w(
         &self,
         exitance: impl Fn(&scene::Patch) -> [f64; 3],
-        intensity: impl Fn(&scene::Light) -> [f64; 3],
+        intensity: impl Fn(LightId) -> [f64; 3],
     ) -> f64 {
         let scene = &self.scene;
         let mean = |c: [f64; 3]| c.iter().sum::<f64>() / 3.0;
@@ -198,22 +194,24 @@ impl Session {
             let exitance = mean(exitance(p));
             exitance * if scene.is_distant(p.body) { factor(p) * area_m2 } else { p.area_m2() }
         };
-        let of_light = |light: &scene::Light| {
-            let spread = match light.kind {
+        let of_light = |k: u32| {
+            let spread = match scene.lights[k as usize].kind {
                 LightKind::Directional => area_m2,
                 LightKind::Point | LightKind::Spot { .. } => 4.0 * std::f64::consts::PI,
             };
-            mean(intensity(light)) * spread
+            mean(intensity(LightId(k))) * spread
         };
-        scene.patches.iter().map(of_patch).chain(scene.lights.iter().map(of_light)).sum()
+        scene.patches.iter().map(of_patch).chain((0..scene.lights.len() as u32).map(of_light)).sum()
     }
 
     /// Nothing but the seed and an unjudged root.
-    fn blank(&self, time_s: f64) -> Solved {
+    fn blank(&self, next: &Next) -> Solved {
         Solved {
-            time_s,
+            time_s: next.time_s,
+            world: next.world.clone(),
+            held: self.held.clone(),
             forest: self.seed.clone(),
-            view: WorldView::new(&self.scene, &self.seed, time_s),
+            view: WorldView::new(&self.scene, &self.seed, &next.world),
             ticks: Ticks::default(),
             tree: PairTree::new(Forest::ROOT),
             hash: PairHash::default(),
@@ -221,7 +219,7 @@ impl Session {
             coarse: Coarse::default(),
             radiosity: Radiosity::default(),
             sound_mean_w_m2: 0.0,
-            sound_time_s: time_s,
+            sound_world: next.world.clone(),
             events: Vec::new(),
             report: FrameReport::default(),
         }
@@ -269,7 +267,7 @@ impl Session {
             return;
         }
         let before = std::mem::take(&mut solved.coarse.brightness);
-        let lit = (&*self.scene, solved.time_s);
+        let lit = (&*self.scene, &solved.world);
         solved.coarse.solve(lit, &self.seed, &self.coarse_ids);
         if let Some(since) = since {
             let (shifts, of_lights) = solved.coarse.brightness.shifts(&before);
@@ -297,7 +295,7 @@ impl Session {
             Some(receivers)
         };
         let split = solved.forest.take_changed();
-        let lit = LitForest::new(&self.scene, &solved.forest, solved.time_s);
+        let lit = LitForest::new(&self.scene, &solved.forest, &solved.world);
         let lit = lit.present_in(&solved.view);
         if cold {
             solved.radiosity = self.first_guess(solved, &lit);
@@ -329,28 +327,27 @@ impl Session {
         of.iter().filter(toggled).map(|f| f.0).collect()
     }
 
-    /// Whether what is distant emits otherwise than at `from_s`, or came or went since `old`.
-    fn outside_differs(&self, solved: &Solved, old: &WorldView, from_s: f64) -> bool {
+    /// Whether what is distant emits otherwise than `before`, or came or went since `old`.
+    fn outside_differs(&self, solved: &Solved, old: &WorldView, before: &World) -> bool {
         let distant = solved.forest.distant_facets();
         !self.came_or_went(solved, old, distant).is_empty()
-            || !self.relit_facets(solved, from_s, distant).is_empty()
+            || !self.relit_facets(solved, before, distant).is_empty()
     }
 
-    /// Those of some facets that emit otherwise than at `from_s`.
-    fn relit_facets(&self, solved: &Solved, from_s: f64, of: &[ElementId]) -> Vec<u32> {
+    /// Those of some facets that emit or reflect otherwise than `before`.
+    fn relit_facets(&self, solved: &Solved, before: &World, of: &[ElementId]) -> Vec<u32> {
         let forest = &solved.forest;
-        let times = [from_s, solved.time_s];
-        let relit: Vec<bool> = self.scene.materials.iter().map(|m| m.is_relit(times)).collect();
         let is_relit = |facet: &&ElementId| {
             let patch = forest.patch(**facet).expect("a facet has a patch");
-            relit[self.scene.patches[patch.0 as usize].material.0 as usize]
+            let material = self.scene.patches[patch.0 as usize].material;
+            solved.world.is_relit(before, material)
         };
         of.iter().filter(is_relit).map(|f| f.0).collect()
     }
 
     /// The coarse solution, where there is one; else exitances.
     fn first_guess(&self, solved: &Solved, lit: &LitForest<'_>) -> Radiosity {
-        let mut out = coarse::start((&self.scene, solved.time_s), &solved.forest, lit);
+        let mut out = coarse::start(&solved.world, &solved.forest, lit);
         for id in 0..solved.forest.len() as u32 {
             if let Some(number) = solved.forest.coarse(ElementId(id)) {
                 out.set(id, solved.coarse.radiosity(self.coarse_ids[number]));
@@ -359,10 +356,10 @@ impl Session {
         out
     }
 
-    fn dynamic_links(&self, solved: &Solved, from_s: f64) -> u64 {
-        let moved = |b: BodyId| self.scene.pose(b, from_s) != solved.view.poses()[b.0 as usize];
+    fn dynamic_links(&self, solved: &Solved, from: &World) -> u64 {
+        let moved = |b: BodyId| from.pose(b) != solved.world.pose(b);
         let light_moved = |k: usize| {
-            let before = WorldView::light_at(&self.scene, &self.scene.lights[k], from_s);
+            let before = WorldView::light_in(&self.scene, from, LightId(k as u32));
             before.as_ref() != solved.view.light(k)
         };
         tally::dynamic_links(&self.scene, &solved.forest, &solved.tree, &moved, &light_moved)

@@ -29,6 +29,15 @@ const BEYOND: f64 = 2.0;
 /// By how much the errors of links may make a scene brighter than it can be.
 const ROUNDING: f64 = 1.1;
 
+/// What does not hold any more that certificates rest on.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Void {
+    /// What counts as rounding changed.
+    pub(crate) rounding: bool,
+    /// Bodies move otherwise than was foreseen.
+    pub(crate) promise: bool,
+}
+
 /// What a strategy predicts with; nothing for those that do not.
 #[derive(Default)]
 pub(crate) struct Ahead {
@@ -39,21 +48,20 @@ pub(crate) struct Ahead {
 }
 
 impl Ahead {
-    /// From the second of two times on; what no longer holds is taken back. `other_rounding` says that
-    /// what counts as rounding changed between the two, which no certificate outlasts.
+    /// From the second of two times on; what no longer holds is taken back.
     pub(crate) fn new(
         update: Update,
         scene: &impl KnownMotion,
         (ticks, tree): (&mut Ticks, &mut PairTree),
         [from_s, to_s]: [f64; 2],
-        other_rounding: bool,
+        no_longer: Void,
     ) -> Ahead {
         let mut ahead = Ahead::default();
         if matches!(update, Update::Scratch | Update::Reinspect) {
             return ahead;
         }
-        let void = ticks.go(from_s, to_s);
-        if void || other_rounding {
+        let void = ticks.go(from_s, to_s) || no_longer.promise;
+        if void || no_longer.rounding {
             tree.forget_certificates();
         }
         if void {

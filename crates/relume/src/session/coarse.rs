@@ -4,7 +4,7 @@
 
 use crate::element::{ElementId, Forest, Kind};
 use crate::pair::{self, Brightness, Carried, Changes, Held, Light};
-use crate::scene::{self, PatchId, Scene};
+use crate::scene::{LightId, PatchId, Scene, World};
 use crate::solver::{Dirty, Link, Links, Radiosity, Stop, Surfaces};
 
 use super::surfaces::{LitForest, set_pairs};
@@ -79,21 +79,21 @@ impl Coarse {
         !changes.dropped.is_empty() || !changes.held.is_empty()
     }
 
-    /// Solves over the coarse links as the scene emits at a time; `coarse` are the coarse elements of `seed` by number.
-    pub(super) fn solve(&mut self, (scene, time_s): (&Scene, f64), seed: &Forest, coarse: &[u32]) {
+    /// Solves over the coarse links as the scene shines in a world; `coarse` are the coarse elements of `seed` by number.
+    pub(super) fn solve(&mut self, (scene, now): (&Scene, &World), seed: &Forest, coarse: &[u32]) {
         for &id in coarse {
             self.links.sort(id);
             self.open.sort(id);
         }
-        let surfaces = LitForest::new(scene, seed, time_s).with_places();
-        self.radiosity = start((scene, time_s), seed, &surfaces);
+        let surfaces = LitForest::new(scene, seed, now).with_places();
+        self.radiosity = start(now, seed, &surfaces);
         self.radiosity.solve(&surfaces, &self.links, Dirty::All, Stop::Sweeps(SWEEPS));
-        self.brightness = self.measure((scene, time_s), seed, coarse, &surfaces);
+        self.brightness = self.measure((scene, now), seed, coarse, &surfaces);
     }
 
     fn measure(
         &self,
-        (scene, time_s): (&Scene, f64),
+        (scene, now): (&Scene, &World),
         seed: &Forest,
         coarse: &[u32],
         surfaces: &LitForest<'_>,
@@ -109,8 +109,8 @@ impl Coarse {
         }
         let arriving: f64 =
             coarse.iter().zip(&irradiance).map(|(&id, h)| surfaces.area_m2(id) * h).sum();
-        let intensity = |l: &scene::Light| l.intensity_at(time_s).iter().sum::<f64>() / 3.0;
-        let mut lights: Vec<f64> = scene.lights.iter().map(intensity).collect();
+        let intensity = |k: u32| now.intensity(LightId(k)).iter().sum::<f64>() / 3.0;
+        let mut lights: Vec<f64> = (0..scene.lights.len() as u32).map(intensity).collect();
         let floor = arriving / total_area * DARK_FLOOR;
         let light_of = |(&id, irradiance): (&u32, &f64)| {
             if seed.is_distant(ElementId(id)) {
@@ -157,15 +157,15 @@ impl Coarse {
 }
 
 /// A solution to begin with: exitances, and what lights and what is distant send.
-pub(super) fn start(lit: (&Scene, f64), forest: &Forest, surfaces: &LitForest<'_>) -> Radiosity {
+pub(super) fn start(now: &World, forest: &Forest, surfaces: &LitForest<'_>) -> Radiosity {
     let mut out = Radiosity::new(surfaces);
-    set_sources(lit, (forest, surfaces), &mut out);
+    set_sources(now, (forest, surfaces), &mut out);
     out
 }
 
-/// Gives the punctual lights the intensities that they have at a time, and what is distant its exitance.
+/// Gives the punctual lights the intensities that they have in a world, and what is distant its exitance.
 pub(super) fn set_sources(
-    (scene, time_s): (&Scene, f64),
+    now: &World,
     (forest, surfaces): (&Forest, &LitForest<'_>),
     radiosity: &mut Radiosity,
 ) {
@@ -174,7 +174,7 @@ pub(super) fn set_sources(
     }
     for id in 0..forest.fixed_len() {
         if let Some(light) = forest.light(ElementId(id)) {
-            radiosity.set(id, scene.lights[light].intensity_at(time_s).map(|x| x as f32));
+            radiosity.set(id, now.intensity(LightId(light as u32)).map(|x| x as f32));
         }
     }
 }

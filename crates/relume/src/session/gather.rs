@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::element::{ElementId, Forest, Kind, WorldElement};
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
-use crate::scene::{LightKind, PatchId};
+use crate::scene::{LightId, LightKind, PatchId};
 use crate::solver::SQUARE_MOMENT;
 use crate::transport::{
     InPlane, form_factor_from_point, form_factor_past, in_plane, keep_in_front, lies_in, light_at,
@@ -115,14 +115,14 @@ impl<'a> Look<'a> {
         }
         for id in self.forest.children(Forest::ROOT).map(ElementId) {
             if self.forest.kind(id) == Kind::Light {
-                let e = self.light_arriving(session, id);
+                let e = self.light_arriving(id);
                 (0..3).for_each(|c| sum[c] += e[c]);
             }
         }
         sum
     }
 
-    fn light_arriving(&self, session: &Session, id: ElementId) -> [f64; 3] {
+    fn light_arriving(&self, id: ElementId) -> [f64; 3] {
         let view = &self.solved.view;
         let index = self.forest.light(id).expect("a light has an index");
         let Some(light) = view.light(index) else { return [0.0; 3] };
@@ -133,7 +133,7 @@ impl<'a> Look<'a> {
             _ => light.position,
         };
         let clear = e > 0.0 && segment_is_clear(view, self.forest, self.point, end, 1e-9 * away);
-        let intensity = session.scene.lights[index].intensity_at(self.solved.time_s);
+        let intensity = self.solved.world.intensity(LightId(index as u32));
         intensity.map(|i| if clear { i * e } else { 0.0 })
     }
 
@@ -286,7 +286,8 @@ impl<'a> Look<'a> {
             let patch = &scene.patches[patch.0 as usize];
             let sensor = Sensor { at, normal: e.plane.normal };
             let h = Look::new((self.session, self.solved), &sensor, false).gather();
-            let (m, rho) = (scene.exitance_at(patch, self.solved.time_s), scene.reflectance(patch));
+            let now = &self.solved.world;
+            let (m, rho) = (now.exitance(scene, patch), now.reflectance(scene, patch));
             [0, 1, 2].map(|c| m[c] + rho[c] * h[c])
         } else {
             let place = place_of(self.forest, id);

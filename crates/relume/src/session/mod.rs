@@ -6,7 +6,7 @@ use std::time::Instant;
 use crate::element::{ElementId, Forest, WorldView};
 use crate::event::Ticks;
 use crate::pair::{LinkEvent, PairHash, PairTree};
-use crate::scene::{BodyId, Scene};
+use crate::scene::{Held, Scene, World};
 use crate::solver::{Links, Radiosity};
 use crate::transport::Simd;
 
@@ -25,6 +25,7 @@ mod lossy;
 mod names;
 mod options;
 mod pieces;
+mod promise;
 mod reconstruct;
 mod report;
 mod snapshot;
@@ -47,7 +48,7 @@ pub use solution::Solution;
 pub use watch::Watch;
 
 // Flatland's session shares these.
-pub(crate) use ahead::{Ahead, most_mean, while_extrapolated};
+pub(crate) use ahead::{Ahead, Void, most_mean, while_extrapolated};
 pub(crate) use events::with_names;
 pub(crate) use surfaces::{Receivers, apply_edits, links_of};
 pub(crate) use tally::balance_of;
@@ -124,11 +125,26 @@ pub struct Session {
     watch: Arc<Watch>,
     /// Time that `moved` compares with, where it is not that of the last step.
     came_from: Option<f64>,
+    /// What is held by hand.
+    held: Held,
+}
+
+/// The world that a step leads to.
+struct Next {
+    frame: u32,
+    /// Time of the clip, seconds.
+    time_s: f64,
+    world: World,
+    /// The world of the frame before, which dynamic links are counted from.
+    from: Option<World>,
 }
 
 /// What the last step left.
 struct Solved {
     time_s: f64,
+    world: World,
+    /// What was held by hand.
+    held: Held,
     forest: Forest,
     view: WorldView,
     /// By which certificates expire.
@@ -140,8 +156,8 @@ struct Solved {
     radiosity: Radiosity,
     /// Mean radiosity when no link was extrapolated last, W/m2.
     sound_mean_w_m2: f64,
-    /// When that was.
-    sound_time_s: f64,
+    /// The world it was in.
+    sound_world: World,
     events: Vec<LinkEvent>,
     report: FrameReport,
 }
@@ -178,7 +194,8 @@ impl Session {
         };
         let simd = Simd::detect();
         let (watch, solved, came_from) = (Arc::default(), None, None);
-        Ok(Session { scene, options, simd, seed, coarse_ids, solved, watch, came_from })
+        let held = Held::default();
+        Ok(Session { scene, options, simd, seed, coarse_ids, solved, watch, came_from, held })
     }
 
     /// The scene being solved.
@@ -212,31 +229,38 @@ impl Session {
     /// [`SessionError::OutOfMemory`] if the links do not fit; there is no solution then until a
     /// step succeeds.
     pub fn step(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, SessionError> {
-        let moved = self.moved_since_last(time_s);
-        let from = self.came_from.take().or(self.solved.as_ref().map(|s| s.time_s));
+        let world = self.scene.at_but(time_s, &self.held);
+        let came_from = self.came_from.take();
+        let from = came_from.map(|from_s| self.scene.at_but(from_s, &self.held));
+        let from = from.or(self.solved.as_ref().map(|s| s.world.clone()));
+        let moved = from.as_ref().map_or(Vec::new(), |from| self.moved(from, &world));
+        let next = Next { frame, time_s, world, from };
         let label = FrameReport { frame, time_s, moved, ..FrameReport::default() };
         let mut last = self.solved.take();
         if self.options.update == Update::Scratch {
             last = None;
         }
-        // What was extrapolated cannot be taken along when time jumps or goes back.
-        last = last.filter(|last| last.is_settled() || last.ticks.goes_on(last.time_s, time_s));
+        // What was extrapolated cannot be taken along when time jumps or goes back, or a hand takes hold.
+        let goes_on =
+            |last: &Solved| last.ticks.goes_on(last.time_s, time_s) && last.held == self.held;
+        last = last.filter(|last| last.is_settled() || goes_on(last));
         let solved = match last {
-            Some(mut last) if last.is_settled() && self.is_still(&last, time_s) => {
-                if time_s < last.time_s {
+            Some(mut last) if last.is_settled() && last.world == next.world => {
+                if time_s < last.time_s || !last.held.promises_as(&self.held) {
                     // What was foreseen from a later time says nothing of an earlier one.
                     last.ticks = Ticks::default();
                     last.tree.forget_certificates();
                 }
                 let report = last.report.of_a_still_frame(label);
-                Solved { time_s, report, events: Vec::new(), ..last }
+                let held = self.held.clone();
+                Solved { time_s, held, report, events: Vec::new(), ..last }
             }
             // On a thread of the pool: entering it anew for every small task would cost more.
             last => rayon::scope(|_| {
-                let solved = self.advance(last, from, label.clone())?;
+                let solved = self.advance(last, &next, label.clone())?;
                 // Extrapolated links by which light grows as it should not: this frame is built anew.
                 match solved.report.residual.is_infinite() {
-                    true => self.advance(None, from, label),
+                    true => self.advance(None, &next, label),
                     false => Ok(solved),
                 }
             })?,
@@ -253,17 +277,11 @@ impl Session {
         self.came_from = time_s;
     }
 
-    fn moved_since_last(&self, time_s: f64) -> Vec<String> {
-        let last = self.came_from.or(self.solved.as_ref().map(|s| s.time_s));
-        let Some(last_s) = last else { return Vec::new() };
-        let moved = |b: &usize| {
-            let body = BodyId(*b as u32);
-            self.scene.pose(body, time_s) != self.scene.pose(body, last_s)
-        };
-        (0..self.scene.bodies.len())
-            .filter(moved)
-            .map(|b| self.scene.bodies[b].name.clone())
-            .collect()
+    /// Names of the bodies that are elsewhere in one world than in another.
+    fn moved(&self, from: &World, to: &World) -> Vec<String> {
+        let bodies = self.scene.bodies.iter().enumerate();
+        let moved = bodies.filter(|(b, _)| from.poses()[*b] != to.poses()[*b]);
+        moved.map(|(_, body)| body.name.clone()).collect()
     }
 
     /// The present solution as an immutable value, read with the bends that links leave out.

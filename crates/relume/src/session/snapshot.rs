@@ -6,8 +6,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::element::{ElementId, Kind};
-use crate::geometry::Pose;
-use crate::scene::{PatchId, Scene};
+use crate::scene::{PatchId, Scene, World};
 
 use crate::solver::{Links, Radiosity, Surfaces};
 
@@ -25,8 +24,8 @@ pub struct Snapshot {
     /// What radiosities may be off by where little light arrives, W/m2: a share of the tolerance times the mean irradiance,
     /// rough. Pictures show nothing darker than this.
     pub error_w_m2: f64,
-    /// World pose of each body, `None` while absent; indexed by `BodyId`.
-    pub poses: Vec<Option<Pose>>,
+    /// Poses, materials and lights as they were.
+    pub world: World,
     /// Leaf elements of all patches, grouped by patch; none of those that are distant.
     pub leaves: Vec<Leaf>,
     /// For each patch the range of its leaves; indexed by `PatchId`, one entry more than patches.
@@ -75,11 +74,11 @@ impl Snapshot {
     /// Linear over a leaf, with jumps between leaves: across the edge of a shadow it is right in the
     /// mean and wrong on either side. [`super::Session::irradiance_at`] has no such limit.
     pub fn irradiance_at(&self, point: DVec3, normal: DVec3) -> Option<[f64; 3]> {
-        let (lo, hi) = self.scene.bounds(self.time_s)?;
+        let (lo, hi) = self.scene.bounds_in(&self.world)?;
         let near_m = 1e-3 * (hi - lo).length();
         let mut found: Vec<(f64, PatchId, DVec2)> = Vec::new();
         for (k, patch) in self.scene.patches.iter().enumerate() {
-            let Some(pose) = self.poses[patch.body.0 as usize] else { continue };
+            let Some(pose) = self.world.pose(patch.body) else { continue };
             let d = pose.inverse_point(point) - patch.frame.origin;
             let off_m = d.dot(patch.frame.normal).abs();
             let along = pose.direction(patch.frame.normal).dot(normal);
@@ -114,7 +113,7 @@ pub(super) fn take(
     (links, radiosity): (&Links, &Radiosity),
 ) -> Snapshot {
     let (scene, forest) = (&session.scene, &solved.forest);
-    let surfaces = LitForest::new(scene, forest, solved.time_s);
+    let surfaces = LitForest::new(scene, forest, &solved.world);
     let bends = Bends { simd: session.simd, solved, links, radiosity };
     let of_facet = |facet: ElementId, out: &mut Vec<Leaf>| {
         let lit = surfaces.lit(facet.0);
@@ -160,7 +159,7 @@ pub(super) fn take(
         scene: Arc::clone(scene),
         time_s: solved.time_s,
         error_w_m2: error * mean_irradiance_w_m2(&leaves),
-        poses: solved.view.poses().to_vec(),
+        world: solved.world.clone(),
         leaves,
         leaf_offsets,
     }

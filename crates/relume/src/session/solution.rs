@@ -103,7 +103,8 @@ impl Solution for Session {
     }
 
     fn reflectance_max(&self) -> f64 {
-        let all = self.scene.patches.iter().flat_map(|patch| self.scene.reflectance(patch));
+        let now = &self.now().world;
+        let all = self.scene.patches.iter().flat_map(|patch| now.reflectance(&self.scene, patch));
         all.fold(0.0, f64::max)
     }
 

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::element::{ElementId, Forest, Kind, WorldView};
 use crate::pair::{self, Edit, PairTree};
-use crate::scene::{PatchId, Scene};
+use crate::scene::{PatchId, Scene, World};
 use crate::solver::{Link, Links, LinksBuilder, Lit, Place, Surfaces};
 
 /// A forest with its materials at one instant.
@@ -18,11 +18,11 @@ pub(super) struct LitForest<'a> {
 }
 
 impl<'a> LitForest<'a> {
-    pub(super) fn new(scene: &Scene, forest: &'a Forest, time_s: f64) -> LitForest<'a> {
+    pub(super) fn new(scene: &Scene, forest: &'a Forest, now: &World) -> LitForest<'a> {
         let single = |v: [f64; 3]| v.map(|x| x as f32);
         let of_patch = |patch: &crate::scene::Patch| {
-            let exitance = single(scene.exitance_at(patch, time_s));
-            Lit { reflectance: single(scene.reflectance(patch)), exitance }
+            let exitance = single(now.exitance(scene, patch));
+            Lit { reflectance: single(now.reflectance(scene, patch)), exitance }
         };
         let patch_lit = scene.patches.iter().map(of_patch).collect();
         LitForest { forest, patch_lit, places: Vec::new() }

@@ -2,7 +2,7 @@
 
 use crate::element::{ElementId, Forest};
 use crate::pair::PairTree;
-use crate::scene::{BodyId, LightKind, Scene};
+use crate::scene::{BodyId, LightId, LightKind, Scene};
 use crate::solver::{Links, Radiosity, Surfaces, row_sums};
 
 use super::Solved;
@@ -54,7 +54,7 @@ pub(super) fn dynamic_links(
 
 fn balance(scene: &Scene, solved: &Solved) -> (RowSumError, Energy) {
     let forest = &solved.forest;
-    let surfaces = LitForest::new(scene, forest, solved.time_s);
+    let surfaces = LitForest::new(scene, forest, &solved.world);
     let present = |facet: &ElementId| {
         let patch = forest.patch(*facet).expect("has a patch");
         solved.view.is_present(scene.patches[patch.0 as usize].body)
@@ -137,7 +137,7 @@ fn lights_w(scene: &Scene, solved: &Solved) -> (f64, f64) {
         if solved.view.light(k).is_none() {
             continue;
         }
-        let intensity: f64 = light.intensity_at(solved.time_s).iter().sum();
+        let intensity: f64 = solved.world.intensity(LightId(k as u32)).iter().sum();
         let all = match light.kind {
             LightKind::Point => 4.0 * std::f64::consts::PI,
             LightKind::Spot { inner, outer } => spot_sr(inner, outer),
@@ -174,7 +174,7 @@ pub(super) fn suspects(scene: &Scene, solved: &Solved) -> Vec<String> {
 /// Row sums of all leaves.
 pub(super) fn row_sums_of(scene: &Scene, solved: &Solved) -> Vec<(ElementId, f64)> {
     let forest = &solved.forest;
-    let surfaces = LitForest::new(scene, forest, solved.time_s);
+    let surfaces = LitForest::new(scene, forest, &solved.world);
     let is_surface = |id: u32| forest.receives(ElementId(id));
     let mut out = Vec::with_capacity(forest.counts().leaves as usize);
     for facet in forest.near_facets() {

@@ -757,7 +757,7 @@ mod tests {
         fill(&mut b);
         let scene = b.build().unwrap();
         let forest = Forest::new(&scene);
-        let view = WorldView::new(&scene, &forest, 0.0);
+        let view = WorldView::new(&scene, &forest, &scene.at(0.0));
         let inner = |z: f64, up: f64| {
             let is = |p: &PatchId| {
                 let frame = view.patch(*p).world;
@@ -822,7 +822,7 @@ mod tests {
         }
         let scene = b.build().unwrap();
         let mut forest = Forest::new(&scene);
-        let view = WorldView::new(&scene, &forest, 0.0);
+        let view = WorldView::new(&scene, &forest, &scene.at(0.0));
         let patches = || (0..scene.patches.len() as u32).map(PatchId);
         // Of every seventh facet its parts besides.
         let roots: Vec<ElementId> = forest.facets().to_vec();

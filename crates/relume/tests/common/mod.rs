@@ -196,7 +196,7 @@ pub(crate) fn leaf_area(leaf: &Leaf) -> f64 {
 /// World position of a point of a patch's plane in a snapshot.
 pub(crate) fn world_point(snapshot: &Snapshot, patch: PatchId, p: DVec2) -> DVec3 {
     let patch = &snapshot.scene.patches[patch.0 as usize];
-    snapshot.poses[patch.body.0 as usize].unwrap().point(patch.frame.point(p))
+    snapshot.world.pose(patch.body).unwrap().point(patch.frame.point(p))
 }
 
 /// The leaf under a world point of a surface with this normal, and the point in its patch's frame.
@@ -211,7 +211,7 @@ pub(crate) fn leaves_at(
     normal: DVec3,
 ) -> Option<Vec<(Leaf, DVec2)>> {
     for (k, patch) in snapshot.scene.patches.iter().enumerate() {
-        let Some(pose) = snapshot.poses[patch.body.0 as usize] else { continue };
+        let Some(pose) = snapshot.world.pose(patch.body) else { continue };
         let local = |p: &DVec3| pose.inverse_point(*p) - patch.frame.origin;
         let faces = pose.direction(patch.frame.normal).dot(normal) > 0.99;
         if !faces || points.iter().any(|p| local(p).dot(patch.frame.normal).abs() > 1e-3) {

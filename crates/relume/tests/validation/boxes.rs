@@ -206,7 +206,7 @@ fn where_the_error_sits_among_64_boxes() {
     let polygons = judged::polygons(&scene, 0.0);
     let (session, report) = common::solved(room_of_boxes(), at_tolerance(0.05));
     let (tree, forest) = session.pairs();
-    let view = WorldView::new(&scene, forest, 0.0);
+    let view = WorldView::new(&scene, forest, &scene.at(0.0));
     let (scene, session, view, polygons) = (&scene, &session, &view, &polygons[..]);
     let looked = Looked { scene, session, view, polygons, means: means(session) };
     // A sample: one in ten of the lamp's links, one in forty of the others.

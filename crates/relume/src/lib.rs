@@ -1,29 +1,99 @@
 //! Relume: diffuse interreflection (radiosity) in scenes whose objects and lights move.
 //!
-//! The rooms, from the ground up; each may use those above it in this list and no other
-//! (`tests/layers.rs` checks it):
+//! A [`Scene`] is read from a file ([`import`]) or built in code ([`SceneBuilder`]). A [`Session`] solves it, frame by
+//! frame or command by command, and pays for what changed; whatever came before, the links are those of a cold build,
+//! bit for bit, on any number of threads. A [`Frame`] is what is read from a solution.
 //!
-//! | room | one sentence |
-//! |---|---|
-//! | [`geometry`] | polygons, bounds, shafts, rigid motion: pure functions |
-//! | [`scene`] | glTF and View3D's files in; bodies, patches, materials, motion: validated, then immutable |
-//! | [`element`] | the element forest: clusters, patches and their quadtrees |
-//! | [`transport`] | exchange area and visibility of two elements: pure queries |
-//! | [`event`] | what the known motion allows within the coming time, and until when |
-//! | [`pair`] | the pair tree, oracles and verdicts |
-//! | [`solver`] | gather, push, pull, residual |
-//! | [`session`] | owns all state; runs the phases of a frame; snapshots out |
-//! | [`flat`] | the plane: another space for the same pairs, events and solver |
+//! A clip, and the irradiance at a sensor in each of its frames:
+//!
+//! ```
+//! use relume::{ImportOptions, Options, Session, import};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/box_room.glb");
+//! let scene = import(file, &ImportOptions::default())?;
+//! let mut session = Session::new(scene, Options { tolerance: 0.1, ..Options::default() })?;
+//! for frame in 0..3 {
+//!     session.step(frame, f64::from(frame) / 24.0)?;
+//!     let [red, green, blue] = session.irradiance_at([0.5, 0.3, 0.2].into(), [0.0, 1.0, 0.0].into());
+//!     println!("{frame}: {red:.3} {green:.3} {blue:.3} W/m2");
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A scene of one's own, in which a body is moved by hand and back:
+//!
+//! ```
+//! use relume::{Command, Options, Pose, SceneBuilder, Session};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # fn cube(half: f64, inward: bool) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+//! #     let corner = |k: u32| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { half } else { -half });
+//! #     let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+//! #     let turned = |[a, b, c]: [u32; 3]| if inward { [a, c, b] } else { [a, b, c] };
+//! #     let of_side = |[a, b, c, d]: [u32; 4]| [turned([a, b, c]), turned([a, c, d])];
+//! #     ((0..8).map(corner).collect(), sides.into_iter().flat_map(of_side).collect())
+//! # }
+//! # let (room_corners, room_triangles) = cube(1.0, true);
+//! # let (lamp_corners, lamp_triangles) = cube(0.1, false);
+//! let mut b = SceneBuilder::new("two");
+//! let grey = b.material("grey", [0.5; 3], [0.0; 3]); // reflectance, exitance in W/m2
+//! let glow = b.material("glow", [0.0; 3], [1.0; 3]);
+//! let room = b.body("room");
+//! let ball = b.body("ball");
+//! b.mesh(room, "walls", grey, &room_corners, &room_triangles); // &[[f64; 3]], &[[u32; 3]]
+//! b.mesh(ball, "lamp", glow, &lamp_corners, &lamp_triangles);
+//! let mut session = Session::new(b.build()?, Options { tolerance: 0.1, ..Options::default() })?;
+//! let first = session.solve()?.hash();
+//!
+//! let undo = session.apply(Command::set_pose(ball, Pose::translation([0.1, 0.0, 0.0])))?;
+//! let frame = session.solve()?; // only what changed
+//! println!("{} links, {:?} W/m2", frame.report().links, frame.irradiance_at([0.0, -1.0, 0.0], [0.0, 1.0, 0.0]));
+//!
+//! session.apply(undo)?;
+//! assert_eq!(session.solve()?.hash(), first);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Lengths are metres, times seconds, light is radiometric (W, W/m2, W/sr) in three linear channels. Work is done on
+//! [rayon]'s global pool; inside `ThreadPool::install` on that pool.
+//!
+//! Not part of the interface, and free to change: the modules that are hidden here, which the command and the tests of this
+//! repository use.
 
 // Tests may measure and compare with whatever the platform offers: what they compute decides nothing.
 #![cfg_attr(test, allow(clippy::disallowed_methods, clippy::disallowed_types))]
 
-pub mod element;
-pub mod event;
+// The rooms, from the ground up; each may use those above it in this list and no other (`tests/layers.rs` checks it).
+#[doc(hidden)]
+pub mod element; // the element forest: clusters, patches and their quadtrees
+#[doc(hidden)]
+pub mod event; // what the known motion allows within the coming time, and until when
 pub mod flat;
-pub mod geometry;
-pub mod pair;
-pub mod scene;
-pub mod session;
-pub mod solver;
-pub mod transport;
+#[doc(hidden)]
+pub mod geometry; // polygons, bounds, shafts, rigid motion: pure functions
+#[doc(hidden)]
+pub mod pair; // the pair tree, oracles and verdicts
+#[doc(hidden)]
+pub mod scene; // files in; bodies, patches, materials, motion, and worlds made of them
+#[doc(hidden)]
+pub mod session; // owns all state; runs the phases of a frame; frames and snapshots out
+#[doc(hidden)]
+pub mod solver; // gather, push, pull, residual
+#[doc(hidden)]
+pub mod transport; // exchange area and visibility of two elements: pure queries // the plane: another space for the same pairs, events and solver
+
+pub use geometry::Pose;
+pub use glam;
+pub use scene::{
+    Body, BodyId, Camera, Edits, Held, ImportOptions, Interpolation, Light, LightId, LightKind,
+    Material, MaterialId, NewBody, Note, Patch, PatchId, Projection, RotationTrack, Scene,
+    SceneBuilder, SceneError, Severity, Surface, SurfaceId, TakenBody, Track, World, import,
+    outside,
+};
+pub use session::{
+    Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Frame,
+    FrameReport, Grouping, Hash, Leaf, Log, LogError, Memory, Mesh, Open, Options, Oracle,
+    PairCounts, Removed, RowSumError, Seconds, Sensor, Session, SessionError, Snapshot, Update,
+    Watch,
+};

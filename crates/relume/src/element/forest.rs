@@ -601,6 +601,15 @@ impl Forest {
         self.fixed.glows[patch.0 as usize]
     }
 
+    /// Says which patches emit light at any time. Whether that differs from before.
+    pub fn set_glows(&mut self, glows: Vec<bool>) -> bool {
+        let differs = self.fixed.glows != glows;
+        if differs {
+            self.fixed_mut().glows = glows;
+        }
+        differs
+    }
+
     /// Area of the patches that are connected with a patch by common corners, itself among them, m2.
     pub fn connected_m2(&self, patch: PatchId) -> f64 {
         self.fixed.connected_m2[patch.0 as usize]

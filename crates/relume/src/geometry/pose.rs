@@ -1,6 +1,6 @@
 //! Rigid motion: where a body is at one instant.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 /// A rigid placement: `world = rotation * local + translation`.
 ///
@@ -16,6 +16,16 @@ pub struct Pose {
 impl Pose {
     /// The pose that leaves every point where it is.
     pub const IDENTITY: Pose = Pose { rotation: DMat3::IDENTITY, translation: DVec3::ZERO };
+
+    /// A rotation about the origin, then a translation, metres.
+    pub fn new(rotation: DQuat, translation: impl Into<DVec3>) -> Pose {
+        Pose { rotation: DMat3::from_quat(rotation), translation: translation.into() }
+    }
+
+    /// A translation, metres.
+    pub fn translation(by: impl Into<DVec3>) -> Pose {
+        Pose { translation: by.into(), ..Pose::IDENTITY }
+    }
 
     /// Maps a point of the body's frame into the world.
     pub fn point(&self, local: DVec3) -> DVec3 {

@@ -34,6 +34,11 @@ impl PairHash {
         self.0 = self.0.wrapping_add(hash_of(key, carried));
     }
 
+    /// The hash as a number.
+    pub fn bits(&self) -> u128 {
+        self.0
+    }
+
     /// Takes a link away that was added before.
     pub fn remove(&mut self, key: u64, carried: &Carried) {
         self.0 = self.0.wrapping_sub(hash_of(key, carried));

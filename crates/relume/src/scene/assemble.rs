@@ -66,6 +66,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
     if parts.patches.is_empty() {
         return Err(empty(&draft));
     }
+    check_declared(&draft, &parts.bodies)?;
     Ok(Scene {
         name: draft.name,
         bodies: parts.bodies,
@@ -308,7 +309,8 @@ fn flat_pieces(points: &[DVec3]) -> Vec<Result<(Frame, Vec<DVec2>), Flaw>> {
     }
 }
 
-/// The nodes that carry a body, in node order, each with the nodes whose surfaces it groups.
+/// The nodes that carry a body, those declared as bodies first, then in node order, each with the nodes whose surfaces it
+/// groups.
 fn bodies_of(draft: &Draft, motion: &Motion) -> Vec<(usize, Vec<usize>)> {
     let mut members: Vec<Vec<usize>> = vec![Vec::new(); draft.nodes.len()];
     for (index, node) in draft.nodes.iter().enumerate() {
@@ -317,7 +319,25 @@ fn bodies_of(draft: &Draft, motion: &Motion) -> Vec<(usize, Vec<usize>)> {
             members[carrier].push(index);
         }
     }
-    members.into_iter().enumerate().filter(|(_, m)| !m.is_empty()).collect()
+    let mut bodies: Vec<(usize, Vec<usize>)> =
+        members.into_iter().enumerate().filter(|(_, m)| !m.is_empty()).collect();
+    bodies.sort_by_key(|&(node, _)| draft.nodes[node].body.unwrap_or(u32::MAX));
+    bodies
+}
+
+/// Bodies that were declared have the numbers that were given out for them.
+fn check_declared(draft: &Draft, bodies: &[Body]) -> Result<(), SceneError> {
+    let declared = draft.nodes.iter().enumerate().filter_map(|(k, n)| Some((k, n, n.body?)));
+    for (k, node, number) in declared {
+        if bodies.get(number as usize).is_none_or(|body| body.node.0 as usize != k) {
+            return Err(SceneError::Geometry {
+                subject: format!("body `{}`", node.name),
+                what: "it has no polygons, or none of any size".into(),
+                remedy: "give it a mesh that is not flat to a line, in metres".into(),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Where a node sits in the frame of the body it rides on: in the world, if it never moves.

@@ -8,9 +8,11 @@ use glam::{DMat3, DQuat, DVec3};
 use super::assemble::assemble;
 use super::draft::{Draft, DraftNode, DraftSurface};
 use super::flatten::{Flaw, flatten};
+use super::limits::is_place;
+use super::merge::merge;
 use super::{
-    Camera, Glow, Light, LightKind, Material, MaterialId, NodeId, Projection, RotationTrack, Scene,
-    SceneError, Track,
+    BodyId, Camera, Glow, Light, LightKind, Material, MaterialId, NodeId, Projection,
+    RotationTrack, Scene, SceneError, Track,
 };
 
 /// Builds a [`Scene`] from code, checked as a file would be.
@@ -92,6 +94,46 @@ impl SceneBuilder {
         let parent = parent.map(|p| p.0 as usize).filter(|&p| p < self.draft.nodes.len());
         self.draft.nodes.push(DraftNode::still(name, parent, translation, rotation));
         NodeId(self.draft.nodes.len() as u32 - 1)
+    }
+
+    /// Adds a body at the origin of the world: what moves as one, by hand ([`Scene::at_but`]) or not at all. Its id is
+    /// the one that it has in the scene.
+    pub fn body(&mut self, name: &str) -> BodyId {
+        let number = self.draft.nodes.iter().filter(|n| n.body.is_some()).count() as u32;
+        let mut node = DraftNode::still(name, None, DVec3::ZERO, DQuat::IDENTITY);
+        node.body = Some(number);
+        self.draft.nodes.push(node);
+        BodyId(number)
+    }
+
+    /// Adds a mesh to a body: positions in the body's frame, metres, and triangles as indices into them,
+    /// counter-clockwise seen from the front. Neighbouring triangles in one plane become one polygon; triangles without
+    /// area are left out.
+    ///
+    /// Meshes of one body, surface name and material form one surface.
+    pub fn mesh(
+        &mut self,
+        body: BodyId,
+        surface_name: &str,
+        material: MaterialId,
+        positions: &[[f64; 3]],
+        triangles: &[[u32; 3]],
+    ) {
+        let Some(node) = self.draft.nodes.iter().position(|n| n.body == Some(body.0)) else {
+            return self.fail(SceneError::Hierarchy {
+                node: format!("body {}", body.0),
+                what: format!("it does not exist, but surface `{surface_name}` is to be on it"),
+                remedy: "use a body of the same builder".into(),
+            });
+        };
+        match polygons_of(surface_name, positions, triangles) {
+            Ok(polygons) => {
+                for polygon in polygons {
+                    self.polygon(NodeId(node as u32), surface_name, material, &polygon);
+                }
+            }
+            Err(flaw) => self.fail(flaw),
+        }
     }
 
     /// Scales what hangs on a node, along the node's own axes; constant in time. A product of
@@ -254,6 +296,35 @@ impl SceneBuilder {
     fn fail(&mut self, mistake: SceneError) {
         self.mistake.get_or_insert(mistake);
     }
+}
+
+/// The convex polygons of a mesh.
+fn polygons_of(
+    surface_name: &str,
+    positions: &[[f64; 3]],
+    triangles: &[[u32; 3]],
+) -> Result<Vec<Vec<DVec3>>, SceneError> {
+    let fail = |what: String, remedy: &str| {
+        let subject = format!("a mesh of surface `{surface_name}`");
+        Err(SceneError::Geometry { subject, what, remedy: remedy.to_owned() })
+    };
+    if let Some(k) = positions.iter().position(|p| !is_place(p)) {
+        return fail(
+            format!("position {k} is {:?}", positions[k]),
+            "give finite numbers, in metres",
+        );
+    }
+    let count = positions.len();
+    if let Some(k) = triangles.iter().position(|t| t.iter().any(|&i| i as usize >= count)) {
+        let what = format!("triangle {k} is {:?}, but there are {count} positions", triangles[k]);
+        return fail(what, "count positions from 0");
+    }
+    let points: Vec<DVec3> = positions.iter().map(|&p| DVec3::from_array(p)).collect();
+    let merged = merge(&points, triangles);
+    if merged.polygons.is_empty() {
+        return fail("it has no triangle with an area".into(), "give triangles with an area");
+    }
+    Ok(merged.polygons)
 }
 
 fn no_material(material: MaterialId, subject: &str) -> SceneError {

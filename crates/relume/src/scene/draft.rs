@@ -41,6 +41,8 @@ pub(super) struct DraftNode {
     pub(super) rotation_track: Option<RotationTrack>,
     pub(super) presence: Vec<(f64, bool)>,
     pub(super) surfaces: Vec<DraftSurface>,
+    /// Its number among the bodies that were declared as such: they come first in the scene, in this order.
+    pub(super) body: Option<u32>,
 }
 
 /// Polygons of one material on one node.
@@ -74,6 +76,7 @@ impl DraftNode {
             rotation_track: None,
             presence: Vec::new(),
             surfaces: Vec::new(),
+            body: None,
         }
     }
 }

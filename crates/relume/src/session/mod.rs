@@ -6,7 +6,7 @@ use std::time::Instant;
 use crate::element::{ElementId, Forest, WorldView};
 use crate::event::Ticks;
 use crate::pair::{LinkEvent, PairHash, PairTree};
-use crate::scene::{Held, Scene, World};
+use crate::scene::{Held, Patch, Scene, World};
 use crate::solver::{Links, Radiosity};
 use crate::transport::Simd;
 
@@ -15,12 +15,15 @@ mod ahead;
 mod bends;
 pub(crate) mod budget;
 mod coarse;
+mod command;
 mod compact;
 mod compare;
 mod estimate;
 mod events;
 mod factors;
+mod frame;
 mod gather;
+mod log;
 mod lossy;
 mod names;
 mod options;
@@ -34,11 +37,14 @@ mod surfaces;
 mod tally;
 mod watch;
 
+pub use command::{Command, CommandError, Removed};
 pub use compare::{Difference, RadiosityGap, Which, compare, radiosity_gap};
 pub use estimate::Estimate;
 pub use events::{Event, EventKind};
 pub use factors::{Closure, Factors, Grouping, Open, PartFactors};
+pub use frame::{Frame, Hash, Mesh};
 pub use gather::Sensor;
+pub use log::{Log, LogError};
 pub use lossy::{Missed, RadiosityError, missed, radiosity_error};
 pub use names::ElementName;
 pub use options::{Options, Oracle, Update};
@@ -127,6 +133,10 @@ pub struct Session {
     came_from: Option<f64>,
     /// What is held by hand.
     held: Held,
+    /// Time of the clip, seconds.
+    time_s: f64,
+    /// Steps so far.
+    frames: u32,
 }
 
 /// The world that a step leads to.
@@ -185,17 +195,26 @@ impl Session {
     ///
     /// # Errors
     /// [`SessionError::Option`] if an option is out of its range.
-    pub fn new(scene: Arc<Scene>, options: Options) -> Result<Session, SessionError> {
+    pub fn new(scene: impl Into<Arc<Scene>>, options: Options) -> Result<Session, SessionError> {
         options.validate()?;
-        let mut seed = Forest::new(&scene);
-        let coarse_ids = match options.oracle {
-            Oracle::Error => coarse::number(&scene, &mut seed),
-            Oracle::FormFactor { .. } => Vec::new(),
-        };
+        let scene = scene.into();
+        let (seed, coarse_ids) = seed_of(&scene, options.oracle);
         let simd = Simd::detect();
         let (watch, solved, came_from) = (Arc::default(), None, None);
-        let held = Held::default();
-        Ok(Session { scene, options, simd, seed, coarse_ids, solved, watch, came_from, held })
+        let (held, time_s, frames) = (Held::default(), 0.0, 0);
+        Ok(Session {
+            scene,
+            options,
+            simd,
+            seed,
+            coarse_ids,
+            solved,
+            watch,
+            came_from,
+            held,
+            time_s,
+            frames,
+        })
     }
 
     /// The scene being solved.
@@ -229,6 +248,8 @@ impl Session {
     /// [`SessionError::OutOfMemory`] if the links do not fit; there is no solution then until a
     /// step succeeds.
     pub fn step(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, SessionError> {
+        self.time_s = time_s;
+        self.frames += 1;
         let world = self.scene.at_but(time_s, &self.held);
         let came_from = self.came_from.take();
         let from = came_from.map(|from_s| self.scene.at_but(from_s, &self.held));
@@ -275,6 +296,52 @@ impl Session {
     /// depends on it.
     pub fn came_from(&mut self, time_s: Option<f64>) {
         self.came_from = time_s;
+    }
+
+    /// Solves the world as the commands so far have made it; the first time that is a cold build.
+    ///
+    /// # Errors
+    /// As [`Session::step`].
+    pub fn solve(&mut self) -> Result<Frame<'_>, SessionError> {
+        self.step(self.frames, self.time_s)?;
+        Ok(Frame::new(self))
+    }
+
+    /// The world that the next [`Session::solve`] solves.
+    pub fn world(&self) -> World {
+        self.scene.at_but(self.time_s, &self.held)
+    }
+
+    /// Time of the clip that the next [`Session::solve`] is at, seconds.
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// What commands hold in place of what the clip says.
+    pub fn held(&self) -> &Held {
+        &self.held
+    }
+
+    /// Goes on with another scene: nothing that was solved stays.
+    fn change_scene(&mut self, scene: Scene) {
+        self.scene = Arc::new(scene);
+        (self.seed, self.coarse_ids) = seed_of(&self.scene, self.options.oracle);
+        self.solved = None;
+        self.note_emitters();
+    }
+
+    /// Notes which patches emit at any time, in the clip or by hand. Where that changes, nothing that was solved stays.
+    fn note_emitters(&mut self) {
+        let (scene, held) = (&self.scene, &self.held);
+        let by_hand = |patch: &Patch| {
+            let exitance = held.exitances.get(&patch.material)?;
+            let share = scene.emission_share(patch);
+            Some((0..3).any(|c| exitance[c] * share[c] > 0.0))
+        };
+        let emits = |p: &Patch| scene.patch_emits(p) || by_hand(p).unwrap_or(false);
+        if self.seed.set_glows(scene.patches.iter().map(emits).collect()) {
+            self.solved = None;
+        }
     }
 
     /// Names of the bodies that are elsewhere in one world than in another.
@@ -357,6 +424,16 @@ impl Session {
         let memory = self.memory();
         memory.pairs + memory.elements + memory.fixed
     }
+}
+
+/// The part of the forest that is always there, and its coarse elements by number.
+fn seed_of(scene: &Scene, oracle: Oracle) -> (Forest, Vec<u32>) {
+    let mut seed = Forest::new(scene);
+    let coarse_ids = match oracle {
+        Oracle::Error => coarse::number(scene, &mut seed),
+        Oracle::FormFactor { .. } => Vec::new(),
+    };
+    (seed, coarse_ids)
 }
 
 /// Bytes that the engine's structures hold.

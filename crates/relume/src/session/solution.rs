@@ -51,7 +51,7 @@ pub(super) fn named_leaves(solution: &impl Solution) -> Vec<(ElementKey, Element
 }
 
 impl Session {
-    fn now(&self) -> &Solved {
+    pub(super) fn now(&self) -> &Solved {
         self.solved.as_ref().expect("a step comes before a comparison")
     }
 }

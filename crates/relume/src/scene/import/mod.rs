@@ -72,7 +72,8 @@ pub struct ImportOptions {
 /// # Errors
 /// A file that is missing, damaged or needs what is not supported, a
 /// scene without polygons: each names the file, node or mesh, and the remedy.
-pub fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError> {
+pub fn import(path: impl AsRef<Path>, options: &ImportOptions) -> Result<Scene, SceneError> {
+    let path = path.as_ref();
     if view3d::is_view3d(path) {
         return match &options.animation {
             None => view3d::import(path, options),

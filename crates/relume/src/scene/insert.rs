@@ -1,0 +1,230 @@
+//! Bodies that come into a scene or leave it after it was made.
+//!
+//! Ids of other bodies, surfaces and materials stay; patches are numbered anew. What was taken out can be put back,
+//! and the scene is then as before. Must not know who changes a scene, or what is solved on it.
+
+use serde::{Deserialize, Serialize};
+
+use super::builder::SceneBuilder;
+use super::{
+    Body, BodyId, Material, MaterialId, Node, NodeId, Patch, PatchId, Scene, SceneError, Surface,
+    SurfaceId,
+};
+
+/// A body to be inserted into a scene: meshes with materials of that scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NewBody {
+    name: String,
+    meshes: Vec<NewMesh>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct NewMesh {
+    surface: String,
+    /// Index of a material of the scene.
+    #[serde(with = "by_index")]
+    material: MaterialId,
+    positions: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
+}
+
+/// A body that was taken out of a scene, to be put back.
+#[derive(Clone, Debug)]
+pub struct TakenBody {
+    body: Body,
+    /// Twins counted from the body's first patch.
+    patches: Vec<Patch>,
+    /// Where it was the last body: what else went with it.
+    ends: Option<Ends>,
+}
+
+#[derive(Clone, Debug)]
+struct Ends {
+    /// Number of the first surface.
+    first: u32,
+    surfaces: Vec<Surface>,
+    node: Option<Node>,
+}
+
+mod by_index {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use super::MaterialId;
+
+    pub(super) fn serialize<S: Serializer>(id: &MaterialId, to: S) -> Result<S::Ok, S::Error> {
+        id.0.serialize(to)
+    }
+
+    pub(super) fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<MaterialId, D::Error> {
+        Ok(MaterialId(u32::deserialize(from)?))
+    }
+}
+
+impl NewBody {
+    /// A body without polygons.
+    pub fn new(name: &str) -> NewBody {
+        NewBody { name: name.to_owned(), meshes: Vec::new() }
+    }
+
+    /// Its name; in a scene in which the name is taken, a number is added.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The same body with a mesh more: positions in the body's frame, metres, triangles counter-clockwise seen from
+    /// the front, a material of the scene that it will be inserted into. See [`SceneBuilder::mesh`].
+    pub fn with_mesh(
+        mut self,
+        surface_name: &str,
+        material: MaterialId,
+        positions: &[[f64; 3]],
+        triangles: &[[u32; 3]],
+    ) -> NewBody {
+        self.meshes.push(NewMesh {
+            surface: surface_name.to_owned(),
+            material,
+            positions: positions.to_vec(),
+            triangles: triangles.to_vec(),
+        });
+        self
+    }
+}
+
+impl Scene {
+    /// The body of this name.
+    pub fn body_named(&self, name: &str) -> Option<BodyId> {
+        let at = self.bodies.iter().position(|body| body.name == name && !body.patches.is_empty());
+        at.map(|k| BodyId(k as u32))
+    }
+
+    /// The same scene with one body more, at the origin of the world, and the id of that body.
+    ///
+    /// # Errors
+    /// What [`SceneBuilder::build`] would say of the body.
+    pub fn with_body(&self, new: &NewBody) -> Result<(Scene, BodyId), SceneError> {
+        let mut alone = SceneBuilder::new(&self.name);
+        for Material { name, reflectance, exitance, double_sided, .. } in &self.materials {
+            if *double_sided {
+                alone.double_sided_material(name, *reflectance, *exitance);
+            } else {
+                alone.material(name, *reflectance, *exitance);
+            }
+        }
+        let body = alone.body(&new.name);
+        for mesh in &new.meshes {
+            alone.mesh(body, &mesh.surface, mesh.material, &mesh.positions, &mesh.triangles);
+        }
+        let alone = alone.build()?;
+        let mut scene = self.clone();
+        let id = BodyId(scene.bodies.len() as u32);
+        let free = |wanted: &str, is_taken: &dyn Fn(&str) -> bool| {
+            let numbered = (2u32..).map(|n| format!("{wanted} {n}"));
+            let mut names = std::iter::once(wanted.to_owned()).chain(numbered);
+            names.find(|name| !is_taken(name)).expect("there are more numbers than names")
+        };
+        let name = free(&new.name, &|name| scene.motion.nodes.iter().any(|n| n.name == name));
+        let mut node = alone.motion.nodes[0].clone();
+        node.name.clone_from(&name);
+        scene.motion.nodes.push(node);
+        let first_surface = scene.surfaces.len() as u32;
+        for surface in &alone.surfaces {
+            let name = free(&surface.name, &|name| scene.surfaces.iter().any(|s| s.name == name));
+            let object = scene.motion.nodes[scene.motion.nodes.len() - 1].name.clone();
+            scene.surfaces.push(Surface { name, object, body: id, material: surface.material });
+        }
+        let first = scene.patches.len() as u32;
+        scene.patches.extend(alone.patches.into_iter().map(|patch| Patch {
+            body: id,
+            surface: SurfaceId(first_surface + patch.surface.0),
+            twin: patch.twin.map(|twin| PatchId(first + twin.0)),
+            ..patch
+        }));
+        scene.bodies.push(Body {
+            name,
+            node: NodeId(scene.motion.nodes.len() as u32 - 1),
+            patches: first..scene.patches.len() as u32,
+            distant: false,
+        });
+        Ok((scene, id))
+    }
+
+    /// The same scene without a body, and that body. Its id stays free, unless it was the last one.
+    pub fn without_body(&self, id: BodyId) -> (Scene, TakenBody) {
+        let mut scene = self.clone();
+        let range = self.bodies[id.0 as usize].patches.clone();
+        let mut patches: Vec<Patch> =
+            scene.patches.drain(range.start as usize..range.end as usize).collect();
+        for patch in &mut patches {
+            patch.twin = patch.twin.map(|twin| PatchId(twin.0 - range.start));
+        }
+        scene.renumber(id, range.start, -(patches.len() as i64));
+        scene.bodies[id.0 as usize].patches = range.start..range.start;
+        let mut taken = TakenBody { body: self.bodies[id.0 as usize].clone(), patches, ends: None };
+        if id.0 as usize + 1 == scene.bodies.len() {
+            scene.bodies.pop();
+            let of_others = scene.surfaces.iter().rposition(|surface| surface.body != id);
+            let first = of_others.map_or(0, |last| last + 1);
+            let surfaces = scene.surfaces.split_off(first);
+            let node = match taken.body.node.0 as usize + 1 == scene.motion.nodes.len() {
+                true => scene.motion.nodes.pop(),
+                false => None,
+            };
+            taken.ends = Some(Ends { first: first as u32, surfaces, node });
+        }
+        (scene, taken)
+    }
+
+    /// Whether a body can be put back under an id: nothing is there.
+    pub fn has_room_for(&self, id: BodyId, taken: &TakenBody) -> bool {
+        match self.bodies.get(id.0 as usize) {
+            Some(body) => body.patches.is_empty() && taken.ends.is_none(),
+            None => id.0 as usize == self.bodies.len() && taken.ends.is_some(),
+        }
+    }
+
+    /// The same scene with a body put back, where [`Scene::has_room_for`] it.
+    pub fn with_body_back(&self, id: BodyId, taken: &TakenBody) -> Scene {
+        let mut scene = self.clone();
+        let mut body = taken.body.clone();
+        let first = match scene.bodies.get(id.0 as usize) {
+            Some(room) => room.patches.start,
+            None => scene.patches.len() as u32,
+        };
+        scene.renumber(id, first, taken.patches.len() as i64);
+        let mut patches = taken.patches.clone();
+        for patch in &mut patches {
+            patch.twin = patch.twin.map(|twin| PatchId(first + twin.0));
+        }
+        body.patches = first..first + patches.len() as u32;
+        match &taken.ends {
+            None => scene.bodies[id.0 as usize] = body,
+            Some(Ends { first: was_first, surfaces, node }) => {
+                let now_first = scene.surfaces.len() as u32;
+                scene.surfaces.extend(surfaces.iter().cloned());
+                for patch in &mut patches {
+                    patch.surface.0 = patch.surface.0 - was_first + now_first;
+                }
+                if let Some(node) = node {
+                    body.node = NodeId(scene.motion.nodes.len() as u32);
+                    scene.motion.nodes.push(node.clone());
+                }
+                scene.bodies.push(body);
+            }
+        }
+        scene.patches.splice(first as usize..first as usize, patches);
+        scene
+    }
+
+    /// Numbers of patches as they are once `more` of body `id` begin at `first`, where none is now.
+    fn renumber(&mut self, id: BodyId, first: u32, more: i64) {
+        let moved = |k: u32| (i64::from(k) + more) as u32;
+        for body in self.bodies.iter_mut().skip(id.0 as usize + 1) {
+            body.patches = moved(body.patches.start)..moved(body.patches.end);
+        }
+        for patch in &mut self.patches {
+            patch.twin = patch.twin.map(|t| if t.0 >= first { PatchId(moved(t.0)) } else { t });
+        }
+    }
+}

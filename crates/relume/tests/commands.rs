@@ -1,0 +1,338 @@
+//! Commands: any log and its inverses lead back, and the state after any log is that of a cold build.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::{Random, at_tolerance, form_factor_oracle, shipped, v};
+use glam::{DQuat, DVec3};
+use relume::{
+    BodyId, Command, CommandError, Frame, LightId, LightKind, Log, MaterialId, NewBody, Options,
+    Pose, Scene, SceneBuilder, Session,
+};
+
+/// A cube about the origin, seen from outside or from inside.
+fn cube(half: f64, inward: bool) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let corner = |k: u32| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { half } else { -half });
+    let sides: [[u32; 4]; 6] =
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let turned = |[a, b, c]: [u32; 3]| if inward { [a, c, b] } else { [a, b, c] };
+    let of_side = |[a, b, c, d]: [u32; 4]| [turned([a, b, c]), turned([a, c, d])];
+    ((0..8).map(corner).collect(), sides.into_iter().flat_map(of_side).collect())
+}
+
+/// A room with a lamp, two crates and a bulb, all of them still.
+fn room() -> Scene {
+    let mut b = SceneBuilder::new("room");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let red = b.material("red", [0.7, 0.2, 0.1], [0.0; 3]);
+    let glow = b.material("glow", [0.1; 3], [9.0, 8.0, 7.0]);
+    let (walls, lamp) = (b.body("walls"), b.body("lamp"));
+    let (one, two) = (b.body("one"), b.body("two"));
+    let (corners, triangles) = cube(1.0, true);
+    b.mesh(walls, "walls", grey, &corners, &triangles);
+    let (corners, triangles) = cube(0.1, false);
+    b.mesh(lamp, "lamp", glow, &corners, &triangles);
+    b.mesh(one, "one", red, &corners, &triangles);
+    b.mesh(two, "two", grey, &corners, &triangles);
+    let hook = b.node("hook", None, v(-0.5, -0.5, 0.5), DQuat::IDENTITY);
+    b.light("bulb", hook, LightKind::Point, [0.3; 3]);
+    b.build().unwrap()
+}
+
+/// The first poses: nothing inside anything else.
+fn start(session: &mut Session) {
+    for (body, at) in [(1, v(0.0, 0.0, 0.8)), (2, v(-0.4, 0.3, -0.6)), (3, v(0.5, -0.3, 0.0))] {
+        session.apply(Command::set_pose(BodyId(body), Pose::translation(at))).unwrap();
+    }
+}
+
+/// A session that is given the world of another one at once.
+fn cold(session: &Session) -> Session {
+    let mut cold = Session::new(Arc::clone(session.scene()), session.options().clone()).unwrap();
+    let held = session.held();
+    let mut apply = |command| drop(cold.apply(command).unwrap());
+    held.poses.iter().for_each(|(&b, &p)| apply(Command::SetPose(b, Some(p))));
+    held.presence.iter().for_each(|(&b, &p)| apply(Command::SetPresence(b, Some(p))));
+    held.reflectances.iter().for_each(|(&m, &r)| apply(Command::SetReflectance(m, Some(r))));
+    held.exitances.iter().for_each(|(&m, &e)| apply(Command::SetExitance(m, Some(e))));
+    held.intensities.iter().for_each(|(&l, &i)| apply(Command::SetIntensity(l, Some(i))));
+    apply(Command::SetTime(session.time_s()));
+    cold
+}
+
+/// Asserts that a session is where one is that starts from its world.
+fn check(session: &mut Session, why: &str) {
+    let mut other = cold(session);
+    assert_eq!(session.world(), other.world(), "{why}");
+    let (rho, options) = (0.95, session.options().clone());
+    let (warm, cold) = (session.solve().unwrap(), other.solve().unwrap());
+    let (one, two) = (warm.report(), cold.report());
+    assert_eq!((warm.hash(), one.links), (cold.hash(), two.links), "{why}");
+    assert_eq!(
+        (one.elements, one.leaves, one.pairs.refined, one.pairs.culled),
+        (two.elements, two.leaves, two.pairs.refined, two.pairs.culled),
+        "{why}"
+    );
+    let (a, b) = (warm.snapshot(), cold.snapshot());
+    assert_eq!(a.corners, b.corners, "{why}");
+    let mean = b.radiosity.iter().flatten().sum::<f32>() / (3 * b.radiosity.len()) as f32;
+    let bound = (options.tolerance / (1.0 - rho)) as f32 * mean.max(1e-3);
+    for (x, y) in a.radiosity.iter().flatten().zip(b.radiosity.iter().flatten()) {
+        assert!((x - y).abs() <= bound, "{why}: {x} {y}, mean {mean}");
+    }
+}
+
+/// A command drawn at random, of any kind that does not change the scene.
+fn draw(r: &mut Random, scene: &Scene) -> Command {
+    let one_of = |r: &mut Random, n: usize| (r.unit() * n as f64) as u32 % n as u32;
+    let body = BodyId(1 + one_of(r, scene.bodies.len() - 1));
+    let material = MaterialId(one_of(r, scene.materials.len()));
+    match one_of(r, 12) {
+        0..5 => {
+            let at = DVec3::from_array([0; 3].map(|_| r.between(-0.85, 0.85)));
+            let axis = v(r.unit(), r.unit(), 1.0).normalize();
+            let turn = if r.unit() < 0.5 { 0.0 } else { r.between(0.0, 3.0) };
+            Command::set_pose(body, Pose::new(DQuat::from_axis_angle(axis, turn), at))
+        }
+        5 => Command::SetPose(body, None),
+        6 => Command::hide(body),
+        7 => Command::SetPresence(body, [None, Some(true)][one_of(r, 2) as usize]),
+        8 => {
+            let to = if r.unit() < 0.3 { None } else { Some([r.unit() * 0.9; 3]) };
+            Command::SetReflectance(material, to)
+        }
+        9 => {
+            let to = [None, Some([0.0; 3]), Some([r.unit(), 2.0, 3.0])][one_of(r, 3) as usize];
+            Command::SetExitance(material, to)
+        }
+        10 if !scene.lights.is_empty() => {
+            let to = [None, Some([0.0; 3]), Some([r.unit(); 3])][one_of(r, 3) as usize];
+            Command::SetIntensity(LightId(0), to)
+        }
+        _ => Command::SetTime(r.between(0.0, 1.5)),
+    }
+}
+
+fn insertion(r: &mut Random) -> Command {
+    let (corners, triangles) = cube(0.02 + 0.1 * r.unit(), false);
+    let shift = [0; 3].map(|_| r.between(-0.8, 0.8));
+    let corners: Vec<[f64; 3]> =
+        corners.iter().map(|c| [0, 1, 2].map(|k| c[k] + shift[k])).collect();
+    let material = MaterialId((3.0 * r.unit()) as u32 % 3);
+    Command::Insert(NewBody::new("new").with_mesh("new", material, &corners, &triangles))
+}
+
+fn kinds() -> [Options; 2] {
+    [at_tolerance(0.4), form_factor_oracle(0.2, 0.02)]
+}
+
+/// Follows logs: each state against a cold build, and the way back.
+fn follow(scene: &Scene, seeds: std::ops::Range<u64>, steps: usize, insert: f64) {
+    for seed in seeds {
+        let mut r = Random(seed);
+        let options = kinds()[(seed % 2) as usize].clone();
+        let mut session = Session::new(scene.clone(), options).unwrap();
+        if scene.name == "room" {
+            start(&mut session);
+        }
+        let first = session.solve().unwrap().hash();
+        let mut inverses = Vec::new();
+        for step in 0..steps {
+            for _ in 0..=(2.0 * r.unit()) as usize {
+                let command = match r.unit() < insert {
+                    true if r.unit() < 0.5 => insertion(&mut r),
+                    true => Command::Remove(BodyId(1 + (r.unit() * 6.0) as u32)),
+                    false => draw(&mut r, session.scene()),
+                };
+                match session.apply(command) {
+                    Ok(inverse) => inverses.push(inverse),
+                    Err(CommandError::Unknown { .. }) => {}
+                    Err(error) => panic!("{seed}: {error}"),
+                }
+            }
+            check(&mut session, &format!("{} {seed}, step {step}", scene.name));
+        }
+        while let Some(inverse) = inverses.pop() {
+            session.apply(inverse).unwrap();
+            if r.unit() < 0.2 {
+                session.solve().unwrap();
+            }
+        }
+        assert_eq!(session.solve().unwrap().hash(), first, "{} {seed}: back", scene.name);
+    }
+}
+
+#[test]
+fn any_log_equals_a_cold_build_and_leads_back() {
+    follow(&room(), 0..10, 6, 0.0);
+}
+
+#[test]
+fn bodies_come_and_go() {
+    follow(&room(), 100..106, 6, 0.4);
+}
+
+#[test]
+fn hands_take_hold_of_a_clip_that_plays() {
+    for name in ["box_room.glb", "cornell_moving_box_and_lamp.glb"] {
+        follow(&shipped(name), 200..203, 5, 0.1);
+    }
+}
+
+#[test]
+fn a_promise_that_is_broken_while_time_goes_on_is_forgotten() {
+    let scene = shipped("cornell_moving_box_and_lamp.glb");
+    let mover = (0..scene.bodies.len() as u32).map(BodyId).find(|&b| scene.moves(b)).unwrap();
+    let mut session = Session::new(scene, at_tolerance(0.3)).unwrap();
+    let mut held = None;
+    for frame in 0..12 {
+        let time_s = f64::from(frame) / 24.0;
+        if frame == 5 || frame == 8 {
+            let aside = Pose { translation: v(0.3, 0.1, 0.2), ..Pose::IDENTITY };
+            let command = if frame == 5 { Some(aside) } else { held.take() };
+            session.apply(Command::SetPose(mover, command)).unwrap();
+        }
+        session.apply(Command::SetTime(time_s)).unwrap();
+        check(&mut session, &format!("frame {frame}"));
+    }
+}
+
+#[test]
+fn a_light_moves_with_the_body_it_hangs_on() {
+    let mut b = SceneBuilder::new("lantern");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let lantern = b.node("lantern", None, v(0.0, 0.0, 0.5), DQuat::IDENTITY);
+    let bulb = b.node("bulb", Some(lantern), v(0.0, 0.0, 0.1), DQuat::IDENTITY);
+    b.cuboid(lantern, "base", grey, v(-0.1, -0.1, -0.1), v(0.1, 0.1, 0.0));
+    b.light("bulb", bulb, LightKind::Point, [1.0; 3]);
+    let scene = b.build().unwrap();
+    let body = scene.body_named("lantern").unwrap();
+    let mut session = Session::new(scene, at_tolerance(0.4)).unwrap();
+    session.solve().unwrap();
+    let by = Pose::translation([0.2, 0.0, 0.0]);
+    let undo = session.apply(Command::set_pose(body, by)).unwrap();
+    let at = session.world().light_pose(LightId(0)).unwrap().translation;
+    assert!(at.distance(v(0.2, 0.0, 0.6)) < 1e-12, "{at}");
+    check(&mut session, "moved");
+    session.apply(Command::hide(body)).unwrap();
+    assert_eq!(session.world().light_pose(LightId(0)), None);
+    check(&mut session, "hidden");
+    session.apply(Command::SetPresence(body, None)).unwrap();
+    session.apply(undo).unwrap();
+    assert_eq!(session.world().light_pose(LightId(0)).unwrap().translation, v(0.0, 0.0, 0.6));
+}
+
+#[test]
+fn a_move_by_hand_costs_as_a_move_of_the_clip() {
+    let mut session = Session::new(room(), at_tolerance(0.2)).unwrap();
+    start(&mut session);
+    let all = session.solve().unwrap().report().examined;
+    session.apply(Command::set_pose(BodyId(3), Pose::translation([0.5, -0.3, 0.02]))).unwrap();
+    let report = session.solve().unwrap().report().clone();
+    assert_eq!(report.moved, ["two"]);
+    assert!(report.examined < all / 3, "{} of {all} pairs", report.examined);
+    let still = session.solve().unwrap().report().clone();
+    assert_eq!((still.examined, still.gathers), (0, 0));
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_and_changes_nothing() {
+    let mut session = Session::new(room(), at_tolerance(0.4)).unwrap();
+    start(&mut session);
+    let before = session.world();
+    let (points, triangles) = cube(0.1, false);
+    let nan = Pose::translation([f64::NAN, 0.0, 0.0]);
+    let large = Pose { rotation: 2.0 * Pose::IDENTITY.rotation, ..Pose::IDENTITY };
+    let flat = NewBody::new("flat").with_mesh("flat", MaterialId(0), &points, &[[0, 0, 1]]);
+    let other = NewBody::new("x").with_mesh("x", MaterialId(9), &points, &triangles);
+    for (command, says) in [
+        (Command::set_pose(BodyId(9), Pose::IDENTITY), "there is no body 9: the scene has 4"),
+        (Command::set_pose(BodyId(1), nan), "pose of body `lamp`"),
+        (Command::set_pose(BodyId(1), large), "without scale"),
+        (Command::set_reflectance(MaterialId(0), [1.0; 3]), "material `grey`"),
+        (Command::set_exitance(MaterialId(7), [1.0; 3]), "there is no material 7"),
+        (Command::set_intensity(LightId(0), [-1.0; 3]), "light `bulb`"),
+        (Command::SetTime(f64::INFINITY), "the time"),
+        (Command::Insert(flat), "no triangle with an area"),
+        (Command::Insert(other), "material 9 does not exist"),
+    ] {
+        let refused = session.apply(command).unwrap_err().to_string();
+        assert!(refused.contains(says), "{refused}");
+        assert_eq!(session.world(), before);
+    }
+    let back = session.apply(Command::Remove(BodyId(3))).unwrap();
+    let (corners, triangles) = cube(0.1, false);
+    let new = NewBody::new("y").with_mesh("y", MaterialId(0), &corners, &triangles);
+    session.apply(Command::Insert(new)).unwrap();
+    let refused = session.apply(back).unwrap_err().to_string();
+    assert!(refused.contains("reverse order"), "{refused}");
+}
+
+#[test]
+fn sessions_can_be_sent_and_shared() {
+    fn both<T: Send + Sync>() {}
+    both::<Session>();
+    both::<Scene>();
+    both::<Command>();
+}
+
+#[test]
+fn logs_are_undone_redone_and_replayed() {
+    for seed in 300..304 {
+        let mut r = Random(seed);
+        let scene = Arc::new(room());
+        let options = kinds()[(seed % 2) as usize].clone();
+        let mut session = Session::new(Arc::clone(&scene), options.clone()).unwrap();
+        let mut log = Log::new();
+        for (body, at) in [(1, v(0.0, 0.0, 0.8)), (2, v(-0.4, 0.3, -0.6))] {
+            let command = Command::set_pose(BodyId(body), Pose::translation(at));
+            log.apply(&mut session, command).unwrap();
+        }
+        let mut hashes = vec![log.solve(&mut session).unwrap().hash().to_string()];
+        for _ in 0..12 {
+            match r.unit() {
+                x if x < 0.2 => assert!(log.undo(&mut session).is_ok()),
+                x if x < 0.3 => assert!(log.redo(&mut session).is_ok()),
+                x if x < 0.5 => log.apply(&mut session, insertion(&mut r)).unwrap(),
+                x if x < 0.6 => drop(log.apply(&mut session, Command::Remove(BodyId(4)))),
+                _ => {
+                    let command = draw(&mut r, session.scene());
+                    // A body that was removed cannot be moved.
+                    let _ = log.apply(&mut session, command);
+                }
+            }
+            hashes.push(log.solve(&mut session).unwrap().hash().to_string());
+        }
+        let mut text = Vec::new();
+        log.write(&mut text).unwrap();
+        let mut other = Session::new(scene, options).unwrap();
+        let mut again = Vec::new();
+        let each = |frame: Frame<'_>, hash: Option<&str>| {
+            assert_eq!(Some(frame.hash().to_string().as_str()), hash);
+            again.push(frame.hash().to_string());
+        };
+        let replayed = Log::replay(&text[..], &mut other, each).unwrap();
+        assert_eq!(again, hashes, "{seed}");
+        let mut twice = Vec::new();
+        replayed.write(&mut twice).unwrap();
+        assert_eq!(String::from_utf8(twice), String::from_utf8(text), "{seed}");
+        while log.undo(&mut session).unwrap() {}
+        let fresh = Session::new(Arc::clone(session.scene()), at_tolerance(0.4)).unwrap();
+        assert_eq!(session.world(), fresh.world(), "{seed}");
+    }
+}
+
+#[test]
+fn lines_of_a_log_that_make_no_sense_are_named() {
+    let mut session = Session::new(room(), at_tolerance(0.4)).unwrap();
+    for (text, says) in [
+        ("{\"undo\":{}}", "line 1: there is nothing to undo"),
+        ("\n{\"set_time\":{\"to\":1}}\nx", "line 3: expected value"),
+        ("{\"remove\":{\"body\":\"sofa\"}}", "line 1: the scene has no body `sofa`"),
+        ("{\"set_exitance\":{\"material\":\"red\",\"to\":[-1,0,0]}}", "line 1: material `red`"),
+    ] {
+        let error = Log::replay(text.as_bytes(), &mut session, |_, _| {}).unwrap_err();
+        assert!(error.to_string().contains(says), "{error}");
+    }
+}

@@ -90,6 +90,18 @@ pub(crate) enum Command {
     /// Stops at the first frame that differs, names the first link in question, and exits with 1.
     #[command(after_help = "Example:  relume verify scene.glb --frames 0-48x12 --tolerance 0.1")]
     Verify(VerifyArgs),
+    /// Do again what a log of commands says was done to a scene, and compare the hashes.
+    ///
+    /// LOG has a line of JSON for each step: `set_pose` (body, to: axes and translation), `set_presence`,
+    /// `set_reflectance`, `set_exitance`, `set_intensity`, `set_time`, `insert`, `remove`, `undo`, `redo`, and `solve`, with
+    /// the hash of the links if it is known. Bodies, materials and lights go by the names that `relume info` lists;
+    /// `to` may be null: then the file has its say again. `insert` holds a name and meshes (surface, index of the
+    /// material, positions, triangles). Programs that use relume as a library write such logs
+    /// (`relume::Log`). Exits with 1 at the first hash that differs.
+    #[command(
+        after_help = "Example:  relume replay moves.jsonl scene.glb --tolerance 0.1 -o with-hashes.jsonl"
+    )]
+    Replay(ReplayArgs),
     /// Measure what a frame costs, against building it from scratch.
     ///
     /// Prints the paper's Table 0.1 for any scene: frames, average time a frame, standard deviation,
@@ -570,6 +582,21 @@ pub(crate) struct VerifyArgs {
     /// How the links follow the motion.
     #[arg(long, value_name = "STRATEGY", value_enum, default_value = "certificate")]
     pub(crate) update: ExactUpdate,
+}
+
+/// `relume replay`
+#[derive(Debug, Args)]
+pub(crate) struct ReplayArgs {
+    /// The log, a line of JSON for each step.
+    #[arg(value_name = "LOG")]
+    pub(crate) log: PathBuf,
+    #[command(flatten)]
+    pub(crate) source: SourceFlags,
+    /// Where to write the log with the hashes that were found.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) clip: ClipFlags,
 }
 
 /// The strategies that lose nothing.

@@ -23,6 +23,7 @@ mod outside;
 mod paper;
 mod probe;
 mod progress;
+mod replay;
 mod report;
 mod resume;
 mod run;
@@ -59,6 +60,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Info(args) => info::info(&args),
         Command::Check(args) => check::check(&args),
         Command::Verify(args) => interrupt::listen().and_then(|()| verify::verify(&args)),
+        Command::Replay(args) => interrupt::listen().and_then(|()| replay::replay(&args)),
         Command::Bench(args) => interrupt::listen().and_then(|()| bench::bench(&args)),
         Command::Factors(args) => interrupt::listen().and_then(|()| factors::factors(&args)),
         Command::Probe(args) => interrupt::listen().and_then(|()| probe::probe(&args)),

@@ -15,7 +15,9 @@ fn a_log_is_followed_and_its_hashes_compared() {
     let axes = "[[1,0,0],[0,1,0],[0,0,1]]";
     let lines = [
         "{\"solve\":{\"hash\":null}}".to_owned(),
-        format!("{{\"set_pose\":{{\"body\":\"lamp\",\"to\":{{\"axes\":{axes},\"translation\":[0.3,2.8,0.2]}}}}}}"),
+        format!(
+            "{{\"set_pose\":{{\"body\":\"lamp\",\"to\":{{\"axes\":{axes},\"translation\":[0.3,2.8,0.2]}}}}}}"
+        ),
         "{\"solve\":{\"hash\":null}}".to_owned(),
         "{\"undo\":{}}".to_owned(),
         "{\"solve\":{\"hash\":null}}".to_owned(),

@@ -12,10 +12,10 @@
 //! # let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/box_room.glb");
 //! let scene = import(file, &ImportOptions::default())?;
 //! let mut session = Session::new(scene, Options { tolerance: 0.1, ..Options::default() })?;
-//! for frame in 0..3 {
-//!     session.step(frame, f64::from(frame) / 24.0)?;
-//!     let [red, green, blue] = session.irradiance_at([0.5, 0.3, 0.2].into(), [0.0, 1.0, 0.0].into());
-//!     println!("{frame}: {red:.3} {green:.3} {blue:.3} W/m2");
+//! for k in 0..3 {
+//!     let frame = session.solve_at(f64::from(k) / 24.0)?;
+//!     let [red, green, blue] = frame.irradiance_at([0.5, 0.3, 0.2], [0.0, 1.0, 0.0]);
+//!     println!("{k}: {red:.3} {green:.3} {blue:.3} W/m2");
 //! }
 //! # Ok(())
 //! # }
@@ -56,7 +56,8 @@
 //! ```
 //!
 //! Lengths are metres, times seconds, light is radiometric (W, W/m2, W/sr) in three linear channels. Work is done on
-//! [rayon]'s global pool; inside `ThreadPool::install` on that pool.
+//! rayon's global pool; inside `ThreadPool::install` on that pool. Results are the same on any. [`Session::watch`] shows a
+//! solve under way to other threads, and calls it off.
 //!
 //! Not part of the interface, and free to change: the modules that are hidden here, which the command and the tests of this
 //! repository use.

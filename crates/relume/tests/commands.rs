@@ -336,3 +336,53 @@ fn lines_of_a_log_that_make_no_sense_are_named() {
         assert!(error.to_string().contains(says), "{error}");
     }
 }
+
+#[test]
+fn a_solve_is_called_off_and_the_next_one_is_not() {
+    let mut session = Session::new(room(), at_tolerance(0.02)).unwrap();
+    start(&mut session);
+    session.watch().cancel();
+    let error = session.solve().map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("called off"), "{error}");
+    assert!(session.frame().is_none());
+    let hash = session.solve().unwrap().hash();
+    assert_eq!(hash, cold(&session).solve().unwrap().hash());
+    assert_eq!(session.frame().map(|frame| frame.hash()), Some(hash));
+}
+
+#[test]
+#[ignore = "minutes: a thousand logs"]
+fn a_thousand_logs() {
+    follow(&room(), 1_000..1_800, 8, 0.15);
+    follow(&shipped("box_room.glb"), 2_000..2_100, 8, 0.1);
+    follow(&shipped("cornell_moving_box_and_lamp.glb"), 3_000..3_100, 8, 0.1);
+}
+
+#[test]
+#[ignore = "minutes: ten thousand commands"]
+fn ten_thousand_commands_leave_no_trace() {
+    let mut session = Session::new(room(), at_tolerance(0.4)).unwrap();
+    start(&mut session);
+    let hash = session.solve().unwrap().hash();
+    let (mut r, mut bytes) = (Random(7), Vec::new());
+    for _ in 0..100 {
+        let mut inverses = Vec::new();
+        for step in 0..100 {
+            let command = match step % 25 {
+                7 => insertion(&mut r),
+                _ => draw(&mut r, session.scene()),
+            };
+            inverses.extend(session.apply(command).ok());
+            if step % 5 == 0 {
+                session.solve().unwrap();
+            }
+        }
+        inverses.into_iter().rev().for_each(|back| drop(session.apply(back).unwrap()));
+        assert_eq!(session.solve().unwrap().hash(), hash);
+        bytes.push(session.memory_bytes());
+    }
+    println!("bytes {bytes:?}");
+    let half = bytes.len() / 2;
+    let most = |bytes: &[u64]| *bytes.iter().max().unwrap();
+    assert!(most(&bytes[half..]) <= most(&bytes[..half]) + most(&bytes[..half]) / 20);
+}

@@ -60,7 +60,7 @@ impl Session {
         let bring = |solved: &mut Solved, since: Option<&Since<'_>>, level, fresh: &[PairId]| {
             let record = Record { edits: !cold, events: !cold && self.options.events };
             let found = self.update(solved, (since, &ahead), level, (record, fresh));
-            found.map_err(|OutOfMemory| self.too_large(solved, next.frame))
+            found.map_err(|OutOfMemory| self.stopped(solved, next.frame))
         };
         if !self.coarse_ids.is_empty() {
             changes = bring(&mut solved, since.as_ref(), Level::Coarse, &[])?;
@@ -235,7 +235,7 @@ impl Session {
         let within = budget::within(self.options.max_memory_bytes);
         let may_go_on = |tree: &PairTree, elements: usize, scratch: u64| {
             self.watch.see(tree.len() as u64, budget::bytes_of(tree, elements, scratch));
-            within(tree, elements, scratch)
+            within(tree, elements, scratch) && !self.watch.is_cancelled()
         };
         let stage = match level {
             Level::Coarse => Stage::Coarse,
@@ -365,7 +365,11 @@ impl Session {
         tally::dynamic_links(&self.scene, &solved.forest, &solved.tree, &moved, &light_moved)
     }
 
-    fn too_large(&self, solved: &Solved, frame: u32) -> SessionError {
+    /// Why an update did not go on.
+    fn stopped(&self, solved: &Solved, frame: u32) -> SessionError {
+        if self.watch.is_cancelled() {
+            return SessionError::Cancelled { frame };
+        }
         SessionError::OutOfMemory {
             frame,
             tolerance: self.options.tolerance,

@@ -52,12 +52,15 @@ impl<'a> Frame<'a> {
         Hash(self.session.now().hash.bits())
     }
 
-    /// Irradiance at a point with a unit normal, W/m2, linear RGB; see [`Session::irradiance_at`].
+    /// Irradiance at a point with a unit normal, W/m2, linear RGB: gathered from all elements and punctual lights, each
+    /// with visibility of its own from this point. What an emitter emits is exact; what an element sends errs by its
+    /// radiosity's variation within it.
     pub fn irradiance_at(&self, point: impl Into<DVec3>, normal: impl Into<DVec3>) -> [f64; 3] {
         self.session.irradiance_at(point.into(), normal.into())
     }
 
-    /// Irradiances at many sensors, W/m2, linear RGB, in their order; see [`Session::irradiances_at`].
+    /// Irradiances at many sensors in parallel, W/m2, linear RGB, in their order. Cost: some 0.1 us for each element
+    /// that is neither far from a sensor nor hidden, more where something is partly in the way.
     pub fn irradiances_at(&self, sensors: &[Sensor]) -> Vec<[f64; 3]> {
         self.session.irradiances_at(sensors)
     }
@@ -65,6 +68,23 @@ impl<'a> Frame<'a> {
     /// The link events of this frame, if [`super::Options::events`] asks for them.
     pub fn events(&self) -> Vec<Event> {
         self.session.events()
+    }
+
+    /// Sums of the form factors from every leaf element, in no order of meaning: 1 in a closed scene, up to the links'
+    /// errors.
+    pub fn row_sums(&self) -> Vec<f64> {
+        self.session.row_sums().into_iter().map(|(_, sum)| sum).collect()
+    }
+
+    /// The solution as pictures and exports read it.
+    pub fn solution(&self) -> Snapshot {
+        self.session.snapshot()
+    }
+
+    /// The same with the light of every element found anew from all links above it: cleaner corners and contact
+    /// shadows. Cost: some ten times that of a frame with a moving light.
+    pub fn reconstruction(&self) -> Snapshot {
+        self.session.reconstruction()
     }
 
     /// The radiosity of all surfaces, as flat arrays.

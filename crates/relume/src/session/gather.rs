@@ -40,6 +40,7 @@ impl Session {
     ///
     /// # Panics
     /// Before the first [`Session::step`].
+    #[doc(hidden)]
     pub fn irradiance_at(&self, point: DVec3, normal: DVec3) -> [f64; 3] {
         self.irradiances_at(&[Sensor { at: point, normal }])[0]
     }
@@ -50,6 +51,7 @@ impl Session {
     ///
     /// # Panics
     /// Before the first [`Session::step`].
+    #[doc(hidden)]
     pub fn irradiances_at(&self, sensors: &[Sensor]) -> Vec<[f64; 3]> {
         let solved = self.solved.as_ref().expect("a step comes before a query");
         let one = |sensor: &Sensor| Look::new((self, solved), sensor, true).gather();

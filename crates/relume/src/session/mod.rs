@@ -63,6 +63,7 @@ use coarse::Coarse;
 
 /// Why a frame could not be computed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SessionError {
     /// The links of this tolerance do not fit into the memory allowed.
     #[error(
@@ -77,6 +78,12 @@ pub enum SessionError {
         limit_bytes: u64,
         /// Pairs made when the limit was met.
         links: u64,
+    },
+    /// The step was called off by [`Watch::cancel`].
+    #[error("frame {frame} was called off")]
+    Cancelled {
+        /// The frame that was being computed.
+        frame: u32,
     },
     /// Light does not settle between some surfaces.
     #[error(
@@ -247,9 +254,17 @@ impl Session {
     /// # Errors
     /// [`SessionError::OutOfMemory`] if the links do not fit; there is no solution then until a
     /// step succeeds.
+    #[doc(hidden)]
     pub fn step(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, SessionError> {
         self.time_s = time_s;
         self.frames += 1;
+        let done = self.step_on(frame, time_s);
+        // What was called off too late calls nothing else off.
+        self.watch.take_cancelled();
+        done
+    }
+
+    fn step_on(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, SessionError> {
         let world = self.scene.at_but(time_s, &self.held);
         let came_from = self.came_from.take();
         let from = came_from.map(|from_s| self.scene.at_but(from_s, &self.held));
@@ -294,6 +309,7 @@ impl Session {
     /// Says at which time the frame before the next step was, where that is not the last step:
     /// [`FrameReport::moved`] and [`FrameReport::dynamic_links`] count from there. Nothing else
     /// depends on it.
+    #[doc(hidden)]
     pub fn came_from(&mut self, time_s: Option<f64>) {
         self.came_from = time_s;
     }
@@ -301,10 +317,23 @@ impl Session {
     /// Solves the world as the commands so far have made it; the first time that is a cold build.
     ///
     /// # Errors
-    /// As [`Session::step`].
+    /// [`SessionError`]; there is no solution then, and the next solve is a cold build.
     pub fn solve(&mut self) -> Result<Frame<'_>, SessionError> {
-        self.step(self.frames, self.time_s)?;
+        self.solve_at(self.time_s)
+    }
+
+    /// Goes to a time of the clip, seconds, and solves the world there. Any time may follow any other.
+    ///
+    /// # Errors
+    /// As [`Session::solve`].
+    pub fn solve_at(&mut self, time_s: f64) -> Result<Frame<'_>, SessionError> {
+        self.step(self.frames, time_s)?;
         Ok(Frame::new(self))
+    }
+
+    /// The last solution, if there is one.
+    pub fn frame(&self) -> Option<Frame<'_>> {
+        self.solved.is_some().then(|| Frame::new(self))
     }
 
     /// The world that the next [`Session::solve`] solves.
@@ -357,6 +386,7 @@ impl Session {
     ///
     /// # Panics
     /// Before the first [`Session::step`].
+    #[doc(hidden)]
     pub fn snapshot(&self) -> Snapshot {
         let solved = self.solved.as_ref().expect("a step comes before a snapshot");
         snapshot::take(self, solved, (&solved.links, &solved.radiosity))
@@ -371,6 +401,7 @@ impl Session {
     ///
     /// # Panics
     /// Before the first [`Session::step`].
+    #[doc(hidden)]
     pub fn reconstruction(&self) -> Snapshot {
         let solved = self.solved.as_ref().expect("a step comes before a snapshot");
         let (links, radiosity) = reconstruct::solve(self, solved);
@@ -381,6 +412,7 @@ impl Session {
     ///
     /// # Panics
     /// Before the first [`Session::step`].
+    #[doc(hidden)]
     pub fn pairs(&self) -> (&PairTree, &Forest) {
         let solved = self.solved.as_ref().expect("a step comes before a look at the pairs");
         (&solved.tree, &solved.forest)
@@ -391,6 +423,7 @@ impl Session {
     ///
     /// # Panics
     /// Before the first [`Session::step`].
+    #[doc(hidden)]
     pub fn events(&self) -> Vec<Event> {
         let solved = self.solved.as_ref().expect("a step comes before its events");
         events::named(&self.scene, solved)
@@ -401,6 +434,7 @@ impl Session {
     ///
     /// # Panics
     /// Before the first [`Session::step`].
+    #[doc(hidden)]
     pub fn row_sums(&self) -> Vec<(ElementId, f64)> {
         let solved = self.solved.as_ref().expect("a step comes before a look at the rows");
         tally::row_sums_of(&self.scene, solved)

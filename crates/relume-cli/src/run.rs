@@ -18,7 +18,7 @@ use relume_picture::picture::{self, Exposure};
 use crate::args::{
     DemoArgs, ExposureFlag, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags, UpdateFlag,
 };
-use crate::clip::{self, Clip, TOLERANCE, fixed, now};
+use crate::clip::{self, Clip, PICTURE_TOLERANCE, TOLERANCE, fixed, now};
 use crate::demo;
 use crate::events::EventTable;
 use crate::failure::Failure;
@@ -69,7 +69,7 @@ pub(crate) fn render(args: RenderArgs) -> Result<(), Failure> {
     let job = Job {
         scene: args.scene,
         dir: Some(args.output),
-        tolerance: TOLERANCE,
+        tolerance: PICTURE_TOLERANCE,
         picture: Some((args.picture.shading.unwrap_or(Shading::Gouraud), args.picture)),
         solve: args.solve,
     };

@@ -271,6 +271,10 @@ pub(crate) struct RenderArgs {
     /// its own.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
+    /// Draw rough pictures, DIR/preview-0000.png ..., within seconds a frame however much there is, and solve nothing: direct
+    /// light, and grey light between surfaces from some thousand points.
+    #[arg(long, conflicts_with_all = ["resume", "events", "report", "mesh", "reconstruct", "shading"])]
+    pub(crate) preview: bool,
     #[command(flatten)]
     pub(crate) solve: SolveFlags,
     #[command(flatten)]

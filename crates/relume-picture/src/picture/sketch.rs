@@ -107,7 +107,7 @@ impl Sketch {
         let projector = Projector::new(view, width, height);
         let exposure = match settings.exposure {
             Exposure::Fixed(exposure) => exposure,
-            Exposure::Automatic => self.metered(view),
+            Exposure::Automatic => self.scale(view),
         };
         let encoder = SrgbEncoder::new();
         let display = |radiosity: Option<[f64; 3]>| match radiosity {
@@ -127,8 +127,13 @@ impl Sketch {
         Image { width, height, pixels: (0..count).into_par_iter().map(shade).collect() }
     }
 
+    /// The exposure that suits a view, [`Exposure::Fixed`], as [`Exposure::automatic`] is chosen.
+    pub fn exposure(&self, view: &View) -> Exposure {
+        Exposure::Fixed(self.scale(view))
+    }
+
     /// Display value per W/m2/sr that suits a view.
-    fn metered(&self, view: &View) -> f64 {
+    fn scale(&self, view: &View) -> f64 {
         let projector = Projector::new(view, METERED.0, METERED.1);
         let all: Vec<DVec2> = pixels(METERED).collect();
         let of_pixel = |&pixel: &DVec2| {

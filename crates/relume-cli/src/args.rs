@@ -283,6 +283,10 @@ pub(crate) struct RenderArgs {
     /// its own.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
+    /// Draw rough pictures, DIR/preview-0000.png ..., within seconds a frame however much there is, and solve nothing: direct
+    /// light, and grey light between surfaces from some thousand points.
+    #[arg(long, conflicts_with_all = ["resume", "events", "report", "mesh", "reconstruct", "shading"])]
+    pub(crate) preview: bool,
     #[command(flatten)]
     pub(crate) solve: SolveFlags,
     #[command(flatten)]
@@ -485,8 +489,8 @@ pub(crate) struct ClipFlags {
     pub(crate) fps: f64,
     #[command(flatten)]
     pub(crate) animation: AnimationFlag,
-    /// Relative error of irradiance aimed at (root mean square), between 0 and 1: 0.1 is quick,
-    /// 0.005 is fine [default: 0.02].
+    /// Relative error of irradiance aimed at (root mean square), between 0 and 1: 0.1 is quick and enough for
+    /// most pictures, 0.005 is fine [default: 0.1 for `render`, 0.02 for numbers].
     #[arg(long, value_name = "ERROR", value_parser = parse_tolerance, allow_negative_numbers = true)]
     pub(crate) tolerance: Option<f64>,
     /// What decides whether two elements are linked: `error`, the estimated error of irradiance, or

@@ -18,11 +18,15 @@ use crate::failure::Failure;
 use crate::frames;
 use crate::memory;
 use crate::output::{self, count, counted};
-use crate::outside;
+use crate::outside::{self, Unlit};
 use crate::scene_file;
 
-/// Default tolerance, relative error of irradiance.
+/// Default tolerance, relative error of irradiance, of what makes numbers.
 pub(crate) const TOLERANCE: f64 = 0.02;
+
+/// The same of pictures: beside one at 0.02 the eye finds no difference but along some edges, at a tenth to a quarter of
+/// the time (docs/tolerance.md).
+pub(crate) const PICTURE_TOLERANCE: f64 = 0.1;
 
 /// Share of the scene's area below which the form-factor oracle does not refine, unless it is told
 /// an area. A share, so that a scene in other units gives the same elements; with it a closed cube
@@ -124,13 +128,14 @@ impl Clip {
         })
     }
 
-    /// The same clip in the light of a default sky, if nothing emits and nothing was said of the light outside: a black
-    /// picture shows nothing.
-    pub(crate) fn lit(self) -> Result<Clip, Failure> {
-        if self.scene.emits() || !self.flags.outside.is_empty() {
-            return Ok(self);
-        }
-        let (scene, said) = outside::lit_by_default((*self.scene).clone(), self.tolerance)?;
+    /// Whether light was asked for: from outside, or of a material.
+    pub(crate) fn light_is_chosen(&self) -> bool {
+        !self.flags.outside.is_empty() || !self.flags.animation.edits.emit.is_empty()
+    }
+
+    /// The same clip in the light of a default sky, which is said: a black picture shows nothing.
+    pub(crate) fn lit(self, why: &Unlit) -> Result<Clip, Failure> {
+        let (scene, said) = outside::lit_by_default((*self.scene).clone(), self.tolerance, why)?;
         if !self.flags.quiet {
             output::complain(&said);
         }
@@ -177,6 +182,16 @@ impl Clip {
     /// The oracle, as on the command line.
     pub(crate) fn oracle(&self) -> String {
         self.flags.oracle.to_string()
+    }
+
+    /// Whether every note is wanted.
+    pub(crate) fn is_verbose(&self) -> bool {
+        self.flags.verbose && !self.flags.quiet
+    }
+
+    /// Frames a second.
+    pub(crate) fn fps(&self) -> f64 {
+        self.flags.fps
     }
 
     /// Time of a frame, seconds.

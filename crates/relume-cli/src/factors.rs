@@ -224,7 +224,7 @@ fn frames(
     let mut session = clip.session_of(joined.scene, args.update)?;
     let size = Size::of_scene(session.scene(), clip, session.options());
     if !args.clip.quiet {
-        size.warn(clip, clip.frames.len());
+        size.warn(clip, clip.frames.len(), "");
     }
     progress.watch(session.watch(), size.pairs());
     let mut before: Option<Factors> = None;

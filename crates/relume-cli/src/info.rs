@@ -2,9 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use relume::scene::{
-    BodyId, Light, LightKind, Material, MaterialId, Patch, Projection, Scene, Tint,
-};
+use relume::scene::{BodyId, Light, LightKind, Material, MaterialId, Projection, Scene, Tint};
 
 use crate::args::InfoArgs;
 use crate::clip::TOLERANCE;
@@ -108,6 +106,8 @@ fn animation(out: &mut String, scene: &Scene, count: u32, fps: f64) -> fmt::Resu
 
 fn bodies(out: &mut String, scene: &Scene) -> fmt::Result {
     writeln!(out, "\nbodies")?;
+    let mut surfaces = vec![Vec::new(); scene.bodies.len()];
+    scene.surfaces.iter().for_each(|surface| surfaces[surface.body.0 as usize].push(surface));
     for (index, body) in scene.bodies.iter().enumerate() {
         let id = BodyId(index as u32);
         let area: f64 = scene.patches_of(id).map(|(_, patch)| patch.area_m2()).sum();
@@ -119,7 +119,7 @@ fn bodies(out: &mut String, scene: &Scene) -> fmt::Result {
             output::name(&body.name),
             number(area)
         )?;
-        for surface in scene.surfaces.iter().filter(|s| s.body == id) {
+        for surface in &surfaces[index] {
             let material = output::name(&scene.materials[surface.material.0 as usize].name);
             writeln!(out, "    {:<22} material {material}", output::name(&surface.name))?;
         }
@@ -153,15 +153,15 @@ fn materials(out: &mut String, scene: &Scene) -> fmt::Result {
 fn emitters(out: &mut String, scene: &Scene) -> fmt::Result {
     writeln!(out, "\nemitters (flux in W; linear RGB, and the sum)")?;
     let mut none = scene.lights.is_empty();
-    for (index, surface) in scene.surfaces.iter().enumerate() {
+    let mut emitted = vec![([0.0; 3], 0.0); scene.surfaces.len()];
+    for patch in scene.patches.iter().filter(|patch| scene.patch_emits(patch)) {
+        let exitance = scene.most_exitance(patch);
+        let (flux, area) = &mut emitted[patch.surface.0 as usize];
+        *area += patch.area_m2();
+        (0..3).for_each(|c| flux[c] += exitance[c] * patch.area_m2());
+    }
+    for (surface, (flux, area)) in scene.surfaces.iter().zip(emitted) {
         let material = &scene.materials[surface.material.0 as usize];
-        let of_it = |patch: &&Patch| patch.surface.0 as usize == index && scene.patch_emits(patch);
-        let (mut flux, mut area) = ([0.0; 3], 0.0);
-        for patch in scene.patches.iter().filter(of_it) {
-            let exitance = scene.most_exitance(patch);
-            area += patch.area_m2();
-            (0..3).for_each(|c| flux[c] += exitance[c] * patch.area_m2());
-        }
         if area == 0.0 {
             continue;
         }

@@ -1,19 +1,64 @@
-//! Scenes in which nothing shines: nothing is solved for a black picture.
+//! Scenes in which nothing shines, or little of what is looked at: nothing is solved for a black picture.
 
 use relume::scene::Scene;
+use relume_picture::picture::Sketch;
 
 use crate::clip::Clip;
 use crate::failure::Failure;
 use crate::output;
+use crate::outside::Unlit;
+use crate::viewing::{ViewFlags, Viewing};
 
 /// Most materials that are named.
 const NAMED: usize = 5;
 
-/// A clip of which pictures are to be made: with light, if need be that of a default sky.
-pub(crate) fn for_pictures(clip: Clip) -> Result<Clip, Failure> {
-    let clip = clip.lit()?;
+/// Share of what is seen of surfaces that has to be lit at some time, so that a picture shows what it is of: eyes that glow
+/// and headlights light less, lamps in rooms and streets more.
+const LIT_MIN: f64 = 0.25;
+
+/// Instants of a clip at which that is looked at.
+const INSTANTS: usize = 3;
+
+/// A clip of which pictures are to be made: with light, that of a default sky too where nothing was said of light and
+/// what emits lights little of what is seen.
+pub(crate) fn for_pictures(clip: Clip, view: &ViewFlags) -> Result<Clip, Failure> {
+    let clip = match unlit(&clip, view)? {
+        Some(why) => clip.lit(&why)?,
+        None => clip,
+    };
     required(&clip.scene)?;
     Ok(clip)
+}
+
+/// Whether a clip needs the light of a default sky, and why.
+fn unlit(clip: &Clip, flags: &ViewFlags) -> Result<Option<Unlit>, Failure> {
+    if clip.light_is_chosen() {
+        return Ok(None);
+    }
+    if !clip.scene.emits() {
+        return Ok(Some(Unlit::Dark));
+    }
+    let views = Viewing::new(&clip.scene, flags)?;
+    let mut most = None;
+    for frame in instants(&clip.frames) {
+        let view = views.at(&clip.scene, frame, clip.fps())?;
+        let lit = Sketch::new(&clip.scene, clip.time_of(frame)).lit(&view);
+        most = [most, lit].into_iter().flatten().reduce(f64::max);
+    }
+    if let (Some(lit), true) = (most, clip.is_verbose()) {
+        let percent = 100.0 * lit;
+        output::complain(&format!(
+            "note: what emits light reaches {percent:.0} % of what the view shows"
+        ));
+    }
+    // Where a view sees no surface it is no matter of light.
+    Ok(most.filter(|&lit| lit < LIT_MIN).map(Unlit::Dim))
+}
+
+/// Some of the frames, the first among them.
+fn instants(frames: &[u32]) -> impl Iterator<Item = u32> + '_ {
+    let count = frames.len().min(INSTANTS);
+    (0..count).map(move |k| frames[k * frames.len() / count])
 }
 
 /// An error if nothing in a scene ever emits.

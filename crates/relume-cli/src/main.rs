@@ -21,6 +21,7 @@ mod notes;
 mod output;
 mod outside;
 mod paper;
+mod preview;
 mod probe;
 mod progress;
 mod replay;

@@ -16,10 +16,11 @@ use crate::scene_file;
 /// Light from outside the scene. Up is +Y, north -Z, east +X.
 #[derive(Clone, Debug, Default, Args)]
 pub(crate) struct OutsideFlags {
-    /// Light from the sky, without the sun's disc: uniform=L (radiance, W/m2/sr; or R,G,B), overcast[=E] (CIE overcast;
+    /// Light from the sky, without the sun's disc: none, uniform=L (radiance, W/m2/sr; or R,G,B), overcast[=E] (CIE overcast;
     /// E is horizontal irradiance, W/m2 [100]), clear[=E] (CIE clear [100]), perez=T (by turbidity, 1.7 to 10, with its
     /// colours; luminance over 125 lm/W), perez=DIRECT,DIFFUSE (all-weather, by the sun's normal and the sky's horizontal
-    /// irradiance, W/m2). All but the first two need --sun.
+    /// irradiance, W/m2). `perez` and `clear` need --sun. `render` adds a uniform one where what emits lights little of
+    /// what is seen, unless it is told none.
     #[arg(long, value_name = "SKY", conflicts_with = "environment")]
     pub(crate) sky: Option<SkyFlag>,
     /// The sun: AZIMUTH,ELEVATION[,E] in degrees, azimuth from north (-Z) clockwise (east, +X, is 90), or
@@ -49,7 +50,8 @@ pub(crate) struct OutsideFlags {
 #[derive(Clone, Debug)]
 pub(crate) struct SkyFlag {
     text: String,
-    sky: Sky,
+    /// `None` for none.
+    sky: Option<Sky>,
 }
 
 /// `--sun`
@@ -120,7 +122,11 @@ impl OutsideFlags {
             let turned = self.environment_turn.unwrap_or(0.0);
             read.map(|e| Sky::Environment(Arc::new(e.turned(turned)))).map_err(scene_file::failure)
         });
-        let sky = environment.transpose()?.or_else(|| self.sky.as_ref().map(|f| f.sky.clone()));
+        let sky =
+            environment.transpose()?.or_else(|| self.sky.as_ref().and_then(|f| f.sky.clone()));
+        if sky.is_none() && self.sun.is_none() {
+            return Ok(scene);
+        }
         let sun = self.sun.as_ref().map(|flag| Sun {
             place: flag.place,
             irradiance: flag.irradiance.map(|e| [e; 3]),
@@ -147,16 +153,34 @@ impl OutsideFlags {
     }
 }
 
-/// A scene in which nothing emits in the light that pictures have by default, with what is said of it.
-pub(crate) fn lit_by_default(scene: Scene, fineness: f64) -> Result<(Scene, String), Failure> {
+/// Why a scene has the light that pictures have by default.
+pub(crate) enum Unlit {
+    /// Nothing emits.
+    Dark,
+    /// What emits lights this share of what the view shows of surfaces.
+    Dim(f64),
+}
+
+/// A scene in the light that pictures have by default, with what is said of it.
+pub(crate) fn lit_by_default(
+    scene: Scene,
+    fineness: f64,
+    why: &Unlit,
+) -> Result<(Scene, String), Failure> {
     let (radiance, ground) = DEFAULT_SKY;
     let sky = Some(Sky::Uniform([radiance; 3]));
     let outside = Outside { sky, ground, fineness, ..Outside::default() };
-    let said = format!(
-        "note: nothing emits light in `{}`: lit by --sky uniform={radiance} --ground {ground}; choose with --sky, --sun or \
-         --environment",
-        scene.name
-    );
+    let (name, light) = (&scene.name, format!("--sky uniform={radiance} --ground {ground}"));
+    let said = match why {
+        Unlit::Dark => format!(
+            "note: nothing emits light in `{name}`: lit by {light}; choose with --sky, --sun or --environment"
+        ),
+        Unlit::Dim(share) => format!(
+            "note: what emits light in `{name}` reaches {:.0} % of what the view shows: {light} is added; --sky none leaves it \
+             out",
+            100.0 * share
+        ),
+    };
     Ok((scene.with_outside(outside).map_err(scene_file::failure)?, said))
 }
 
@@ -178,6 +202,7 @@ impl FromStr for SkyFlag {
             None => (text, Vec::new()),
         };
         let sky = match (name, given[..].iter().as_slice()) {
+            ("none", []) => return Ok(SkyFlag { text: text.to_owned(), sky: None }),
             ("uniform", &[l]) => Sky::Uniform([l; 3]),
             ("uniform", &[r, g, b]) => Sky::Uniform([r, g, b]),
             ("overcast", []) => Sky::Overcast { irradiance: SKY_W_M2 },
@@ -188,13 +213,13 @@ impl FromStr for SkyFlag {
             ("perez", &[direct, diffuse]) => Sky::AllWeather { direct, diffuse },
             _ => {
                 return Err(
-                    "write uniform=L, uniform=R,G,B, overcast, overcast=E, clear, clear=E, \
+                    "write none, uniform=L, uniform=R,G,B, overcast, overcast=E, clear, clear=E, \
                             perez=TURBIDITY or perez=DIRECT,DIFFUSE"
                         .into(),
                 );
             }
         };
-        Ok(SkyFlag { text: text.to_owned(), sky })
+        Ok(SkyFlag { text: text.to_owned(), sky: Some(sky) })
     }
 }
 

@@ -36,7 +36,7 @@ pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
     let mut session = clip.session(args.update, false)?;
     let size = Size::of(&clip, session.options());
     if !args.clip.quiet {
-        size.warn(&clip, clip.frames.len());
+        size.warn(&clip, clip.frames.len(), "");
     }
     let progress = Progress::new(clip.frames.len(), 0, args.clip.quiet);
     progress.watch(session.watch(), size.pairs());

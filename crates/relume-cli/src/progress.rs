@@ -11,6 +11,7 @@ use relume::session::Watch;
 use crate::clip::now;
 use crate::interrupt;
 use crate::memory;
+use crate::output;
 
 static DONE: AtomicU64 = AtomicU64::new(0);
 static WANTED: AtomicU64 = AtomicU64::new(0);
@@ -120,6 +121,12 @@ impl Progress {
     /// Does something, such as printing a line, with the bar out of the way.
     pub(crate) fn suspend<T>(&self, action: impl FnOnce() -> T) -> T {
         self.bar.suspend(action)
+    }
+
+    /// Says lines with the bar out of the way, from any thread.
+    pub(crate) fn aside(&self) -> impl Fn(&str) + Send + 'static {
+        let bar = self.bar.clone();
+        move |line| bar.suspend(|| output::complain(line))
     }
 
     /// Takes the bar away.

@@ -54,7 +54,7 @@ pub(crate) fn take_over(
 /// What differs, in words, one entry a field.
 fn differences(then: &Report, now: &Report) -> Vec<String> {
     if then.scene.content != now.scene.content {
-        return vec!["the scene file or a file it refers to has changed".into()];
+        return vec!["the scene file, a file it refers to or the environment has changed".into()];
     }
     let fields = |report: &Report| {
         let mut fields = Vec::new();
@@ -94,15 +94,16 @@ fn flatten(name: String, value: &Value, into: &mut Vec<(String, String)>) {
     }
 }
 
-/// Hash over the bytes of a scene file and of the files it refers to, 16 hexadecimal digits.
+/// Hash over the bytes of a scene file, of the files it refers to and of the environment that lights it, 16 hexadecimal
+/// digits.
 ///
 /// FNV-1a over 64 bits: it tells an edited file from the same one, and is no protection against
 /// somebody who wants to deceive.
-pub(crate) fn content_hash(scene: &Path) -> Result<String, Failure> {
+pub(crate) fn content_hash(scene: &Path, environment: Option<&Path>) -> Result<String, Failure> {
     let bytes = memory::read(scene)?;
     let mut hash = Fnv::new();
     hash.add(&bytes);
-    for file in referred_files(scene, &bytes) {
+    for file in referred_files(scene, &bytes).into_iter().chain(environment.map(Path::to_owned)) {
         // A file that is missing is the importer's to complain about.
         let _ = File::open(&file).and_then(|file| hash.add_file(file));
     }
@@ -278,7 +279,10 @@ mod tests {
         let text = refusal(|r| r.version = "9.9.9".into());
         assert!(text.contains("and is 9.9.9 now"), "{text}");
         let text = refusal(|r| r.scene.content = "ff00".into());
-        assert!(text.contains("the scene file or a file it refers to has changed"), "{text}");
+        assert!(
+            text.contains("the scene file, a file it refers to or the environment has changed"),
+            "{text}"
+        );
     }
 
     #[test]
@@ -289,11 +293,17 @@ mod tests {
         let text = r#"{"buffers": [{"uri": "my%20buffer.bin"}, {"uri": "data:,x"}]}"#;
         fs::write(&scene, text).unwrap();
         fs::write(&buffer, "one").unwrap();
-        let first = content_hash(&scene).unwrap();
-        assert_eq!(content_hash(&scene).unwrap(), first);
+        let first = content_hash(&scene, None).unwrap();
+        assert_eq!(content_hash(&scene, None).unwrap(), first);
         fs::write(&buffer, "two").unwrap();
-        assert_ne!(content_hash(&scene).unwrap(), first);
-        assert!(content_hash(&dir.path().join("missing.glb")).is_err());
+        assert_ne!(content_hash(&scene, None).unwrap(), first);
+        assert!(content_hash(&dir.path().join("missing.glb"), None).is_err());
+        let sky = dir.path().join("sky.hdr");
+        fs::write(&sky, "blue").unwrap();
+        let lit = content_hash(&scene, Some(&sky)).unwrap();
+        assert_ne!(lit, content_hash(&scene, None).unwrap());
+        fs::write(&sky, "grey").unwrap();
+        assert_ne!(content_hash(&scene, Some(&sky)).unwrap(), lit);
     }
 
     #[test]
@@ -308,9 +318,9 @@ mod tests {
         glb.extend(json);
         fs::write(&scene, glb).unwrap();
         fs::write(&image, "red").unwrap();
-        let first = content_hash(&scene).unwrap();
+        let first = content_hash(&scene, None).unwrap();
         fs::write(&image, "tan").unwrap();
-        assert_ne!(content_hash(&scene).unwrap(), first);
+        assert_ne!(content_hash(&scene, None).unwrap(), first);
     }
 
     #[test]

@@ -18,7 +18,7 @@ use relume_picture::picture::{self, Exposure};
 use crate::args::{
     DemoArgs, ExposureFlag, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags, UpdateFlag,
 };
-use crate::clip::{self, Clip, TOLERANCE, fixed, now};
+use crate::clip::{self, Clip, PICTURE_TOLERANCE, TOLERANCE, fixed, now};
 use crate::demo;
 use crate::events::EventTable;
 use crate::failure::Failure;
@@ -28,6 +28,7 @@ use crate::light;
 use crate::lock::Lock;
 use crate::memory;
 use crate::output::{self, count, counted};
+use crate::preview::{self, Meanwhile};
 use crate::progress::Progress;
 use crate::report::{PictureOptions, Report, RunOptions, SceneSummary};
 use crate::resume;
@@ -59,6 +60,7 @@ pub(crate) fn demo(args: DemoArgs) -> Result<(), Failure> {
         dir: Some(dir),
         tolerance: demo.tolerance,
         picture: Some((args.picture.shading.unwrap_or(Shading::Gouraud), args.picture)),
+        preview: false,
         solve: args.solve,
     };
     job.run()
@@ -67,9 +69,10 @@ pub(crate) fn demo(args: DemoArgs) -> Result<(), Failure> {
 /// `relume render`
 pub(crate) fn render(args: RenderArgs) -> Result<(), Failure> {
     let job = Job {
+        preview: args.preview,
         scene: args.scene,
         dir: Some(args.output),
-        tolerance: TOLERANCE,
+        tolerance: PICTURE_TOLERANCE,
         picture: Some((args.picture.shading.unwrap_or(Shading::Gouraud), args.picture)),
         solve: args.solve,
     };
@@ -83,6 +86,7 @@ pub(crate) fn solve(args: SolveArgs) -> Result<(), Failure> {
         dir: args.output,
         tolerance: TOLERANCE,
         picture: None,
+        preview: false,
         solve: args.solve,
     };
     job.run()
@@ -95,6 +99,8 @@ struct Job {
     /// Unless the flags give one.
     tolerance: f64,
     picture: Option<(Shading, PictureFlags)>,
+    /// Whether pictures are rough ones, and nothing is solved.
+    preview: bool,
     solve: SolveFlags,
 }
 
@@ -111,7 +117,7 @@ impl Job {
                 let at_least = flags.view.frames_at_least();
                 let read =
                     Clip::for_pictures(&self.scene, &self.solve.clip, self.tolerance, at_least)?;
-                light::for_pictures(read)?
+                light::for_pictures(read, &flags.view)?
             }
             None => {
                 let read = Clip::of_file(&self.scene, &self.solve.clip, self.tolerance)?;
@@ -131,6 +137,11 @@ impl Job {
             make_directory(dir)?;
         }
         let _lock = self.dir.as_deref().map(Lock::take).transpose()?;
+        if let (true, Some(dir), Some(views), Some((_, flags))) =
+            (self.preview, &self.dir, &views, &self.picture)
+        {
+            return preview::draw(&clip, views, flags, dir);
+        }
         let report = self.open_report(&clip)?;
         let wanted = &clip.frames;
         let pending: Vec<u32> =
@@ -144,7 +155,8 @@ impl Job {
         let session = clip.session_with(Options { events: events.is_some(), ..options })?;
         let size = Size::of(&clip, session.options());
         if !self.quiet() {
-            size.warn(&clip, pending.len());
+            let rough = if self.picture.is_some() { ", or rough pictures: --preview" } else { "" };
+            size.warn(&clip, pending.len(), rough);
         }
         let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.quiet());
         progress.watch(session.watch(), size.pairs());
@@ -162,7 +174,8 @@ impl Job {
             energy: None,
             suspects: Vec::new(),
         };
-        let outcome = run.frames(wanted, &pending);
+        let mut meanwhile = run.meanwhile(&pending)?;
+        let outcome = run.frames((wanted, &pending), &mut meanwhile);
         run.progress.clear();
         // Also where a frame failed: what was finished stays.
         let there = run.finished().report.frames.keys().copied().collect::<BTreeSet<u32>>();
@@ -191,7 +204,10 @@ impl Job {
     /// The report of this run, with what an earlier one finished. An older report stays until a
     /// frame is finished; that it can be replaced is tried at once.
     fn open_report(&self, clip: &Clip) -> Result<Report, Failure> {
-        let summary = SceneSummary::new(&clip.scene, resume::content_hash(&self.scene)?);
+        let summary = SceneSummary::new(&clip.scene, {
+            let environment = self.solve.clip.outside.environment.as_deref();
+            resume::content_hash(&self.scene, environment)?
+        });
         let mut report = Report::new(summary, self.run_options(clip));
         let paths = self.report_paths();
         if self.solve.resume
@@ -318,9 +334,27 @@ impl Job {
         }
         if let Some(energy) = &run.energy {
             line += &balance(energy, &run.suspects);
+            if gets_no_light(run.session.scene(), energy) {
+                line += NO_LIGHT_GETS_IN;
+            }
         }
         output::print(&(line + "\n"))
     }
+}
+
+/// Share of what would come from outside if nothing were in the way, below which what arrives is rounding.
+const GETS_IN: f64 = 1e-4;
+
+const NO_LIGHT_GETS_IN: &str = "\nwarning: next to no light from outside gets in: open what is closed around the scene (--hide NODE) \
+                                or light it from within (--emit MATERIAL=RADIANCE)";
+
+/// Whether all light is from outside at the start, and next to nothing of it arrives.
+fn gets_no_light(scene: &Scene, energy: &Energy) -> bool {
+    let Some(now) = scene.outside.as_ref().and_then(|outside| outside.at(0.0).ok()) else {
+        return false;
+    };
+    let arrives: f64 = now.horizontal_w_m2().iter().flatten().sum();
+    !scene.without_outside().emits() && energy.emitted_w < GETS_IN * arrives * scene.area_m2()
 }
 
 /// A line about the energy balance of the last frame.
@@ -398,8 +432,31 @@ impl Run<'_> {
         interrupt::locked(&self.finished)
     }
 
+    /// A rough picture for as long as none is finished.
+    fn meanwhile(&self, pending: &[u32]) -> Result<Option<(Meanwhile, PathBuf)>, Failure> {
+        let first = pending.first().filter(|_| self.finished().report.frames.is_empty());
+        let (Some(&frame), Some(dir)) = (first, &self.job.dir) else { return Ok(None) };
+        let Some((view, _, flags)) = self.view(frame)? else { return Ok(None) };
+        let of =
+            (Arc::clone(self.session.scene()), frames::time_of(frame, self.job.solve.clip.fps));
+        let aside = self.progress.aside();
+        let quiet = self.job.quiet();
+        let say = move |line: &str| {
+            if !quiet {
+                aside(line);
+            }
+        };
+        let path = preview::path(dir);
+        let picture = Meanwhile::new(of, (view, preview::settings(flags)), path.clone(), say);
+        Ok(Some((picture, path)))
+    }
+
     /// Solves and draws the frames that are not finished yet, in order.
-    fn frames(&mut self, wanted: &[u32], pending: &[u32]) -> Result<Outcome, Failure> {
+    fn frames(
+        &mut self,
+        (wanted, pending): (&[u32], &[u32]),
+        meanwhile: &mut Option<(Meanwhile, PathBuf)>,
+    ) -> Result<Outcome, Failure> {
         // The first finished frame is written down at once: an older report ends there.
         let (mut written, mut interval) = (None::<Instant>, REPORT_INTERVAL);
         for &frame in pending {
@@ -413,6 +470,9 @@ impl Run<'_> {
             let before = wanted.iter().rev().find(|&&earlier| earlier < frame);
             self.session.came_from(before.map(|&f| frames::time_of(f, self.job.solve.clip.fps)));
             self.frame(frame)?;
+            if let Some((mut meanwhile, path)) = meanwhile.take() {
+                meanwhile.end(&path);
+            }
             self.progress.finish_frame();
             if written.is_none_or(|at| at.elapsed() >= interval) {
                 let before = now();

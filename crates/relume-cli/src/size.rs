@@ -34,12 +34,12 @@ impl Size {
     }
 
     /// Says on stderr what it will take, where that is minutes or more than there may be; `frames` are those
-    /// that are left to do.
-    pub(crate) fn warn(&self, clip: &Clip, frames: usize) {
+    /// that are left to do, and `or` is what else may be done.
+    pub(crate) fn warn(&self, clip: &Clip, frames: usize, or: &str) {
         let line =
             if frames > 0 { self.warning(clip.threads, memory::limit_bytes()) } else { None };
         if let Some(line) = line {
-            output::complain(&line);
+            output::complain(&(line + or));
         }
     }
 

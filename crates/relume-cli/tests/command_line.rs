@@ -237,7 +237,8 @@ fn resuming_keeps_finished_frames_and_refuses_other_options() {
     let at = changed.windows(7).position(|w| w == b"ceiling").unwrap();
     changed[at] = b'C';
     fs::write(&scene, changed).unwrap();
-    solve(&["--resume"]).fails(1, &["the scene file or a file it refers to has changed"]);
+    solve(&["--resume"])
+        .fails(1, &["the scene file, a file it refers to or the environment has changed"]);
 
     fs::write(&path, "{ half a rep").unwrap();
     solve(&["--resume"]).fails(1, &["is not a report of relume", "leave out --resume"]);

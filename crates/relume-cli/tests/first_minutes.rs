@@ -75,6 +75,25 @@ fn a_material_that_is_told_to_shine_lights_the_scene() {
 }
 
 #[test]
+fn pictures_are_coarser_than_numbers_unless_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut b = SceneBuilder::new("lamp");
+    let paper = b.material("paper", [0.7; 3], [1.0; 3]);
+    let node = b.node("lamp", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.cuboid(node, "lamp", paper, DVec3::ZERO, DVec3::ONE);
+    let (scene, out) = (dir.path().join("lamp.glb"), dir.path().join("out"));
+    write_glb(&b.build().unwrap(), &scene).unwrap();
+    let tolerance = |command: &[&str]| {
+        relume(&[command, &["-o", text(&out)]].concat()).succeeds();
+        json(&out.join("report.json"))["options"]["tolerance"].clone()
+    };
+    let render = ["render", text(&scene), "--size", "64x48"];
+    assert_eq!(tolerance(&render), 0.1);
+    assert_eq!(tolerance(&[&render[..], &["--tolerance", "0.3"]].concat()), 0.3);
+    assert_eq!(tolerance(&["solve", text(&scene)]), 0.02);
+}
+
+#[test]
 fn a_still_scene_on_a_turntable_is_solved_once() {
     let dir = tempfile::tempdir().unwrap();
     let scene = dark_room(dir.path());

@@ -56,9 +56,28 @@ impl Exposure {
     /// The same, with how much is lit.
     pub fn metered(snapshot: &Snapshot, view: &View) -> Metered {
         let untold = snapshot.error_w_m2 / PI;
+        Metered::of(visible_radiances(snapshot, view).into_iter(), untold)
+    }
+
+    /// Display value per W/m2/sr for this picture.
+    pub(crate) fn resolve(self, snapshot: &Snapshot, view: &View) -> f64 {
+        match self {
+            Exposure::Fixed(exposure) => exposure,
+            Exposure::Automatic => match Exposure::automatic(snapshot, view) {
+                Exposure::Fixed(exposure) => exposure,
+                Exposure::Automatic => 1.0,
+            },
+        }
+    }
+}
+
+impl Metered {
+    /// From the luminances of the pixels (radiance, W/m2/sr), each with whether it is a lamp's, `None` where no surface is
+    /// seen; `untold` is by how much the solution may be off.
+    pub(super) fn of(seen: impl Iterator<Item = Option<(f64, bool)>>, untold: f64) -> Metered {
         let mut lit = Vec::new();
         let (mut lamps, mut lamp_max, mut told, mut pixels) = (0, 0.0_f64, 0, 0);
-        for seen in visible_radiances(snapshot, view) {
+        for seen in seen {
             pixels += 1;
             match seen {
                 Some((luminance, true)) => {
@@ -85,17 +104,6 @@ impl Exposure {
         };
         let lit = f64::from(told + lamps) / f64::from(pixels.max(1));
         Metered { exposure: Exposure::Fixed(scale), lit }
-    }
-
-    /// Display value per W/m2/sr for this picture.
-    pub(crate) fn resolve(self, snapshot: &Snapshot, view: &View) -> f64 {
-        match self {
-            Exposure::Fixed(exposure) => exposure,
-            Exposure::Automatic => match Exposure::automatic(snapshot, view) {
-                Exposure::Fixed(exposure) => exposure,
-                Exposure::Automatic => 1.0,
-            },
-        }
     }
 }
 

@@ -16,6 +16,7 @@
 //! | `raster` | which thing each sample of each pixel sees |
 //! | `tone` | radiosity to display values and bytes |
 //! | `exposure` | one exposure for a clip |
+//! | `sketch` | a rough picture of a scene that is not solved: [`Sketch`] |
 //! | `image` | pixels and PNG files |
 
 mod assemble;
@@ -29,6 +30,7 @@ mod printed;
 mod project;
 mod raster;
 mod render;
+mod sketch;
 mod tone;
 
 pub use camera::{View, ViewError, Viewpoint};
@@ -37,4 +39,5 @@ pub use image::{Image, WriteError, is_whole_png};
 pub use outline::Outlines;
 pub use overview::Overview;
 pub use render::{Settings, Shading, render};
+pub use sketch::Sketch;
 pub use tone::Tone;

@@ -69,6 +69,15 @@ impl Projector {
         self.world_from_camera.rotation * camera
     }
 
+    /// Where the ray to what a pixel position sees starts, metres.
+    pub(crate) fn origin(&self, pixel: DVec2) -> DVec3 {
+        if self.perspective {
+            return self.eye();
+        }
+        let across = (pixel - self.centre) / self.scale;
+        self.world_from_camera.point(DVec3::new(across.x, -across.y, 0.0))
+    }
+
     /// Whether the side that `normal` points to, of a plane through `point`, faces the camera.
     pub(crate) fn faces(&self, point: DVec3, normal: DVec3) -> bool {
         let towards_camera = if self.perspective {

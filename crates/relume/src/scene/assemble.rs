@@ -180,11 +180,13 @@ impl Parts {
                 remedy: format!("scale the scene to metres: {EXTENT_MIN_M:e} m at least"),
             });
         }
-        let size = |p: &Patch| {
+        // Length, and width as of a triangle of this area: what is as thin is left out, however long.
+        let is_speck = |p: &Patch| {
             let far = |c: &DVec2| c.distance(p.corners[0]);
-            p.corners.iter().map(far).fold(0.0, f64::max)
+            let length = p.corners.iter().map(far).fold(0.0, f64::max);
+            2.0 * p.area_m2() < SPECK * extent * length || length < SPECK * extent
         };
-        let is_speck: Vec<bool> = self.patches.iter().map(|p| size(p) < SPECK * extent).collect();
+        let is_speck: Vec<bool> = self.patches.iter().map(is_speck).collect();
         if !is_speck.contains(&true) {
             return Ok(());
         }
@@ -520,7 +522,7 @@ fn speck_note(surface: &str, count: usize, whole: bool) -> Note {
         subject: surface.to_owned(),
         count,
         message: format!(
-            "{count} polygons are smaller than a millionth of the scene; {of_it} left out: scale it, or what is around it"
+            "{count} polygons are smaller or thinner than a millionth of the scene; {of_it} left out: scale it, or what is around it"
         ),
     }
 }

@@ -12,8 +12,8 @@ pub const EXTENT_MIN_M: f64 = 1e-6;
 /// Largest exitance (W/m2) or intensity of a light (W/sr, W/m2).
 pub const EMISSION_MAX: f64 = 1e30;
 
-/// Extent of the smallest polygon that is solved, as a share of the scene's: the rounding of 32-bit coordinates
-/// moves such a polygon by a tenth of its size.
+/// Length and width of the smallest polygon that is solved, as a share of the scene's extent: the rounding of 32-bit
+/// coordinates moves the corners of such a polygon by a tenth of that. Slivers that export leaves along edges are thinner.
 pub const SPECK: f64 = 1e-6;
 
 /// Whether a point is one to compute with: finite, and no coordinate beyond [`COORDINATE_MAX_M`].

@@ -1,6 +1,6 @@
 //! Unique names: the first keeps its name, later ones get " 2", " 3", and so on.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Note, Severity};
 
@@ -8,6 +8,8 @@ use super::{Note, Severity};
 #[derive(Default)]
 pub(super) struct Names {
     taken: BTreeSet<String>,
+    /// For each name that was wanted again the number to try next.
+    next: BTreeMap<String, u32>,
     renamed: Vec<(String, String)>,
 }
 
@@ -17,8 +19,14 @@ impl Names {
         if self.taken.insert(wanted.to_owned()) {
             return wanted.to_owned();
         }
-        let free = (2u32..).map(|n| format!("{wanted} {n}")).find(|n| !self.taken.contains(n));
-        let name = free.unwrap_or_else(|| unreachable!("there are more numbers than names"));
+        let next = self.next.entry(wanted.to_owned()).or_insert(2);
+        let name = loop {
+            let name = format!("{wanted} {next}");
+            *next += 1;
+            if !self.taken.contains(&name) {
+                break name;
+            }
+        };
         self.taken.insert(name.clone());
         self.renamed.push((wanted.to_owned(), name.clone()));
         name
@@ -27,22 +35,29 @@ impl Names {
     /// One note for each name that was wanted more than once; `kind` is what is named.
     pub(super) fn notes(&self, kind: &str) -> Vec<Note> {
         let mut notes: Vec<Note> = Vec::new();
+        let mut note_of: BTreeMap<&str, usize> = BTreeMap::new();
         for (wanted, name) in &self.renamed {
-            match notes.iter_mut().find(|n| n.subject == *wanted) {
-                Some(note) => {
+            match note_of.get(wanted.as_str()) {
+                Some(&k) => {
+                    let note = &mut notes[k];
                     note.count += 1;
                     note.message = format!(
                         "{} {kind}s share this name; they are numbered up to `{name}`",
                         note.count + 1
                     );
                 }
-                None => notes.push(Note {
-                    severity: Severity::Info,
-                    code: "renamed",
-                    subject: wanted.clone(),
-                    count: 1,
-                    message: format!("two {kind}s share this name; the second is called `{name}`"),
-                }),
+                None => {
+                    note_of.insert(wanted, notes.len());
+                    notes.push(Note {
+                        severity: Severity::Info,
+                        code: "renamed",
+                        subject: wanted.clone(),
+                        count: 1,
+                        message: format!(
+                            "two {kind}s share this name; the second is called `{name}`"
+                        ),
+                    });
+                }
             }
         }
         notes

@@ -218,6 +218,22 @@ fn numbers_that_cannot_be_computed_with_are_refused_with_their_name() {
 }
 
 #[test]
+fn slivers_are_left_out_however_long_they_are() {
+    let mut g = Gltf::cube();
+    // As export leaves them along edges: two thousandths of a millimetre across, in a scene of some metres.
+    g.node(
+        json!({"name": "sliver", "mesh": 0, "scale": [1, 2e-6, 2e-6], "translation": [2, 0, 0]}),
+    );
+    g.node(json!({"name": "wire", "mesh": 0, "scale": [1, 2e-5, 2e-5], "translation": [4, 0, 0]}));
+    let scene = scene_of(&g).unwrap();
+    let names: Vec<&str> = scene.bodies.iter().map(|b| b.name.as_str()).collect();
+    assert_eq!(names.len(), 2, "{names:?}");
+    assert!(names.contains(&"wire"), "{names:?}");
+    let notes = with_code(&scene.notes, "speck");
+    assert_eq!((notes[0].subject.as_str(), notes[0].count), ("sliver", 6));
+}
+
+#[test]
 fn what_is_too_small_for_the_scene_is_left_out_by_name() {
     let mut g = Gltf::cube();
     g.node(

@@ -125,6 +125,34 @@ const MTL: &str =
     "newmtl red\nKd 0.8 0.1 1.0\nmap_Kd wood.png\nd 0.5\nnewmtl light\nKe 4 2 0\nKd 0.2 0.2 0.2\n";
 
 #[test]
+fn strips_of_triangles_in_ply_are_surfaces() {
+    let strips = |list: &str| {
+        let count = list.split_whitespace().count();
+        let text = format!(
+            "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n\
+             element tristrips 1\nproperty list int int vertex_indices\nend_header\n\
+             0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 1\n1 2 1\n{count} {list}\n"
+        );
+        scene_of("strip.ply", text.as_bytes()).unwrap()
+    };
+    let fronts = |scene: &Scene| {
+        let firsts = scene
+            .patches
+            .iter()
+            .enumerate()
+            .filter(|(k, p)| p.twin.is_none_or(|t| t.0 as usize > *k));
+        firsts.map(|(_, p)| (p.area_m2(), p.frame.normal.z > 0.0)).collect::<Vec<_>>()
+    };
+    // A square, and a slope behind it, all counter-clockwise from above.
+    let whole = fronts(&strips("0 1 2 3 4 5"));
+    assert!(whole.len() == 2 && whole.iter().all(|f| f.1), "{whole:?}");
+    assert!((whole[0].0 - 1.0).abs() < 1e-12 && (whole[1].0 - 2f64.sqrt()).abs() < 1e-12);
+    // In two strips with a gap between.
+    assert_eq!(fronts(&strips("0 1 2 3 -1 2 3 4 5")), whole);
+    assert_eq!(fronts(&strips("0 1 2 -1 4 2 3")).len(), 2);
+}
+
+#[test]
 fn ply_with_other_ends_of_lines_and_more_space() {
     for format in ["ascii", "binary_little_endian"] {
         let plain = ply(format);

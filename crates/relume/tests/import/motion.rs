@@ -431,6 +431,29 @@ fn what_is_sheared_keeps_its_first_shape_and_turns_as_nearly_as_a_body_can() {
 }
 
 #[test]
+fn a_pose_does_not_play_in_place_of_a_motion() {
+    let mut g = Gltf::cube();
+    let pose = [0., 0., 0., 0., 0., 0.];
+    g.animate("RESET", 0, "translation", "LINEAR", &[0.0], &pose[..3]);
+    g.animate("static", 0, "translation", "STEP", &[0.0, 1.0], &pose);
+    g.animate(
+        "held",
+        0,
+        "translation",
+        "CUBICSPLINE",
+        &[0.0, 1.0],
+        &[[0.0; 6], [0.0; 6], [0.0; 6]].concat(),
+    );
+    let all = scene_of(&g).unwrap();
+    assert_eq!(all.motion.animation.as_deref(), Some("RESET"));
+    g.animate("walk", 0, "translation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 1., 0., 0.]);
+    g.animate("run", 0, "translation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 2., 0., 0.]);
+    let moving = scene_of(&g).unwrap();
+    assert_eq!(moving.motion.animation.as_deref(), Some("walk"));
+    assert_eq!(at(&moving, 1.0).x - at(&all, 1.0).x, 1.0);
+}
+
+#[test]
 fn of_animations_of_the_same_things_the_first_plays_and_the_others_are_listed() {
     let mut g = Gltf::cube();
     let other = g.node(json!({"name": "other", "mesh": 0}));

@@ -43,14 +43,14 @@ pub(super) struct Candidate {
 
 /// An axis-aligned box, metres.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
+pub(in super::super) struct Bounds {
     low: DVec3,
     high: DVec3,
 }
 
 impl Bounds {
     /// Of everything, over the whole animation; `None` if there is nothing.
-    pub(super) fn swept(scene: &Scene) -> Option<Bounds> {
+    pub(in super::super) fn swept(scene: &Scene) -> Option<Bounds> {
         let mut bounds: Option<Bounds> = None;
         for body in (0..scene.bodies.len() as u32).map(BodyId) {
             let steps = if scene.moves(body) { SWEEP_STEPS } else { 0 };
@@ -68,7 +68,7 @@ impl Bounds {
     }
 
     /// Middle and diagonal, metres.
-    pub(super) fn unit(&self) -> (DVec3, f64) {
+    pub(in super::super) fn unit(&self) -> (DVec3, f64) {
         (self.at(0.5, 0.5, 0.5), self.low.distance(self.high).max(f64::MIN_POSITIVE))
     }
 

@@ -12,10 +12,10 @@ use relume::geometry::Pose;
 use relume::scene::{PatchId, Scene};
 
 /// How far off a surface rays start, in units of the scene.
-pub(super) const LIFT: f32 = 1e-5;
+pub(in super::super) const LIFT: f32 = 1e-5;
 
 /// All patches at one instant, made ready for rays.
-pub(super) struct Caster {
+pub(in super::super) struct Caster {
     tree: Bvh2,
     /// In the order of the tree.
     triangles: Vec<Triangle>,
@@ -35,18 +35,18 @@ struct Triangle {
 
 /// What a ray meets.
 #[derive(Clone, Copy)]
-pub(super) struct Hit {
+pub(in super::super) struct Hit {
     /// The patch whose front it is; `None` for the black back of a single-sided one.
-    pub(super) front: Option<PatchId>,
+    pub(in super::super) front: Option<PatchId>,
     /// Distance, in units of the scene.
-    pub(super) distance: f32,
+    pub(in super::super) distance: f32,
     /// Cosine between the ray and the normal, not negative.
-    pub(super) cosine: f32,
+    pub(in super::super) cosine: f32,
 }
 
 impl Caster {
     /// Of the patches that are present; `poses` by body.
-    pub(super) fn new(
+    pub(in super::super) fn new(
         scene: &Scene,
         poses: &[Option<Pose>],
         (middle, unit_m): (DVec3, f64),
@@ -81,22 +81,27 @@ impl Caster {
     }
 
     /// A point of the world in units of the scene.
-    pub(super) fn place(&self, world: DVec3) -> Vec3 {
+    pub(in super::super) fn place(&self, world: DVec3) -> Vec3 {
         ((world - self.middle) / self.unit_m).as_vec3()
     }
 
     /// Metres in a unit of the scene.
-    pub(super) fn unit_m(&self) -> f64 {
+    pub(in super::super) fn unit_m(&self) -> f64 {
         self.unit_m
     }
 
     /// The first thing on the way from a point in a unit direction.
-    pub(super) fn first(&self, scene: &Scene, from: Vec3, towards: Vec3) -> Option<Hit> {
+    pub(in super::super) fn first(&self, scene: &Scene, from: Vec3, towards: Vec3) -> Option<Hit> {
         self.nearest(scene, from, towards, false)
     }
 
     /// The same, passing through the backs of single-sided patches, as pictures do.
-    pub(super) fn first_front(&self, scene: &Scene, from: Vec3, towards: Vec3) -> Option<Hit> {
+    pub(in super::super) fn first_front(
+        &self,
+        scene: &Scene,
+        from: Vec3,
+        towards: Vec3,
+    ) -> Option<Hit> {
         self.nearest(scene, from, towards, true)
     }
 
@@ -124,7 +129,7 @@ impl Caster {
     }
 
     /// Whether nothing is on the way from a point in a unit direction, up to a distance.
-    pub(super) fn is_free(&self, from: Vec3, towards: Vec3, distance: f32) -> bool {
+    pub(in super::super) fn is_free(&self, from: Vec3, towards: Vec3, distance: f32) -> bool {
         self.triangles.is_empty() || {
             let ray = Ray::new(from.into(), towards.into(), LIFT, distance - LIFT);
             self.tree

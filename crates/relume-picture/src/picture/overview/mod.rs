@@ -13,9 +13,9 @@
 //! Cost: bounded but for a hierarchy of boxes over all patches: some million rays for each of up to three
 //! instants.
 
-mod candidates;
-mod caster;
-mod preview;
+pub(super) mod candidates;
+pub(super) mod caster;
+pub(super) mod preview;
 mod score;
 
 use glam::DVec3;

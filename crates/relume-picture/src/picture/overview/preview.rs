@@ -2,7 +2,7 @@
 //! what is lit from what is dark.
 //!
 //! Direct light from points on lamps and from punctual lights, by one shadow ray each; then bounces along
-//! fixed rays from point to point. Luminance only. Must not be used for anything but choosing a view.
+//! fixed rays from point to point. Luminance only. Good for choosing a view and for sketches; no number may rest on it.
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
@@ -48,15 +48,18 @@ struct Point {
 }
 
 /// The rough solution.
-pub(super) struct Preview {
+pub(in super::super) struct Preview {
     points: Vec<Point>,
+    lamps: Lamps,
     /// For each patch the range of its points; one entry more than patches.
     offsets: Vec<u32>,
     /// How bright a point is in the eye of a picture exposed for what is lit: 1 at the typical radiosity, 0
     /// eight stops below it.
-    pub(super) brightness: Vec<f64>,
+    pub(in super::super) brightness: Vec<f64>,
+    /// Luminance of the reflected radiosity of each point after some bounces, W/m2.
+    pub(in super::super) reflected: Vec<f64>,
     /// Whether anything is lit at all.
-    pub(super) is_lit: bool,
+    pub(in super::super) is_lit: bool,
 }
 
 /// Rays from a point that look for the sky.
@@ -67,27 +70,31 @@ const STOPS: f64 = 8.0;
 
 impl Preview {
     /// Of a scene and the light from outside at `time_s`; `poses` by body.
-    pub(super) fn new(
+    pub(in super::super) fn new(
         (scene, sky): (&Scene, Option<&OutsideNow>),
         time_s: f64,
         poses: &[Option<Pose>],
         caster: &Caster,
     ) -> Preview {
         let (points, offsets) = spread(scene, time_s, poses, caster);
-        let mut preview = Preview { brightness: Vec::new(), is_lit: false, points, offsets };
+        let (brightness, reflected) = (Vec::new(), vec![0.0; points.len()]);
         let lamps = Lamps::new(scene, time_s, poses, caster);
+        let mut preview = Preview { points, lamps, offsets, brightness, reflected, is_lit: false };
         let of_sky = |k: usize| sky.map_or(0.0, |sky| preview.sky_irradiance(sky, caster, k));
         let direct: Vec<f64> = (0..preview.points.len())
             .into_par_iter()
-            .map(|k| lamps.irradiance(&preview.points[k], caster) + of_sky(k))
+            .map(|k| {
+                preview.lamp_irradiance(preview.points[k].at, preview.points[k].normal, caster)
+                    + of_sky(k)
+            })
             .collect();
         if direct.iter().all(|&e| e == 0.0) {
             preview.brightness = vec![1.0; preview.points.len()];
             return preview;
         }
-        let reflected = preview.bounce(scene, caster, &direct);
         preview.is_lit = true;
-        preview.brightness = preview.brightnesses(&reflected);
+        preview.reflected = preview.bounce(scene, caster, &direct);
+        preview.brightness = preview.brightnesses(&preview.reflected);
         preview
     }
 
@@ -106,8 +113,13 @@ impl Preview {
         self.points[point].emits
     }
 
+    /// Irradiance that comes directly from lamps and lights to a place on a surface, in units of the scene, W/m2.
+    pub(in super::super) fn lamp_irradiance(&self, at: Vec3, normal: Vec3, caster: &Caster) -> f64 {
+        self.lamps.irradiance((at, normal), caster)
+    }
+
     /// The point of a patch that is nearest to a place on it.
-    pub(super) fn point_at(&self, patch: PatchId, place: Vec3) -> usize {
+    pub(in super::super) fn point_at(&self, patch: PatchId, place: Vec3) -> usize {
         let [from, to] = [0, 1].map(|k| self.offsets[patch.0 as usize + k] as usize);
         let off = |k: &usize| self.points[*k].at.distance_squared(place);
         (from..to).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(from)
@@ -141,7 +153,7 @@ impl Preview {
         let grey = |l: [f64; 3]| luminance(l.map(|l| l as f32));
         let count = SKY_RAYS as f64;
         let open = self.directions(k, SKY_RAYS).filter(is_open);
-        let sum = open.map(|towards| grey(sky.radiance(towards.as_dvec3()))).sum::<f64>();
+        let sum = open.map(|towards| grey(sky.sky_radiance(towards.as_dvec3()))).sum::<f64>();
         let sun = sky.sun_beam().map_or(0.0, |(towards, beam_w_m2)| {
             let towards = towards.as_vec3();
             let cosine = f64::from(point.normal.dot(towards)).max(0.0);
@@ -270,14 +282,14 @@ impl Lamps {
     }
 
     /// Irradiance that comes to a point directly, W/m2.
-    fn irradiance(&self, point: &Point, caster: &Caster) -> f64 {
+    fn irradiance(&self, (at, normal): (Vec3, Vec3), caster: &Caster) -> f64 {
         let unit_m2 = caster.unit_m() * caster.unit_m();
-        let from = point.at + point.normal * LIFT;
+        let from = at + normal * LIFT;
         // Towards what shines: direction, cosine, distance squared, m2; nothing where it is behind or hidden.
         let in_sight = |at: Vec3| {
             let way = at - from;
             let (distance, towards) = (way.length().max(NEAREST), way.normalize_or_zero());
-            let cosine = towards.dot(point.normal);
+            let cosine = towards.dot(normal);
             let sees = cosine > 0.0 && caster.is_free(from, towards, way.length() - LIFT);
             sees.then(|| (towards, f64::from(cosine), f64::from(distance * distance) * unit_m2))
         };
@@ -292,7 +304,7 @@ impl Lamps {
         };
         let of_light = |&(at, axis, kind, strength): &(Vec3, Vec3, LightKind, f64)| match kind {
             LightKind::Directional => {
-                let cosine = -axis.dot(point.normal);
+                let cosine = -axis.dot(normal);
                 let lit = cosine > 0.0 && caster.is_free(from, -axis, f32::INFINITY);
                 if lit { strength * f64::from(cosine) } else { 0.0 }
             }

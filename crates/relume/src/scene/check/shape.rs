@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::{DVec2, DVec3};
 
 use super::{listed, note};
-use crate::scene::topology::Topology;
+use crate::scene::topology::{Side, Topology};
 use crate::scene::{Note, Scene, Severity};
 
 /// Adds what is wrong with the shape at time 0.
@@ -125,15 +125,49 @@ fn parts(topology: &Topology) -> Vec<Part> {
     parts
 }
 
+/// Whether a part encloses what it holds although it has free sides: whether what is left without the double-sided polygons
+/// that hang on it by some of their sides (partitions, shelves, leaves of doors) is closed, and as large.
+fn closed_but_for_sheets(topology: &Topology, parts: &[Part], part: usize) -> bool {
+    let is_of_part = |side: &Side| topology.component[side.polygon as usize] as usize == part;
+    let groups: Vec<&Vec<Side>> = topology.sides.iter().filter(|g| is_of_part(&g[0])).collect();
+    let mut hangs = vec![false; topology.polygons.len()];
+    let mut before = usize::MAX;
+    let mut count = 0;
+    while before != count {
+        before = count;
+        for group in &groups {
+            let mut left = group.iter().filter(|s| !hangs[s.polygon as usize]);
+            if let (Some(side), None) = (left.next(), left.next()) {
+                if !topology.polygons[side.polygon as usize].two_sided {
+                    return false;
+                }
+                hangs[side.polygon as usize] = true;
+                count += 1;
+            }
+        }
+    }
+    let left = topology.polygons.iter().enumerate();
+    let left = left.filter(|(k, _)| topology.component[*k] as usize == part && !hangs[*k]);
+    let points = left.flat_map(|(_, polygon)| &polygon.corners);
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for &corner in points {
+        let at = topology.points[corner as usize];
+        (low, high) = (low.min(at), high.max(at));
+    }
+    let whole = parts[part].bounds;
+    low.cmple(whole.0).all() && high.cmpge(whole.1).all()
+}
+
 /// Free sides, for each object: of the largest part as a warning, of others for information. Flat
-/// sheets (a lamp, a leaf) are meant to have free sides.
+/// sheets (a lamp, a leaf) are meant to have free sides, and so are sheets that hang on what is closed without them.
 fn open(scene: &Scene, topology: &Topology, parts: &[Part], notes: &mut Vec<Note>) {
     let largest = (0..parts.len())
         .max_by(|&a, &b| parts[a].diagonal().total_cmp(&parts[b].diagonal()).then(b.cmp(&a)));
+    let closed = largest.filter(|&k| closed_but_for_sheets(topology, parts, k));
     let mut free: BTreeMap<(&str, bool), (usize, f64)> = BTreeMap::new();
     for side in topology.sides.iter().filter(|g| g.len() == 1).map(|g| g[0]) {
         let part = topology.component[side.polygon as usize] as usize;
-        if !parts[part].flat {
+        if !parts[part].flat && Some(part) != closed {
             let entry = free
                 .entry((object(scene, topology, side.polygon), Some(part) == largest))
                 .or_default();
@@ -162,9 +196,11 @@ fn open(scene: &Scene, topology: &Topology, parts: &[Part], notes: &mut Vec<Note
         notes.push(note(severity, code, object, count, message));
     }
     let around_all = |p: &Part| parts.iter().all(|q| p.spans(q));
-    if !gaps
-        && !parts.iter().any(|p| p.closed() && around_all(p) && (parts.len() > 1 || p.volume < 0.0))
-    {
+    let encloses = |(k, p): (usize, &Part)| {
+        let is_closed = p.closed() && (parts.len() > 1 || p.volume < 0.0);
+        (is_closed || (Some(k) == closed && !p.closed())) && around_all(p)
+    };
+    if !gaps && !parts.iter().enumerate().any(encloses) {
         let message = "nothing encloses the scene: light that leaves it is lost in black surroundings; \
                        put it in a closed room if that is not meant";
         notes.push(note(Severity::Info, "open-enclosure", &scene.name, 1, message.to_owned()));

@@ -125,6 +125,32 @@ fn an_open_room_is_named_with_its_free_sides() {
 }
 
 #[test]
+fn sheets_that_stand_in_a_closed_room_are_no_gaps() {
+    let found_with = |without: usize| {
+        let mut b = SceneBuilder::new("s");
+        let m = b.material("m", [0.5; 3], [1.0; 3]);
+        let sheet = b.double_sided_material("sheet", [0.5; 3], [0.0; 3]);
+        let room = b.node("room", None, O, DQuat::IDENTITY);
+        for side in super::super::builder::cuboid_sides(O, I).iter().take(6 - without) {
+            let mut side = *side;
+            side.reverse();
+            b.polygon(room, "walls", if without > 0 { sheet } else { m }, &side);
+        }
+        // From corner to corner of the room, with a free side on top, and another that stands on it.
+        let half = |x: f64, z: f64, y: f64| DVec3::new(x, y, z);
+        let diagonal = [half(0., 0., 0.), half(1., 1., 0.), half(1., 1., 0.5), half(0., 0., 0.5)];
+        b.polygon(room, "partition", sheet, &diagonal);
+        let across =
+            [half(0.5, 0.5, 0.), half(0.5, 1., 0.), half(0.5, 1., 0.5), half(0.5, 0.5, 0.5)];
+        b.polygon(room, "partition", sheet, &across);
+        found(&check(&b.build().unwrap()), "open-enclosure")
+    };
+    assert_eq!(found_with(0), []);
+    assert_eq!(found_with(1).len(), 1);
+    assert_eq!(found_with(1)[0].0, Severity::Warning);
+}
+
+#[test]
 fn objects_in_the_open_and_open_objects_are_worth_knowing() {
     let mut b = SceneBuilder::new("space");
     let m = b.material("m", [0.5; 3], [1.0; 3]);

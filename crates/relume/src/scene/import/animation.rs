@@ -2,8 +2,8 @@
 //! materials and lights emit.
 //!
 //! All animations play together unless one is chosen by name: exporters such as Blender's write
-//! one for each object. Of those that move the same properties (a figure's walk and run) the first plays, and the others
-//! are listed. Scale keys that only switch between nothing and one size become presence; what changes its size otherwise
+//! one for each object. Of those that move the same properties (a figure's walk and run) the first plays in which anything
+//! moves (not a pose of one key, as figures at rest have), and the others are listed. Scale keys that only switch between nothing and one size become presence; what changes its size otherwise
 //! is held at its first size, because it would not move rigidly.
 
 use std::collections::BTreeSet;
@@ -115,24 +115,31 @@ pub(super) fn played(
     Ok(played)
 }
 
-/// The first of each set of animations that have nothing to do with the others, with a note that lists the rest.
+/// Of each set of animations that have nothing to do with the others the first in which anything moves, or the first, with
+/// a note that lists the rest.
 fn first_of_each_kind(document: &Document, names: &[String], notes: &mut Vec<Note>) -> Vec<usize> {
-    let mut kinds: Vec<(usize, BTreeSet<String>)> = Vec::new();
+    let mut kinds: Vec<(Vec<usize>, BTreeSet<String>)> = Vec::new();
     for (index, animation) in document.root.animations.iter().enumerate() {
-        let mut first = index;
+        let mut members = vec![index];
         let mut moved: BTreeSet<String> =
             animation.channels.iter().filter_map(moved_property).collect();
-        kinds.retain(|(other, of_other)| {
-            let alike = !of_other.is_disjoint(&moved);
+        kinds.retain(|(others, of_others)| {
+            let alike = !of_others.is_disjoint(&moved);
             if alike {
-                first = first.min(*other);
-                moved.extend(of_other.iter().cloned());
+                members.extend(others);
+                moved.extend(of_others.iter().cloned());
             }
             !alike
         });
-        kinds.push((first, moved));
+        members.sort_unstable();
+        kinds.push((members, moved));
     }
-    let mut playing: Vec<usize> = kinds.into_iter().map(|kind| kind.0).collect();
+    let moves = |&&index: &&usize| anything_moves(document, &document.root.animations[index]);
+    let first = |(members, _): &(Vec<usize>, _)| match members.len() {
+        1 => members[0],
+        _ => *members.iter().find(moves).unwrap_or(&members[0]),
+    };
+    let mut playing: Vec<usize> = kinds.iter().map(first).collect();
     playing.sort_unstable();
     let others: Vec<&str> = (0..names.len())
         .filter(|index| !playing.contains(index))
@@ -140,7 +147,8 @@ fn first_of_each_kind(document: &Document, names: &[String], notes: &mut Vec<Not
         .collect();
     if let (Some(&first), false) = (playing.first(), others.is_empty()) {
         let message = format!(
-            "of the animations that move the same objects the first plays; {} others do not: {}; choose one by name",
+            "of the animations that move the same objects the first that changes anything plays; {} others do not: {}; choose \
+             one by name",
             others.len(),
             others.join(", ")
         );
@@ -148,6 +156,47 @@ fn first_of_each_kind(document: &Document, names: &[String], notes: &mut Vec<Not
     }
     playing
 }
+
+/// Whether any value of an animation changes from key to key. What cannot be read counts as moving: whoever plays it says
+/// why.
+fn anything_moves(document: &Document, animation: &json::Animation) -> bool {
+    animation.channels.iter().any(|channel| {
+        let Some(sampler) = animation.samplers.get(channel.sampler) else { return true };
+        let values = match channel.target.path.as_str() {
+            "rotation" => document.numbers::<4>(sampler.output, "").map(|v| v.into_flattened()),
+            "translation" | "scale" => {
+                document.numbers::<3>(sampler.output, "").map(|v| v.into_flattened())
+            }
+            // Of other properties any number of values belongs to a key.
+            _ => return true,
+        };
+        let keys = document.root.accessors.get(sampler.input).map_or(0, |times| times.count);
+        let Ok(values) = values else { return true };
+        let cubic = sampler.interpolation.as_deref() == Some("CUBICSPLINE");
+        keys == 0 || !is_constant(&values, keys, cubic)
+    })
+}
+
+/// Whether keys are all the same, up to rounding; of cubic ones tangents are 0.
+fn is_constant(values: &[f64], keys: usize, cubic: bool) -> bool {
+    let per_key = values.len() / keys;
+    let part = if cubic { per_key / 3 } else { per_key };
+    if part == 0 {
+        return false;
+    }
+    let most = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let same = |a: f64, b: f64| (a - b).abs() <= SAME_VALUE * most;
+    let value_of = |key: &'_ [f64]| if cubic { key[part..2 * part].to_vec() } else { key.to_vec() };
+    let first = value_of(&values[..per_key]);
+    values.chunks_exact(per_key).all(|key| {
+        let tangents = if cubic { [&key[..part], &key[2 * part..]] } else { [&key[..0]; 2] };
+        value_of(key).iter().zip(&first).all(|(&a, &b)| same(a, b))
+            && tangents.into_iter().flatten().all(|&t| t == 0.0)
+    })
+}
+
+/// Values of keys that differ by less than this share of the largest are the same.
+const SAME_VALUE: f64 = 1e-6;
 
 /// What a channel changes, as a pointer.
 fn moved_property(channel: &json::Channel) -> Option<String> {

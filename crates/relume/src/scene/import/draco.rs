@@ -14,6 +14,7 @@ use draco_core::{
 
 use super::accessor::Component;
 use super::document::Document;
+use super::guard::guarded;
 use super::json;
 use crate::scene::SceneError;
 
@@ -147,12 +148,17 @@ impl Document {
             .with_max_points(COUNT_MAX)
             .with_max_faces(COUNT_MAX)
             .with_max_decoded_bytes(bytes_max);
-        let mut mesh = Mesh::new();
-        let decoded = MeshDecoder::new()
-            .decode(&mut DecoderBuffer::new(bytes).with_limits(limits), &mut mesh);
+        let decoded = guarded(|| {
+            let mut mesh = Mesh::new();
+            let mut buffer = DecoderBuffer::new(bytes).with_limits(limits);
+            MeshDecoder::new().decode(&mut buffer, &mut mesh).map(|()| mesh)
+        });
         match decoded {
-            Ok(()) => Ok(cell.get_or_init(|| mesh)),
-            Err(error) => Err(self.undecoded(&error, view, owner, bytes_max)),
+            Some(Ok(mesh)) => Ok(cell.get_or_init(|| mesh)),
+            Some(Err(error)) => Err(self.undecoded(&error, view, owner, bytes_max)),
+            None => Err(self.malformed(format!(
+                "{owner}: the compressed data in buffer view {view} cannot be read: its bytes are damaged"
+            ))),
         }
     }
 

@@ -11,6 +11,7 @@ use meshoptimizer_rs::codec::{
 use meshoptimizer_rs::{Limits, Workspace};
 
 use super::document::Document;
+use super::guard::guarded;
 use super::json;
 use crate::scene::SceneError;
 
@@ -40,7 +41,8 @@ impl Document {
             )));
         }
         self.fits(format_args!("buffer view {index}"), bytes)?;
-        decoded(packed, source, bytes as usize)
+        guarded(|| decoded(packed, source, bytes as usize))
+            .unwrap_or_else(|| Err("its bytes are damaged".to_owned()))
             .map_err(|why| self.malformed(format!("{what} cannot be read: {why}")))
     }
 }

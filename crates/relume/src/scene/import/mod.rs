@@ -14,6 +14,7 @@ mod clock;
 mod document;
 mod draco;
 mod facet;
+mod guard;
 mod images;
 mod json;
 mod light;

@@ -49,7 +49,7 @@ impl PropertyAccess for Face {
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        if !matches!(name, "vertex_indices" | "vertex_index") {
+        if !matches!(name, "vertex_indices" | "vertex_index" | "tristrip") {
             return PropertyAccessResult::Ignored;
         }
         self.0 = match property {
@@ -97,9 +97,17 @@ pub(super) fn read(bytes: &[u8], stem: &str, folder: &Folder) -> Result<Contents
             }
             "face" => {
                 let read = Parser::<Face>::new();
-                faces = read
+                let read = read
                     .read_payload_for_element(&mut reader, element, &header)
                     .map_err(|e| wrong(&e))?;
+                faces.extend(read);
+            }
+            "tristrips" => {
+                let read = Parser::<Face>::new();
+                let strips = read
+                    .read_payload_for_element(&mut reader, element, &header)
+                    .map_err(|e| wrong(&e))?;
+                faces.extend(strips.iter().flat_map(of_strip));
             }
             _ => {
                 unused.push(name.as_str());
@@ -119,6 +127,23 @@ pub(super) fn read(bytes: &[u8], stem: &str, folder: &Folder) -> Result<Contents
     let parts = vec![Part { material: None, points, triangles }];
     contents.objects = vec![Object { name: stem.to_owned(), parts }];
     Ok(contents)
+}
+
+/// The triangles of a strip: each index makes one with the two before it, every second turned round; negative ones begin
+/// anew.
+fn of_strip(strip: &Face) -> impl Iterator<Item = Face> {
+    let runs = strip.0.split(|&index| index < 0);
+    let of_run = |run: &[i64]| {
+        let turned = |(k, t): (usize, &[i64])| match k % 2 {
+            0 => Face(vec![t[0], t[1], t[2]]),
+            _ => Face(vec![t[1], t[0], t[2]]),
+        };
+        run.windows(3).enumerate().map(turned).collect::<Vec<Face>>()
+    };
+    runs.flat_map(of_run)
+        .filter(|f| f.0[0] != f.0[1] && f.0[1] != f.0[2] && f.0[0] != f.0[2])
+        .collect::<Vec<_>>()
+        .into_iter()
 }
 
 /// The file with a header, and a body if that is text, whose lines end with line feeds and have single spaces:

@@ -199,6 +199,11 @@ impl OutsideNow {
         {
             return radiance;
         }
+        self.sky_radiance(direction)
+    }
+
+    /// The same without the sun's disc.
+    pub fn sky_radiance(&self, direction: DVec3) -> [f64; 3] {
         match &self.sky {
             Some(sky) if direction.y > 0.0 || matches!(sky, SkyNow::Picture(_)) => {
                 sky.radiance(direction)

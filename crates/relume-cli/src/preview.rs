@@ -1,0 +1,123 @@
+//! Rough pictures of what is not solved: those of `--preview`, and one that is there while the first frame takes long.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use relume::scene::Scene;
+use relume_picture::export::write_atomically;
+use relume_picture::picture::{Exposure, Settings, Sketch, View};
+
+use crate::args::{ExposureFlag, PictureFlags, Shading};
+use crate::clip::{self, Clip, fixed};
+use crate::failure::Failure;
+use crate::interrupt;
+use crate::output::{self, counted};
+use crate::viewing::Viewing;
+
+/// The first frame has this long before a rough picture is drawn beside it.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// A rough picture that is drawn where the first frame takes long, and goes when that is finished.
+pub(crate) struct Meanwhile {
+    /// Dropped when there is no more need.
+    wanted: Option<Sender<()>>,
+    state: Arc<Mutex<State>>,
+}
+
+#[derive(PartialEq)]
+enum State {
+    Wanted,
+    Written,
+    Over,
+}
+
+impl Meanwhile {
+    /// A picture of a scene at `time_s` seconds, in a file; `say` is told when it is there.
+    pub(crate) fn new(
+        (scene, time_s): (Arc<Scene>, f64),
+        (view, settings): (View, Settings),
+        path: PathBuf,
+        say: impl Fn(&str) + Send + 'static,
+    ) -> Meanwhile {
+        let (wanted, over) = mpsc::channel::<()>();
+        let state = Arc::new(Mutex::new(State::Wanted));
+        let shared = Arc::clone(&state);
+        // No work of the engine: its results do not depend on it.
+        #[allow(clippy::disallowed_methods)]
+        std::thread::spawn(move || {
+            if over.recv_timeout(PATIENCE) != Err(RecvTimeoutError::Timeout) {
+                return;
+            }
+            let image = Sketch::new(&scene, time_s).draw(&view, &settings);
+            let Ok(bytes) = image.to_png() else { return };
+            let mut state = interrupt::locked(&shared);
+            let _guard = interrupt::writing();
+            // A picture that cannot be written is no reason to stop: the frame's own will say so.
+            if *state == State::Wanted && write_atomically(&path, &bytes).is_ok() {
+                *state = State::Written;
+                say(&format!(
+                    "note: this takes a while; {} shows roughly what the first frame will look like",
+                    path.display()
+                ));
+            }
+        });
+        Meanwhile { wanted: Some(wanted), state }
+    }
+
+    /// There is a better one: takes the picture away.
+    pub(crate) fn end(&mut self, path: &Path) {
+        self.wanted = None;
+        let before = std::mem::replace(&mut *interrupt::locked(&self.state), State::Over);
+        if before == State::Written {
+            // Gone already is as good.
+            let _ = fs::remove_file(path);
+        }
+    }
+}
+
+/// The file of the rough picture beside a first frame.
+pub(crate) fn path(dir: &Path) -> PathBuf {
+    dir.join("preview.png")
+}
+
+/// How rough pictures are drawn.
+pub(crate) fn settings(flags: &PictureFlags) -> Settings {
+    let exposure = match flags.exposure {
+        ExposureFlag::Auto => Exposure::Automatic,
+        ExposureFlag::Stops(stops) => fixed(stops),
+    };
+    clip::picture_settings(flags, Shading::Gouraud, exposure)
+}
+
+/// Draws rough pictures of the frames of a clip, `preview-0000.png` ..., and solves nothing.
+pub(crate) fn draw(
+    clip: &Clip,
+    views: &Viewing,
+    flags: &PictureFlags,
+    dir: &Path,
+) -> Result<(), Failure> {
+    let mut settings = settings(flags);
+    let mut sketch: Option<Sketch> = None;
+    let moves = clip.scene.motion.duration_s > 0.0;
+    for &frame in &clip.frames {
+        if interrupt::requested() {
+            return Err(Failure::interrupted("stopped"));
+        }
+        let now = sketch.take().filter(|_| !moves);
+        let now = now.unwrap_or_else(|| Sketch::new(&clip.scene, clip.time_of(frame)));
+        let view = views.at(&clip.scene, frame, clip.fps())?;
+        if settings.exposure == Exposure::Automatic {
+            settings.exposure = now.exposure(&view);
+        }
+        let bytes = now.draw(&view, &settings).to_png().map_err(Failure::new)?;
+        let path = dir.join(format!("preview-{frame:04}.png"));
+        let _guard = interrupt::writing();
+        write_atomically(&path, &bytes).map_err(|error| Failure::write(&path, &error))?;
+        sketch = Some(now);
+    }
+    let count = counted(clip.frames.len(), "rough picture");
+    output::print(&format!("{count} in {}, nothing was solved\n", dir.display()))
+}

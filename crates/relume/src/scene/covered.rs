@@ -351,7 +351,7 @@ mod tests {
 
     #[test]
     fn what_light_may_get_into_or_what_moves_or_floats_covers_nothing() {
-        assert_eq!(covered_m2(&[5], 0.0, false, false), 0.0);
+        assert_eq!(covered_m2(&[4, 5], 0.0, false, false), 0.0);
         assert_eq!(covered_m2(&[4, 0], 0.0, false, false), 0.0);
         assert_eq!(covered_m2(&[4], 0.0, false, true), 0.0);
         assert_eq!(covered_m2(&[4], 0.0, true, false), 0.0);

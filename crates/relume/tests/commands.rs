@@ -386,3 +386,43 @@ fn ten_thousand_commands_leave_no_trace() {
     let most = |bytes: &[u64]| *bytes.iter().max().unwrap();
     assert!(most(&bytes[half..]) <= most(&bytes[..half]) + most(&bytes[..half]) / 20);
 }
+
+#[test]
+fn the_floor_under_a_crate_that_is_taken_away_is_lit() {
+    let scene = |crate_at: Option<f64>| {
+        let mut b = SceneBuilder::new("cellar");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let glow = b.material("glow", [0.0; 3], [5.0; 3]);
+        let place =
+            |b: &mut SceneBuilder, name: &str| b.node(name, None, DVec3::ZERO, DQuat::IDENTITY);
+        let walls = place(&mut b, "walls");
+        b.cuboid_inward(walls, "walls", grey, v(0.0, 0.0, 0.0), v(4.0, 3.0, 4.0));
+        let lamp = place(&mut b, "lamp");
+        b.cuboid(lamp, "lamp", glow, v(1.0, 2.5, 1.0), v(3.0, 2.7, 3.0));
+        if let Some(x) = crate_at {
+            let one = place(&mut b, "crate");
+            b.cuboid(one, "crate", grey, v(x, 0.0, 1.5), v(x + 1.0, 1.0, 2.5));
+        }
+        b.build().unwrap()
+    };
+    let floor = |session: &mut Session, x: f64| {
+        session.solve().unwrap().irradiance_at([x, 0.0, 2.1], [0.0, 1.0, 0.0])[0]
+    };
+    let mut session = Session::new(scene(Some(0.5)), at_tolerance(0.1)).unwrap();
+    let beside = floor(&mut session, 3.0);
+    let body = session.scene().body_named("crate").unwrap();
+    session.apply(Command::set_pose(body, Pose::translation([2.0, 0.0, 0.0]))).unwrap();
+    let uncovered = floor(&mut session, 1.0);
+    check(&mut session, "moved");
+    let mut there = Session::new(scene(Some(2.5)), at_tolerance(0.1)).unwrap();
+    let expected = floor(&mut there, 1.0);
+    assert!((uncovered / expected - 1.0).abs() < 0.05, "{uncovered} {expected} {beside}");
+    session.apply(Command::hide(body)).unwrap();
+    let empty = floor(&mut Session::new(scene(None), at_tolerance(0.1)).unwrap(), 1.0);
+    let hidden = floor(&mut session, 1.0);
+    assert!((hidden / empty - 1.0).abs() < 0.05, "{hidden} {empty}");
+    check(&mut session, "hidden");
+    session.apply(Command::SetPresence(body, None)).unwrap();
+    session.apply(Command::SetPose(body, None)).unwrap();
+    assert!((floor(&mut session, 3.0) / beside - 1.0).abs() < 1e-3);
+}

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 
 use super::clusters::{Branch, binary_tree};
+use super::exposed::{exposed_extent, exposed_m2};
 use super::split::{Chart, Extent, Place, Shape};
 use crate::geometry::{Aabb, Segment, cut_along, polygon_area, split_convex};
-use crate::scene::{BodyId, Enclosure, PatchId, Scene, Solid, Solids};
+use crate::scene::{BodyId, Covered, Enclosure, PatchId, Scene, Solid, Solids};
 
 /// Index of a node in a [`Forest`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -38,13 +39,15 @@ pub struct ElementKey {
     pub path: u32,
 }
 
-/// What differs between siblings: 20 bytes.
+/// What differs between siblings: 24 bytes.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     /// Where an element lies within its facet.
     place: Place,
     fan: Fan,
     area_m2: f32,
+    /// Of that, what light can reach.
+    exposed_m2: f32,
 }
 
 /// What two siblings have in common; a node of the fixed part has one of its own. 20 bytes.
@@ -100,6 +103,9 @@ const NONE: u32 = u32::MAX;
 /// Vectors of the forest are given room for this share more than they need.
 const SLACK: usize = 32;
 
+/// Elements of which a smaller share is exposed count as covered wholly.
+const EXPOSED_LEAST: f32 = 1.0 / 32.0;
+
 /// Levels that a path has room for.
 const LEVELS_MAX: u32 = 15;
 
@@ -143,6 +149,8 @@ struct Fixed {
     facets: Vec<ElementId>,
     /// The convex solids that patches are faces of.
     solids: Solids,
+    /// What of each patch is covered, by patch.
+    covered: Vec<Covered>,
     /// Box around the unit normals of the patches at or below each node, in their bodies' frames.
     normals: Vec<Aabb>,
     /// Whether a patch emits light at any time, by patch.
@@ -187,6 +195,7 @@ pub struct Counts {
 impl Forest {
     /// The fixed part of the forest of a scene.
     pub fn new(scene: &Scene) -> Forest {
+        let solids = scene.solids();
         let mut forest = Forest {
             nodes: Vec::new(),
             twins: Vec::new(),
@@ -196,7 +205,8 @@ impl Forest {
             fixed: Arc::new(Fixed {
                 patch_roots: vec![ElementId(NONE); scene.patches.len()],
                 body_roots: vec![ElementId(NONE); scene.bodies.len()],
-                solids: scene.solids(),
+                covered: scene.covered(&solids, &|_| false),
+                solids,
                 ..Fixed::default()
             }),
             vacant: [Vec::new(), Vec::new()],
@@ -364,18 +374,21 @@ impl Forest {
     }
 
     fn sum_areas(&mut self) {
-        let mut sums = vec![0.0_f64; self.nodes.len()];
+        let mut sums = vec![[0.0_f64; 2]; self.nodes.len()];
         for id in (0..self.nodes.len()).rev() {
             let id = ElementId(id as u32);
             if self.kind(id) == Kind::Element && !self.is_distant(id) {
-                sums[id.0 as usize] = self.shape(id).area();
+                let shape = self.shape(id);
+                sums[id.0 as usize] = [shape.area(), exposed_m2(&shape, self.covered(id))];
             }
             if let Some(parent) = self.parent(id) {
-                sums[parent.0 as usize] += sums[id.0 as usize];
+                let [area, exposed] = sums[id.0 as usize];
+                sums[parent.0 as usize][0] += area;
+                sums[parent.0 as usize][1] += exposed;
             }
         }
-        for (node, sum) in self.nodes.iter_mut().zip(sums) {
-            node.area_m2 = sum as f32;
+        for (node, [area, exposed]) in self.nodes.iter_mut().zip(sums) {
+            (node.area_m2, node.exposed_m2) = (area as f32, exposed as f32);
         }
     }
 
@@ -497,6 +510,43 @@ impl Forest {
         f64::from(self.nodes[id.0 as usize].area_m2)
     }
 
+    /// Area of what light can reach, m2: without what rests on the element ([`Scene::covered`]); a millionth of the area
+    /// where it is covered wholly. Light counts over this area alone: an element has the mean radiosity of what can be seen of
+    /// it. Exact up to single precision.
+    #[inline]
+    pub fn exposed_m2(&self, id: ElementId) -> f64 {
+        f64::from(self.nodes[id.0 as usize].exposed_m2)
+    }
+
+    /// What arrives is spread over this area, m2: what is exposed, or all of an element of which next to nothing is.
+    #[inline]
+    pub fn receiving_m2(&self, id: ElementId) -> f64 {
+        let Node { area_m2, exposed_m2, .. } = self.nodes[id.0 as usize];
+        f64::from(if exposed_m2 > EXPOSED_LEAST * area_m2 { exposed_m2 } else { area_m2 })
+    }
+
+    /// Whether two elements are on patches that rest against each other in one plane: what they exchange leaves neither, and
+    /// counts for nothing.
+    #[inline]
+    pub fn rest_in_contact(&self, a: ElementId, b: ElementId) -> bool {
+        let (Some(of_a), Some(of_b)) = (self.patch(a), self.patch(b)) else { return false };
+        self.fixed.covered[of_a.0 as usize].contacts.contains(&of_b)
+    }
+
+    /// Covered parts of the patch of an element.
+    fn covered(&self, id: ElementId) -> &Covered {
+        let patch = self.patch(id).expect("an element has a patch");
+        &self.fixed.covered[patch.0 as usize]
+    }
+
+    /// Where what is exposed of an element lies in its patch's frame; the radius is that of the whole.
+    pub fn exposed_extent(&self, id: ElementId) -> Extent {
+        let extent = self.extent(id);
+        let Node { area_m2, exposed_m2, .. } = self.nodes[id.0 as usize];
+        let is_part = exposed_m2 > EXPOSED_LEAST * area_m2 && exposed_m2 < area_m2;
+        if is_part { exposed_extent(&self.shape(id), extent, self.covered(id)) } else { extent }
+    }
+
     /// The patch an element or polygon belongs to.
     #[inline]
     pub fn patch(&self, id: ElementId) -> Option<PatchId> {
@@ -610,6 +660,18 @@ impl Forest {
         differs
     }
 
+    /// Finds anew what of each patch is covered, with some bodies displaced, and what of each element is exposed. Whether
+    /// that differs from before.
+    pub fn cover(&mut self, scene: &Scene, is_displaced: &dyn Fn(BodyId) -> bool) -> bool {
+        let covered = scene.covered(&self.fixed.solids, is_displaced);
+        let differs = self.fixed.covered != covered;
+        if differs {
+            self.fixed_mut().covered = covered;
+            self.sum_areas();
+        }
+        differs
+    }
+
     /// Area of the patches that are connected with a patch by common corners, itself among them, m2.
     pub fn connected_m2(&self, patch: PatchId) -> f64 {
         self.fixed.connected_m2[patch.0 as usize]
@@ -681,8 +743,15 @@ impl Forest {
         let (places, count) = place.children(chart.len, chart.shape(&place).cut());
         let first = self.room_for(count);
         for (k, place) in places[..count].iter().enumerate() {
-            let area_m2 = chart.shape(place).area() as f32;
-            self.nodes[first as usize + k] = Node { place: *place, fan: Fan::LEAF, area_m2 };
+            let shape = chart.shape(place);
+            let (area_m2, of_parent) = (shape.area() as f32, self.nodes[id.0 as usize]);
+            let exposed_m2 = if of_parent.exposed_m2 < of_parent.area_m2 {
+                exposed_m2(&shape, self.covered(id)) as f32
+            } else {
+                area_m2
+            };
+            let node = Node { place: *place, fan: Fan::LEAF, area_m2, exposed_m2 };
+            self.nodes[first as usize + k] = node;
         }
         for k in (0..count as u32).step_by(2) {
             let twins = self.twins_of(first + k);
@@ -857,7 +926,8 @@ impl PatchCuts<'_> {
 }
 
 impl Node {
-    const VACANT: Node = Node { place: Place::WHOLE, fan: Fan::OTHER, area_m2: 0.0 };
+    const VACANT: Node =
+        Node { place: Place::WHOLE, fan: Fan::OTHER, area_m2: 0.0, exposed_m2: 0.0 };
 }
 
 impl Twins {

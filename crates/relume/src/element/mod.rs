@@ -4,6 +4,7 @@
 //! pose. Parents come before children.
 
 mod clusters;
+mod exposed;
 mod forest;
 mod split;
 mod world;

@@ -117,9 +117,9 @@ impl Session {
     /// The law: any commands followed by their inverses in reverse order lead to the state of the start, and the state
     /// after any commands equals that of a session that was given the same world at once, links bit for bit.
     ///
-    /// Cost: of the command itself none; of the next solve, what the change changes. After [`Command::Insert`],
-    /// [`Command::Remove`] and [`Command::PutBack`], and where a material comes to emit that never does in the clip, the
-    /// next solve is a cold build.
+    /// Cost: of the command itself none; of the next solve, what the change changes. It is a cold build after
+    /// [`Command::Insert`], [`Command::Remove`] and [`Command::PutBack`], where a material comes to emit that never does in
+    /// the clip, and where a body that rests against others is taken from its place, or put back there.
     ///
     /// # Errors
     /// [`CommandError`]; nothing has changed then.
@@ -140,9 +140,7 @@ impl Session {
                 Command::SetReflectance(material, set(&mut held.reflectances, material, to))
             }
             Command::SetExitance(material, to) => {
-                let before = set(&mut held.exitances, material, to);
-                self.note_emitters();
-                Command::SetExitance(material, before)
+                Command::SetExitance(material, set(&mut held.exitances, material, to))
             }
             Command::SetIntensity(light, to) => {
                 Command::SetIntensity(light, set(&mut held.intensities, light, to))

@@ -8,10 +8,10 @@ use rayon::prelude::*;
 
 use crate::element::{ElementId, Forest, Kind, WorldElement};
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
-use crate::scene::{LightId, LightKind, PatchId};
+use crate::scene::{InPlane, LightId, LightKind, PatchId};
 use crate::solver::SQUARE_MOMENT;
 use crate::transport::{
-    InPlane, form_factor_from_point, form_factor_past, in_plane, keep_in_front, lies_in, light_at,
+    form_factor_from_point, form_factor_past, in_plane, keep_in_front, lies_in, light_at,
     segment_is_clear,
 };
 
@@ -244,14 +244,22 @@ impl<'a> Look<'a> {
         } else {
             // The part in view may be much brighter or darker than the rest.
             let (factor, moment) = self.factor_past(seen, &in_the_way, SPLITS);
-            let at = e.offset(moment / factor.max(f64::MIN_POSITIVE)) / e.radius;
-            let place = place_of(self.forest, id);
-            let b = self.solved.radiosity.linear(id.0, &place, SQUARE_MOMENT);
-            (factor, b.at(at.x as f32, at.y as f32).map(|b| b.max(0.0)))
+            (factor, self.radiosity_at(&e, id, moment / factor.max(f64::MIN_POSITIVE)))
         };
         if factor > 0.0 {
             (0..3).for_each(|c| sum[c] += factor * f64::from(b[c]));
         }
+    }
+
+    /// Radiosity of an element at a point of it, from its line, never negative.
+    fn radiosity_at(&self, e: &WorldElement, id: ElementId, at: DVec3) -> [f32; 3] {
+        let place = place_of(self.forest, id);
+        let b = self.solved.radiosity.linear(id.0, &place, SQUARE_MOMENT);
+        // Its mean is that of what is exposed of it.
+        let [x, y] = place.centroid.map(f64::from);
+        let middle = glam::DVec2::new(x, y) - self.forest.extent(id).centroid;
+        let at = (e.offset(at) - middle) / e.radius;
+        b.at(at.x as f32, at.y as f32).map(|b| b.max(0.0))
     }
 
     /// Adds what a part of a leaf sends that is large against its distance: the leaf knows its radiosity as a line
@@ -292,10 +300,7 @@ impl<'a> Look<'a> {
             let (m, rho) = (now.exitance(scene, patch), now.reflectance(scene, patch));
             [0, 1, 2].map(|c| m[c] + rho[c] * h[c])
         } else {
-            let place = place_of(self.forest, id);
-            let b = self.solved.radiosity.linear(id.0, &place, SQUARE_MOMENT);
-            let at = e.offset(at) / e.radius;
-            b.at(at.x as f32, at.y as f32).map(|b| f64::from(b.max(0.0)))
+            self.radiosity_at(e, id, at).map(f64::from)
         };
         (0..3).for_each(|c| sum[c] += factor * b[c]);
     }

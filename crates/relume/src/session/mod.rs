@@ -1,12 +1,14 @@
 //! The session owns all mutable state and runs the phases of a frame; snapshots come out.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
 
 use crate::element::{ElementId, Forest, WorldView};
 use crate::event::Ticks;
+use crate::geometry::Pose;
 use crate::pair::{LinkEvent, PairHash, PairTree};
-use crate::scene::{Held, Patch, Scene, World};
+use crate::scene::{BodyId, Held, Patch, Scene, World};
 use crate::solver::{Links, Radiosity};
 use crate::transport::Simd;
 
@@ -140,6 +142,8 @@ pub struct Session {
     came_from: Option<f64>,
     /// What is held by hand.
     held: Held,
+    /// Bodies that are not where the scene has them at rest, as the seed knows them.
+    displaced: BTreeSet<BodyId>,
     /// Time of the clip, seconds.
     time_s: f64,
     /// Steps so far.
@@ -219,6 +223,7 @@ impl Session {
             watch,
             came_from,
             held,
+            displaced: BTreeSet::new(),
             time_s,
             frames,
         })
@@ -265,6 +270,7 @@ impl Session {
     }
 
     fn step_on(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, SessionError> {
+        self.follow_hands();
         let world = self.scene.at_but(time_s, &self.held);
         let came_from = self.came_from.take();
         let from = came_from.map(|from_s| self.scene.at_but(from_s, &self.held));
@@ -356,11 +362,19 @@ impl Session {
         self.scene = Arc::new(scene);
         (self.seed, self.coarse_ids) = seed_of(&self.scene, self.options.oracle);
         self.solved = None;
-        self.note_emitters();
+        self.displaced = BTreeSet::new();
     }
 
-    /// Notes which patches emit at any time, in the clip or by hand. Where that changes, nothing that was solved stays.
-    fn note_emitters(&mut self) {
+    /// Tells the seed what hands have changed of it: which patches emit at any time, and which bodies at rest are where
+    /// the scene has them, covering what they stand on. Where either changes anything, nothing that was solved stays.
+    fn follow_hands(&mut self) {
+        let displaced = self.displaced_now();
+        if displaced != self.displaced {
+            if self.seed.cover(&self.scene, &|body| displaced.contains(&body)) {
+                self.solved = None;
+            }
+            self.displaced = displaced;
+        }
         let (scene, held) = (&self.scene, &self.held);
         let by_hand = |patch: &Patch| {
             let exitance = held.exitances.get(&patch.material)?;
@@ -371,6 +385,15 @@ impl Session {
         if self.seed.set_glows(scene.patches.iter().map(emits).collect()) {
             self.solved = None;
         }
+    }
+
+    /// Bodies that no clip moves, and that a hand has moved or hidden.
+    fn displaced_now(&self) -> BTreeSet<BodyId> {
+        let Held { poses, presence, .. } = &self.held;
+        let moved =
+            poses.iter().filter(|(_, pose)| **pose != Pose::IDENTITY).map(|(&body, _)| body);
+        let hidden = presence.iter().filter(|(_, there)| !**there).map(|(&body, _)| body);
+        moved.chain(hidden).filter(|&body| !self.scene.moves(body)).collect()
     }
 
     /// Names of the bodies that are elsewhere in one world than in another.

@@ -112,7 +112,10 @@ impl Reconstruction<'_> {
         found: &mut Vec<(u32, Link)>,
     ) -> bool {
         let forest = &self.solved.forest;
-        if !forest.receives(receiver) || forest.kind(source) != Kind::Element {
+        if !forest.receives(receiver)
+            || forest.kind(source) != Kind::Element
+            || forest.rest_in_contact(receiver, source)
+        {
             return false;
         }
         let sends = self.solved.radiosity.radiosity(source.0);
@@ -133,14 +136,14 @@ impl Reconstruction<'_> {
             return false;
         };
         let radius = forest.extent(source).radius;
-        for (((leaf, shape), share), x) in ids.iter().zip(shapes).zip(shares).zip(exchanges) {
+        for ((leaf, share), x) in ids.iter().zip(shares).zip(exchanges) {
             if share <= 0.0 {
                 continue;
             }
             let (own, others) = if is_a { (x.over_a, x.over_b) } else { (x.over_b, x.over_a) };
             let size = forest.extent(ElementId(*leaf)).radius;
             let g = Gradients::new((own.gradient, size), (others.gradient, radius));
-            let coupling = (share / shape.area()) as f32;
+            let coupling = (share / forest.receiving_m2(ElementId(*leaf))) as f32;
             let (over_receiver, over_source) = (g.over_a, g.over_b);
             found.push((*leaf, Link { source: source.0, coupling, over_receiver, over_source }));
         }
@@ -158,7 +161,7 @@ impl Reconstruction<'_> {
             false => (Looker::B, gradients.over_b, gradients.over_a),
         };
         let v = self.sharing.visibility_from(link, looker)?;
-        let area_m2 = self.solved.forest.area_m2(leaf);
+        let area_m2 = self.solved.forest.receiving_m2(leaf);
         let coupling = (v * f64::from(exchange_area_m2) / area_m2) as f32;
         Some(Link { source: source.0, coupling, over_receiver, over_source })
     }

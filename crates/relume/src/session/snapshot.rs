@@ -119,6 +119,9 @@ pub(super) fn take(
         let lit = surfaces.lit(facet.0);
         let mut bent = bends.of_leaves(facet.0).into_iter();
         radiosity.irradiances(&surfaces, facet.0, &mut |id, h| {
+            // Of what is exposed; a leaf is read about its own centroid.
+            let extent = forest.extent(ElementId(id));
+            let h = h.moved(&surfaces.place(id), [extent.centroid.x, extent.centroid.y]);
             let h = h.plus(&bent.next().expect("the same leaves"));
             let irradiance = h.mean.map(|x| x.max(0.0));
             out.push(Leaf {

@@ -55,7 +55,7 @@ pub(super) fn place_of(forest: &Forest, id: ElementId) -> Place {
     if forest.kind(id) != Kind::Element {
         return Place { centroid: [0.0; 2], radius: 1.0, moment: [1.0, 0.0, 1.0] };
     }
-    let extent = forest.extent(id);
+    let extent = forest.exposed_extent(id);
     Place {
         centroid: [extent.centroid.x as f32, extent.centroid.y as f32],
         radius: extent.radius as f32,
@@ -90,7 +90,7 @@ impl Surfaces for LitForest<'_> {
     }
 
     fn area_m2(&self, id: u32) -> f64 {
-        self.forest.area_m2(ElementId(id))
+        self.forest.exposed_m2(ElementId(id))
     }
 
     fn place(&self, id: u32) -> Place {
@@ -112,8 +112,12 @@ pub(crate) trait Receivers {
     fn room(&self) -> usize;
     /// Whether light is gathered there: an element, neither a light nor distant.
     fn receives(&self, id: ElementId) -> bool;
-    /// Area, m2.
+    /// Area that what arrives is spread over, m2.
     fn receiving_area_m2(&self, id: ElementId) -> f64;
+    /// Whether two elements rest against each other, so that what they exchange counts for nothing.
+    fn rest_in_contact(&self, _a: ElementId, _b: ElementId) -> bool {
+        false
+    }
 }
 
 impl Receivers for Forest {
@@ -126,7 +130,11 @@ impl Receivers for Forest {
     }
 
     fn receiving_area_m2(&self, id: ElementId) -> f64 {
-        self.area_m2(id)
+        self.receiving_m2(id)
+    }
+
+    fn rest_in_contact(&self, a: ElementId, b: ElementId) -> bool {
+        Forest::rest_in_contact(self, a, b)
     }
 }
 
@@ -139,6 +147,7 @@ pub(super) fn directions(
     let carried = link.carried;
     let exchange = carried.exchange_area_past_occluders_m2();
     let g = carried.gradients;
+    let exchange = if forest.rest_in_contact(link.a, link.b) { 0.0 } else { exchange };
     let one = |receiver: ElementId, source: ElementId, over_receiver, over_source| {
         let receives = forest.receives(receiver) && exchange > 0.0;
         receives.then(|| {
@@ -178,7 +187,9 @@ pub(super) fn set_pairs(
     let both = |(a, b): (ElementId, ElementId)| [(a.0, without(b)), (b.0, without(a))];
     let mut wanted: Vec<(u32, Link)> = Vec::new();
     for pair in set {
-        if pair.carried.exchange_area_past_occluders_m2() > 0.0 {
+        if pair.carried.exchange_area_past_occluders_m2() > 0.0
+            && !forest.rest_in_contact(pair.a, pair.b)
+        {
             wanted.extend(directions(forest, &pair));
         } else {
             wanted.extend(both((pair.a, pair.b)));

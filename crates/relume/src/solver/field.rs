@@ -31,6 +31,12 @@ impl Linear {
         Linear { mean: self.at(dx, dy), ..*self }
     }
 
+    /// The same about another point than the centroid of a place, per metre.
+    pub(crate) fn moved(&self, own: &Place, to: [f64; 2]) -> Linear {
+        let [dx, dy] = [0, 1].map(|k| to[k] as f32 - own.centroid[k]);
+        Linear { mean: self.at(dx, dy), ..*self }
+    }
+
     /// Divided by a number.
     pub(super) fn divided(&self, by: f32) -> Linear {
         let each = |numbers: [f32; 3]| numbers.map(|x| x / by);

@@ -1,24 +1,9 @@
-//! What lies in one plane: which of two coincident surfaces hides the other, and what surfaces in contact exchange.
-//!
-//! The rule. A closed body touches what it stands on: where its face lies in the plane of another surface and
-//! looks at it, each hides the other from everything else, and they exchange all that leaves the overlap. Of two
-//! surfaces in one plane that face the same way, the smaller shows and hides the larger (a rug on a floor); of
-//! equal ones the first. Two rooms that share a wall's plane are back to back: neither wall hides the other.
+//! What lies in one plane: which of two coincident surfaces hides the other ([`Sheet::lies_to`] has the rule), and what
+//! surfaces in contact exchange: all that leaves the overlap.
 
 use crate::element::{Forest, OccluderPolygon, WorldElement, WorldView};
-use crate::geometry::{ConvexPolygon, Plane, no_smaller};
-use crate::scene::{Enclosure, PatchId};
-
-/// How a polygon in the plane of an end lies to it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum InPlane {
-    /// It faces the end, or its other side does, and touches it.
-    Touches,
-    /// It faces the same way and shows in the end's place.
-    Covers,
-    /// It hides nothing of the end.
-    Apart,
-}
+use crate::geometry::{ConvexPolygon, Plane};
+use crate::scene::{InPlane, PatchId, Sheet};
 
 /// How a patch that lies in the plane of an end of patch `end` lies to it; `opposed` if it faces the other way.
 pub fn in_plane(
@@ -28,41 +13,13 @@ pub fn in_plane(
     end: PatchId,
     opposed: bool,
 ) -> InPlane {
-    let twins = [patch, end].map(|p| view.patch(p).twin);
-    if twins[0] == Some(end) {
-        return InPlane::Apart;
-    }
-    let [of_patch, of_end] = [patch, end].map(|p| forest.enclosure(p));
-    let shows =
-        || if shows_first(forest, view, patch, end) { InPlane::Covers } else { InPlane::Apart };
-    match twins.map(|twin| twin.is_some()) {
-        [false, false] if !opposed => shows(),
-        [false, false] if of_patch == Enclosure::Space && of_end == Enclosure::Space => {
-            InPlane::Apart
-        }
-        [false, false] => InPlane::Touches,
-        // A body is on the side of a two-sided surface that its face looks at.
-        [false, true] if of_patch == Enclosure::Body => {
-            if opposed {
-                InPlane::Touches
-            } else {
-                InPlane::Apart
-            }
-        }
-        [false, true] if opposed => InPlane::Apart,
-        [true, false] if of_end == Enclosure::Body => InPlane::Touches,
-        _ => shows(),
-    }
-}
-
-/// Whether of two coincident patches that face the same way, or whose other sides do, the first shows.
-fn shows_first(forest: &Forest, view: &WorldView, one: PatchId, other: PatchId) -> bool {
-    let area = |p| forest.area_m2(forest.patch_root(p));
-    let first = |p: PatchId| view.patch(p).twin.map_or(p, |twin| twin.min(p));
-    match (no_smaller(area(one), area(other)), no_smaller(area(other), area(one))) {
-        (true, true) => first(one) < first(other),
-        (one_is_larger, _) => !one_is_larger,
-    }
+    let sheet = |patch: PatchId| Sheet {
+        patch,
+        twin: view.patch(patch).twin,
+        enclosure: forest.enclosure(patch),
+        area_m2: forest.area_m2(forest.patch_root(patch)),
+    };
+    sheet(patch).lies_to(&sheet(end), opposed)
 }
 
 /// Whether a polygon lies in an end's plane, up to `within_m`, and if so whether it faces the other way.

@@ -16,7 +16,7 @@ mod visibility;
 
 pub use bend::{Bend, Receiver};
 pub use clip::keep_in_front;
-pub use contact::{InPlane, in_plane, lies_in, overlap_m2};
+pub use contact::{in_plane, lies_in, overlap_m2};
 pub use exchange::{
     Exchange, Meeting, Variation, contact_exchange, exchange, exchange_by_points,
     exchange_of_points, light_at, light_exchange, meeting,

@@ -3,10 +3,10 @@
 
 use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldView};
 use crate::geometry::{Aabb, Plane, Pose, ShaftOfBoxes, shaft_meets_box};
-use crate::scene::{BodyId, PatchId};
+use crate::scene::{BodyId, InPlane, PatchId};
 
 use super::clip::keep_in_front;
-use super::contact::{InPlane, in_plane, lies_in, overlap_m2};
+use super::contact::{in_plane, lies_in, overlap_m2};
 use super::exchange::{Meeting, meeting};
 use super::kernel::Simd;
 use super::lookout::{Between, Clipping, Looker, Lookout, PlacedSolid, is_hidden};

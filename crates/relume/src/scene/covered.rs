@@ -1,0 +1,390 @@
+//! What of each patch is covered by what rests on it: no light reaches it, and nobody sees it. Pure geometry.
+//!
+//! A crate on a floor hides the floor under it. What a part of the floor that is larger than the crate sends comes from the
+//! rest alone; if the covered part counted in its mean, it would count twice, as dark and as hidden.
+
+use glam::{DVec2, DVec3};
+
+use super::topology::{Polygon, components, matched, sides_of};
+use super::weld::Weld;
+use super::{BodyId, InPlane, PatchId, Scene, Sheet, Solids};
+use crate::geometry::{Aabb, Moments, Plane, Segment, common, difference, within_outlines};
+
+/// What lies this close to a plane, as a share of the largest coordinate, lies in it: a few roundings of 32-bit numbers.
+const IN_PLANE: f64 = 1e-6;
+
+/// Bodies are cut this far above a patch to see what they cover, in roundings.
+const ABOVE: f64 = 4.0;
+
+/// Of what covers more than this share of a patch nothing is taken: the patch is wholly dark, and counts nowhere twice.
+const WHOLLY: f64 = 0.999;
+
+/// Parts of less than this share of a patch are rounding.
+const SLIVER: f64 = 1e-9;
+
+/// Cuts made in one scene; what would be found after that is not: a count, so that it is the same everywhere.
+const CUTS_MAX: usize = 2_000_000;
+
+/// Polygons of a surface, and covered parts of a patch, that are looked at.
+const MANY: usize = 4_096;
+
+/// What of a patch is covered.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Covered {
+    /// Disjoint convex polygons in the patch's frame, counter-clockwise, with boxes around them (low, high); metres.
+    pub parts: Vec<(Vec<DVec2>, [DVec2; 2])>,
+    /// Patches that touch it: what they exchange leaves neither.
+    pub contacts: Vec<PatchId>,
+}
+
+impl Scene {
+    /// What of each patch is covered by what rests on it; empty where nothing is. That is where it touches another patch or
+    /// another shows in its place ([`Sheet::lies_to`]), and where a body of one-sided polygons that look outwards stands on it
+    /// or sticks in it: one that is closed but for a border in the patch's plane or behind it, so that boxes without a bottom
+    /// count, and without lamps in it. Bodies that never move cover each other, a body that moves only itself.
+    /// Exact to a millionth of the largest coordinate. Of patches that are covered by more than 0.999 by one thing nothing is said.
+    /// Those that `is_displaced` names are not where the file has them: they cover themselves alone, as if they moved.
+    pub fn covered(&self, solids: &Solids, is_displaced: &dyn Fn(BodyId) -> bool) -> Vec<Covered> {
+        let mut out = vec![Covered::default(); self.patches.len()];
+        let bodies = (0..self.bodies.len() as u32).map(BodyId);
+        let (moving, at_rest): (Vec<BodyId>, Vec<BodyId>) = bodies
+            .filter(|&body| !self.is_distant(body))
+            .partition(|&b| self.moves(b) || is_displaced(b));
+        let mut cuts_left = CUTS_MAX;
+        let mut cover = |bodies: &[BodyId]| {
+            Group::new(self, bodies).cover((self, solids), &mut out, &mut cuts_left);
+        };
+        cover(&at_rest);
+        moving.into_iter().for_each(|body| cover(&[body]));
+        out
+    }
+}
+
+/// Patches that share a frame.
+struct Group {
+    placed: Vec<Placed>,
+    hulls: Vec<Hull>,
+    slack_m: f64,
+}
+
+/// A patch in the frame of its group.
+struct Placed {
+    id: PatchId,
+    corners: Vec<DVec3>,
+    normal: DVec3,
+    bounds: Aabb,
+}
+
+/// One-sided polygons of a body that hang together along sides.
+struct Hull {
+    /// Numbers of its patches in the group.
+    polygons: Vec<usize>,
+    /// Ends of sides that no other polygon has.
+    border: Vec<DVec3>,
+    bounds: Aabb,
+}
+
+impl Group {
+    fn new(scene: &Scene, bodies: &[BodyId]) -> Group {
+        let mut placed = Vec::new();
+        let mut hulls = Vec::new();
+        for &body in bodies {
+            let first = placed.len();
+            placed.extend(scene.patches_of(body).map(|(id, patch)| {
+                let corners: Vec<DVec3> = patch.corners_in_body().collect();
+                let bounds = Aabb::of(corners.iter().copied());
+                Placed { id, corners, normal: patch.frame.normal, bounds }
+            }));
+            hulls_of(scene, (&placed, first), &mut hulls);
+        }
+        let reach = |p: &Placed| p.bounds.lo.abs().max(p.bounds.hi.abs()).max_element();
+        let slack_m = IN_PLANE * placed.iter().map(reach).fold(0.0, f64::max);
+        let lamps: Vec<usize> = (0..placed.len())
+            .filter(|&k| scene.patch_emits(&scene.patches[placed[k].id.0 as usize]))
+            .collect();
+        let overlaps = |a: &Aabb, b: &Aabb| {
+            a.lo.cmplt(b.hi - slack_m).all() && b.lo.cmplt(a.hi - slack_m).all()
+        };
+        hulls.retain(|hull: &Hull| {
+            let own = |k: &usize| hull.polygons.binary_search(k).is_ok();
+            let inside =
+                |k: &usize| overlaps(&placed[*k].bounds.grown(2.0 * slack_m), &hull.bounds);
+            let point = |l: &super::Light| scene.motion.place(l.node, 0.0).translation;
+            let lit = |l: &super::Light| Aabb::of([point(l)]).meets(&hull.bounds);
+            !lamps.iter().any(|k| !own(k) && inside(k)) && !scene.lights.iter().any(lit)
+        });
+        Group { placed, hulls, slack_m }
+    }
+
+    fn cover(&self, (scene, solids): (&Scene, &Solids), out: &mut [Covered], left: &mut usize) {
+        let mut order: Vec<usize> = (0..self.placed.len()).collect();
+        let low = |k: &usize| self.placed[*k].bounds.lo.x;
+        order.sort_by(|p, q| low(p).total_cmp(&low(q)).then(p.cmp(q)));
+        for (at, &one) in order.iter().enumerate() {
+            let end = self.placed[one].bounds.hi.x + self.slack_m;
+            let beside = order[at + 1..].iter().take_while(|q| low(q) <= end);
+            for &other in beside.filter(|&&q| self.may_touch(one, q)) {
+                self.touch((scene, solids), [one, other], out, left);
+            }
+        }
+        for hull in &self.hulls {
+            let own = |k: usize| hull.polygons.binary_search(&k).is_ok();
+            let grown = hull.bounds.grown(self.slack_m);
+            for (k, patch) in self.placed.iter().enumerate() {
+                if patch.bounds.meets(&grown) && !own(k) {
+                    self.stand(scene, hull, patch, (&mut out[patch.id.0 as usize], left));
+                }
+            }
+        }
+    }
+
+    /// Whether two patches lie in one plane, and their boxes meet.
+    fn may_touch(&self, one: usize, other: usize) -> bool {
+        let (p, q) = (&self.placed[one], &self.placed[other]);
+        let plane = Plane::through(p.corners[0], p.normal);
+        p.bounds.grown(self.slack_m).meets(&q.bounds)
+            && p.normal.dot(q.normal).abs() > 0.5
+            && q.corners.iter().all(|&c| plane.distance(c).abs() <= self.slack_m)
+    }
+
+    /// What two patches in one plane cover of each other.
+    fn touch(
+        &self,
+        (scene, solids): (&Scene, &Solids),
+        pair: [usize; 2],
+        out: &mut [Covered],
+        left: &mut usize,
+    ) {
+        let [p, q] = pair.map(|k| &self.placed[k]);
+        let sheet = |p: &Placed| {
+            let patch = &scene.patches[p.id.0 as usize];
+            let enclosure = solids.enclosures[p.id.0 as usize];
+            Sheet { patch: p.id, twin: patch.twin, enclosure, area_m2: patch.area_m2() }
+        };
+        let opposed = p.normal.dot(q.normal) < 0.0;
+        for (of, by) in [(p, q), (q, p)] {
+            let lies = sheet(by).lies_to(&sheet(of), opposed);
+            if lies == InPlane::Apart {
+                continue;
+            }
+            let mut corners: Vec<DVec2> =
+                by.corners.iter().map(|&c| in_frame(scene, of.id, c)).collect();
+            if opposed {
+                corners.reverse();
+            }
+            let covered = &mut out[of.id.0 as usize];
+            let found = add(scene, of.id, vec![corners], (covered, left));
+            if found && lies == InPlane::Touches && opposed {
+                covered.contacts.push(by.id);
+            }
+        }
+    }
+
+    /// What a body covers of a patch that it stands on or sticks in.
+    fn stand(
+        &self,
+        scene: &Scene,
+        hull: &Hull,
+        patch: &Placed,
+        (covered, left): (&mut Covered, &mut usize),
+    ) {
+        let height = |c: DVec3| (c - patch.corners[0]).dot(patch.normal);
+        if hull.border.iter().any(|&c| height(c) > self.slack_m) {
+            return;
+        }
+        let mut outline: Vec<Segment> = Vec::new();
+        for polygon in hull.polygons.iter().map(|&k| &self.placed[k]) {
+            let above = |c: DVec3| height(c) - ABOVE * self.slack_m;
+            let n = polygon.corners.len();
+            let through = (0..n).filter_map(|k| {
+                let [p, q] = [polygon.corners[k], polygon.corners[(k + 1) % n]];
+                let (x, y) = (above(p), above(q));
+                ((x > 0.0) != (y > 0.0)).then(|| p + (q - p) * (x / (x - y)))
+            });
+            let ends: Vec<DVec3> = through.collect();
+            let [p, q] = ends[..] else { continue };
+            // The inside is on the left, seen from the front of the patch.
+            let along = patch.normal.cross(polygon.normal);
+            let [p, q] = if along.dot(q - p) < 0.0 { [q, p] } else { [p, q] };
+            outline.push([p, q].map(|c| in_frame(scene, patch.id, c)));
+        }
+        if !outline.is_empty() && outline.len() <= MANY {
+            *left = left.saturating_sub(outline.len());
+            add(scene, patch.id, within_outlines(&outline, self.slack_m), (covered, left));
+        }
+    }
+}
+
+/// Adds to what is covered of a patch what other polygons in its frame cover; whether they cover any of it.
+fn add(
+    scene: &Scene,
+    patch: PatchId,
+    by: Vec<Vec<DVec2>>,
+    (covered, left): (&mut Covered, &mut usize),
+) -> bool {
+    let whole = &scene.patches[patch.0 as usize].corners;
+    let whole_m2 = Moments::of(whole).area;
+    let wide = |p: &[DVec2]| p.len() > 2 && Moments::of(p).area > SLIVER * whole_m2;
+    let mut fresh: Vec<Vec<DVec2>> = by.iter().map(|p| common(p, whole)).collect();
+    fresh.retain(|p| wide(p));
+    let fresh_m2: f64 = fresh.iter().map(|p| Moments::of(p).area).sum();
+    if fresh.is_empty() || fresh_m2 > WHOLLY * whole_m2 {
+        return !fresh.is_empty();
+    }
+    for (part, bounds) in &covered.parts {
+        let mut rest = Vec::with_capacity(fresh.len());
+        for piece in fresh {
+            if *left > 0 && meet(&around(&piece), bounds) {
+                *left -= 1;
+                difference(&piece, part, &mut rest);
+            } else {
+                rest.push(piece);
+            }
+        }
+        fresh = rest;
+    }
+    fresh.retain(|p| wide(p));
+    if *left == 0 || covered.parts.len() + fresh.len() > MANY {
+        // Without the cuts parts would count twice.
+        covered.parts.clear();
+    } else {
+        covered.parts.extend(fresh.into_iter().map(|p| {
+            let bounds = around(&p);
+            (p, bounds)
+        }));
+    }
+    true
+}
+
+/// Lowest and highest coordinates.
+fn around(polygon: &[DVec2]) -> [DVec2; 2] {
+    polygon
+        .iter()
+        .fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[lo, hi], &p| [lo.min(p), hi.max(p)])
+}
+
+fn meet(a: &[DVec2; 2], b: &[DVec2; 2]) -> bool {
+    a[0].cmplt(b[1]).all() && b[0].cmplt(a[1]).all()
+}
+
+fn in_frame(scene: &Scene, patch: PatchId, p: DVec3) -> DVec2 {
+    let frame = scene.patches[patch.0 as usize].frame;
+    let d = p - frame.origin;
+    DVec2::new(d.dot(frame.u), d.dot(frame.v))
+}
+
+/// Adds the groups of one-sided polygons of a body, from the number `first` on, that hang together along sides, each of which
+/// is run as often one way as the other, or is on the border.
+fn hulls_of(scene: &Scene, (placed, first): (&[Placed], usize), out: &mut Vec<Hull>) {
+    let is_one_sided = |p: &Placed| scene.patches[p.id.0 as usize].twin.is_none();
+    let one_sided: Vec<usize> =
+        (first..placed.len()).filter(|&k| is_one_sided(&placed[k])).collect();
+    let all = || one_sided.iter().map(|&k| &placed[k]);
+    let mut weld = Weld::of_corners(all().flat_map(|p| p.corners.iter().copied()));
+    let polygon = |p: &Placed| {
+        let mut corners: Vec<u32> = p.corners.iter().map(|&c| weld.vertex(c)).collect();
+        corners.dedup();
+        Polygon { patch: p.id, two_sided: false, corners }
+    };
+    let polygons: Vec<Polygon> = all().map(polygon).collect();
+    let sides = matched(&weld.points, weld.tolerance, sides_of(&polygons));
+    let component = components(polygons.len(), &sides);
+    let count = component.iter().max().map_or(0, |&most| most as usize + 1);
+    let mut hulls: Vec<Hull> = (0..count)
+        .map(|_| Hull { polygons: Vec::new(), border: Vec::new(), bounds: Aabb::EMPTY })
+        .collect();
+    for (at, &of) in component.iter().enumerate() {
+        let hull = &mut hulls[of as usize];
+        hull.polygons.push(one_sided[at]);
+        hull.bounds = hull.bounds.union(placed[one_sided[at]].bounds);
+    }
+    for group in &sides {
+        let forth = group.iter().filter(|s| s.start < s.end).count();
+        if 2 * forth != group.len() {
+            let ends = [group[0].start, group[0].end].map(|c| weld.points[c as usize]);
+            hulls[component[group[0].polygon as usize] as usize].border.extend(ends);
+        }
+    }
+    out.extend(hulls.into_iter().filter(|hull| (3..=MANY).contains(&hull.polygons.len())));
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+    use crate::scene::{Interpolation, SceneBuilder, Track};
+
+    /// What is covered of a floor of 4 x 4 m, a patch of its own, by a box of 1 x 2 m that is made by `skip` without some of its
+    /// sides (4 is the bottom), lowered by `sunk_m`.
+    fn covered_m2(skip: &[usize], sunk_m: f64, moves: bool, lamp: bool) -> f64 {
+        let mut b = SceneBuilder::new("floor and box");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let floor = b.node("floor", None, DVec3::ZERO, DQuat::IDENTITY);
+        let corners = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)];
+        b.polygon(floor, "floor", grey, &corners.map(|(x, y)| DVec3::new(x, y, 0.0)));
+        let at = DVec3::new(1.5, 1.5, -sunk_m);
+        let node = b.node("box", None, at, DQuat::from_rotation_z(0.3));
+        let p = |k: usize| DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64 * 2.0, (k >> 2) as f64);
+        let sides =
+            [[0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6], [0, 2, 3, 1], [4, 5, 7, 6]];
+        for (k, side) in sides.iter().enumerate().filter(|(k, _)| !skip.contains(k)) {
+            b.polygon(node, &format!("side {k}"), grey, &side.map(p));
+        }
+        if lamp {
+            let glow = b.material("glow", [0.0; 3], [1.0; 3]);
+            let small = [(0.4, 0.4), (0.6, 0.4), (0.6, 0.6)];
+            b.polygon(node, "lamp", glow, &small.map(|(x, y)| DVec3::new(x, y, 0.5)));
+        }
+        if moves {
+            let values = vec![at, at + DVec3::Z];
+            let interpolation = Interpolation::Linear;
+            b.animate_translation(node, Track { times_s: vec![0.0, 1.0], values, interpolation });
+        }
+        let scene = b.build().unwrap();
+        let covered = scene.covered(&scene.solids(), &|_| false);
+        covered[0].parts.iter().map(|(p, _)| Moments::of(p).area).sum()
+    }
+
+    #[test]
+    fn boxes_cover_what_they_stand_on_with_and_without_a_bottom() {
+        for (skip, sunk_m) in [(&[][..], 0.0), (&[4][..], 0.0), (&[][..], 0.3), (&[4][..], 0.3)] {
+            let found = covered_m2(skip, sunk_m, false, false);
+            assert!((found - 2.0).abs() < 1e-6, "{skip:?} {sunk_m}: {found}");
+        }
+    }
+
+    #[test]
+    fn what_light_may_get_into_or_what_moves_or_floats_covers_nothing() {
+        assert_eq!(covered_m2(&[4, 5], 0.0, false, false), 0.0);
+        assert_eq!(covered_m2(&[4, 0], 0.0, false, false), 0.0);
+        assert_eq!(covered_m2(&[4], 0.0, false, true), 0.0);
+        assert_eq!(covered_m2(&[4], 0.0, true, false), 0.0);
+        assert_eq!(covered_m2(&[4], -0.1, false, false), 0.0);
+        assert_eq!(covered_m2(&[], -0.1, false, false), 0.0);
+    }
+
+    #[test]
+    fn of_a_rug_and_a_floor_the_floor_is_covered_and_crates_on_both_count_once() {
+        let mut b = SceneBuilder::new("rug");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let node = b.node("all", None, DVec3::ZERO, DQuat::IDENTITY);
+        let square =
+            |r: f64| [(-r, -r), (r, -r), (r, r), (-r, r)].map(|(x, y)| DVec3::new(x, y, 0.0));
+        b.polygon(node, "floor", grey, &square(4.0));
+        b.polygon(node, "rug", grey, &square(2.0));
+        let crate_ = b.node("crate", None, DVec3::ZERO, DQuat::IDENTITY);
+        b.cuboid(crate_, "crate", grey, DVec3::new(1.0, 1.0, 0.0), DVec3::new(3.0, 3.0, 1.0));
+        let scene = b.build().unwrap();
+        let covered = scene.covered(&scene.solids(), &|_| false);
+        let area =
+            |k: usize| covered[k].parts.iter().map(|(p, _)| Moments::of(p).area).sum::<f64>();
+        assert!(
+            (area(0) - 19.0).abs() < 1e-6 && (area(1) - 1.0).abs() < 1e-6,
+            "{} {}",
+            area(0),
+            area(1)
+        );
+        assert!(!covered[0].contacts.is_empty());
+    }
+}

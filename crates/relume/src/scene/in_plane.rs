@@ -1,0 +1,72 @@
+//! Which of two surfaces that lie in one plane hides the other. Pure bookkeeping; must not know elements.
+
+use super::{Enclosure, PatchId};
+use crate::geometry::no_smaller;
+
+/// How a polygon in the plane of an end lies to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InPlane {
+    /// It faces the end, or its other side does, and touches it.
+    Touches,
+    /// It faces the same way and shows in the end's place.
+    Covers,
+    /// It hides nothing of the end.
+    Apart,
+}
+
+/// What decides how a patch lies to others in its plane.
+#[derive(Clone, Copy, Debug)]
+pub struct Sheet {
+    /// The patch.
+    pub patch: PatchId,
+    /// The same polygon seen from behind, if it is two-sided.
+    pub twin: Option<PatchId>,
+    /// What its surface encloses.
+    pub enclosure: Enclosure,
+    /// Its area, m2.
+    pub area_m2: f64,
+}
+
+impl Sheet {
+    /// How this patch lies to another one in its plane; `opposed` if it faces the other way.
+    ///
+    /// A closed body touches what it stands on: where its face lies in the plane of another surface and looks at it, each
+    /// hides the other from everything else. Of two surfaces in one plane that face the same way, the smaller shows and
+    /// hides the larger (a rug on a floor); of equal ones the first. Two rooms that share a wall's plane are back to back:
+    /// neither wall hides the other.
+    pub fn lies_to(&self, end: &Sheet, opposed: bool) -> InPlane {
+        if self.twin == Some(end.patch) {
+            return InPlane::Apart;
+        }
+        let shows = || if self.shows_before(end) { InPlane::Covers } else { InPlane::Apart };
+        match [self, end].map(|sheet| sheet.twin.is_some()) {
+            [false, false] if !opposed => shows(),
+            [false, false]
+                if self.enclosure == Enclosure::Space && end.enclosure == Enclosure::Space =>
+            {
+                InPlane::Apart
+            }
+            [false, false] => InPlane::Touches,
+            // A body is on the side of a two-sided surface that its face looks at.
+            [false, true] if self.enclosure == Enclosure::Body => {
+                if opposed {
+                    InPlane::Touches
+                } else {
+                    InPlane::Apart
+                }
+            }
+            [false, true] if opposed => InPlane::Apart,
+            [true, false] if end.enclosure == Enclosure::Body => InPlane::Touches,
+            _ => shows(),
+        }
+    }
+
+    /// Whether of two coincident patches that face the same way, or whose other sides do, this one shows.
+    fn shows_before(&self, other: &Sheet) -> bool {
+        let first = |s: &Sheet| s.twin.map_or(s.patch, |twin| twin.min(s.patch));
+        match (no_smaller(self.area_m2, other.area_m2), no_smaller(other.area_m2, self.area_m2)) {
+            (true, true) => first(self) < first(other),
+            (is_larger, _) => !is_larger,
+        }
+    }
+}

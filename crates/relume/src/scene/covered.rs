@@ -105,7 +105,8 @@ impl Group {
         };
         hulls.retain(|hull: &Hull| {
             let own = |k: &usize| hull.polygons.binary_search(k).is_ok();
-            let inside = |k: &usize| overlaps(&placed[*k].bounds.grown(2.0 * slack_m), &hull.bounds);
+            let inside =
+                |k: &usize| overlaps(&placed[*k].bounds.grown(2.0 * slack_m), &hull.bounds);
             let point = |l: &super::Light| scene.motion.place(l.node, 0.0).translation;
             let lit = |l: &super::Light| Aabb::of([point(l)]).meets(&hull.bounds);
             !lamps.iter().any(|k| !own(k) && inside(k)) && !scene.lights.iter().any(lit)
@@ -274,7 +275,8 @@ fn in_frame(scene: &Scene, patch: PatchId, p: DVec3) -> DVec2 {
 /// is run as often one way as the other, or is on the border.
 fn hulls_of(scene: &Scene, (placed, first): (&[Placed], usize), out: &mut Vec<Hull>) {
     let is_one_sided = |p: &Placed| scene.patches[p.id.0 as usize].twin.is_none();
-    let one_sided: Vec<usize> = (first..placed.len()).filter(|&k| is_one_sided(&placed[k])).collect();
+    let one_sided: Vec<usize> =
+        (first..placed.len()).filter(|&k| is_one_sided(&placed[k])).collect();
     let all = || one_sided.iter().map(|&k| &placed[k]);
     let mut weld = Weld::of_corners(all().flat_map(|p| p.corners.iter().copied()));
     let polygon = |p: &Placed| {
@@ -322,7 +324,8 @@ mod tests {
         let at = DVec3::new(1.5, 1.5, -sunk_m);
         let node = b.node("box", None, at, DQuat::from_rotation_z(0.3));
         let p = |k: usize| DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64 * 2.0, (k >> 2) as f64);
-        let sides = [[0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let sides =
+            [[0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6], [0, 2, 3, 1], [4, 5, 7, 6]];
         for (k, side) in sides.iter().enumerate().filter(|(k, _)| !skip.contains(k)) {
             b.polygon(node, &format!("side {k}"), grey, &side.map(p));
         }
@@ -364,15 +367,22 @@ mod tests {
         let mut b = SceneBuilder::new("rug");
         let grey = b.material("grey", [0.5; 3], [0.0; 3]);
         let node = b.node("all", None, DVec3::ZERO, DQuat::IDENTITY);
-        let square = |r: f64| [(-r, -r), (r, -r), (r, r), (-r, r)].map(|(x, y)| DVec3::new(x, y, 0.0));
+        let square =
+            |r: f64| [(-r, -r), (r, -r), (r, r), (-r, r)].map(|(x, y)| DVec3::new(x, y, 0.0));
         b.polygon(node, "floor", grey, &square(4.0));
         b.polygon(node, "rug", grey, &square(2.0));
         let crate_ = b.node("crate", None, DVec3::ZERO, DQuat::IDENTITY);
         b.cuboid(crate_, "crate", grey, DVec3::new(1.0, 1.0, 0.0), DVec3::new(3.0, 3.0, 1.0));
         let scene = b.build().unwrap();
         let covered = scene.covered(&scene.solids());
-        let area = |k: usize| covered[k].parts.iter().map(|(p, _)| Moments::of(p).area).sum::<f64>();
-        assert!((area(0) - 19.0).abs() < 1e-6 && (area(1) - 1.0).abs() < 1e-6, "{} {}", area(0), area(1));
+        let area =
+            |k: usize| covered[k].parts.iter().map(|(p, _)| Moments::of(p).area).sum::<f64>();
+        assert!(
+            (area(0) - 19.0).abs() < 1e-6 && (area(1) - 1.0).abs() < 1e-6,
+            "{} {}",
+            area(0),
+            area(1)
+        );
         assert!(!covered[0].contacts.is_empty());
     }
 }

@@ -47,14 +47,15 @@ mod view3d;
 mod weld;
 
 pub use builder::SceneBuilder;
-pub use covered::Covered;
 pub use check::check;
+pub use covered::Covered;
+pub use discontinuity::Lines;
 pub use drift::Drift;
 pub use edit::Edits;
 pub use error::SceneError;
 pub use glow::Glow;
-pub use in_plane::{InPlane, Sheet};
 pub use import::{ImportOptions, import};
+pub use in_plane::{InPlane, Sheet};
 pub use join::{Joined, Part};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
 pub use print::{Print, Printed};

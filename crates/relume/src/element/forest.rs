@@ -548,7 +548,10 @@ impl Forest {
     #[inline]
     pub fn rest_in_contact(&self, a: ElementId, b: ElementId) -> bool {
         let (Some(of_a), Some(of_b)) = (self.patch(a), self.patch(b)) else { return false };
-        self.fixed.covered[of_a.0 as usize].contacts.contains(&of_b)
+        let rests = |on: PatchId, other: PatchId| {
+            self.fixed.covered[on.0 as usize].contacts.binary_search(&other).is_ok()
+        };
+        rests(of_a, of_b) || rests(of_b, of_a)
     }
 
     /// Covered parts of the patch of an element.

@@ -1,5 +1,6 @@
 //! The forest itself: a pool of nodes, the fixed part (down to facets) first.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -8,8 +9,8 @@ use glam::{DVec2, DVec3};
 use super::clusters::{Branch, binary_tree};
 use super::exposed::{exposed_extent, exposed_m2};
 use super::split::{Chart, Extent, Place, Shape};
-use crate::geometry::{Aabb, Segment, cut_along, polygon_area, split_convex};
-use crate::scene::{BodyId, Covered, Enclosure, PatchId, Scene, Solid, Solids};
+use crate::geometry::{Aabb, cut_along, polygon_area, split_convex};
+use crate::scene::{BodyId, Covered, Enclosure, Lines, PatchId, Scene, Solid, Solids};
 
 /// Index of a node in a [`Forest`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -39,15 +40,13 @@ pub struct ElementKey {
     pub path: u32,
 }
 
-/// What differs between siblings: 24 bytes.
+/// What differs between siblings: 20 bytes.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     /// Where an element lies within its facet.
     place: Place,
     fan: Fan,
     area_m2: f32,
-    /// Of that, what light can reach.
-    exposed_m2: f32,
 }
 
 /// What two siblings have in common; a node of the fixed part has one of its own. 20 bytes.
@@ -104,7 +103,7 @@ const NONE: u32 = u32::MAX;
 const SLACK: usize = 32;
 
 /// Elements of which a smaller share is exposed count as covered wholly.
-const EXPOSED_LEAST: f32 = 1.0 / 32.0;
+const EXPOSED_LEAST: f64 = 1.0 / 32.0;
 
 /// Levels that a path has room for.
 const LEVELS_MAX: u32 = 15;
@@ -119,6 +118,8 @@ pub struct Forest {
     nodes: Vec<Node>,
     /// One for each node of the fixed part, then one for every two.
     twins: Vec<Twins>,
+    /// Area of what light can reach of the elements that are partly or wholly covered, m2.
+    exposed: BTreeMap<u32, f32>,
     fixed_len: u32,
     /// Elements with ids below this are never reaped.
     kept_len: u32,
@@ -199,6 +200,7 @@ impl Forest {
         let mut forest = Forest {
             nodes: Vec::new(),
             twins: Vec::new(),
+            exposed: BTreeMap::new(),
             // All that is planted here.
             fixed_len: u32::MAX,
             kept_len: u32::MAX,
@@ -311,7 +313,7 @@ impl Forest {
             let patch = range.start + leaf;
             forest.fixed_mut().patch_roots[patch as usize] = ElementId(id);
             let corners = &scene.patches[patch as usize].corners;
-            forest.plant_polygon((patch, &cuts.of(patch)), corners, id);
+            forest.plant_polygon((patch, &cuts.of(patch), 0), corners, id);
         });
     }
 
@@ -334,17 +336,24 @@ impl Forest {
         }
     }
 
-    /// A polygon as a facet, or as a group of facets where lines cut it or it has too many corners.
-    fn plant_polygon(&mut self, (patch, cuts): (u32, &PatchCuts<'_>), corners: &[DVec2], at: u32) {
-        let parts =
-            cuts.apply(corners).or_else(|| (corners.len() > 4).then(|| split_convex(corners)));
+    /// A polygon as a facet, or as a group of facets where lines cut it or it has too many corners; `cut` is how often it was cut
+    /// before.
+    fn plant_polygon(
+        &mut self,
+        (patch, cuts, cut): (u32, &PatchCuts<'_>, u32),
+        corners: &[DVec2],
+        at: u32,
+    ) {
+        let along_lines = cuts.apply(corners, cut);
+        let cut = cut + u32::from(along_lines.is_some());
+        let parts = along_lines.or_else(|| (corners.len() > 4).then(|| split_convex(corners)));
         let Some((one, two)) = parts else {
             return self.plant_facet(patch, corners, at);
         };
         self.set(at, Kind::Polygon, patch);
         let child = self.add_children(at, 2);
-        self.plant_polygon((patch, cuts), &one, child);
-        self.plant_polygon((patch, cuts), &two, child + 1);
+        self.plant_polygon((patch, cuts, cut), &one, child);
+        self.plant_polygon((patch, cuts, cut), &two, child + 1);
     }
 
     fn plant_facet(&mut self, patch: u32, corners: &[DVec2], at: u32) {
@@ -387,8 +396,11 @@ impl Forest {
                 sums[parent.0 as usize][1] += exposed;
             }
         }
-        for (node, [area, exposed]) in self.nodes.iter_mut().zip(sums) {
-            (node.area_m2, node.exposed_m2) = (area as f32, exposed as f32);
+        for (id, [area, exposed]) in (0..).zip(sums) {
+            self.nodes[id as usize].area_m2 = area as f32;
+            if exposed < area {
+                self.exposed.insert(id, exposed as f32);
+            }
         }
     }
 
@@ -515,14 +527,20 @@ impl Forest {
     /// it. Exact up to single precision.
     #[inline]
     pub fn exposed_m2(&self, id: ElementId) -> f64 {
-        f64::from(self.nodes[id.0 as usize].exposed_m2)
+        let is_covered = |patch: PatchId| !self.fixed.covered[patch.0 as usize].parts.is_empty();
+        match self.patch(id) {
+            Some(patch) if is_covered(patch) => {
+                self.exposed.get(&id.0).map_or_else(|| self.area_m2(id), |&m2| f64::from(m2))
+            }
+            _ => self.area_m2(id),
+        }
     }
 
     /// What arrives is spread over this area, m2: what is exposed, or all of an element of which next to nothing is.
     #[inline]
     pub fn receiving_m2(&self, id: ElementId) -> f64 {
-        let Node { area_m2, exposed_m2, .. } = self.nodes[id.0 as usize];
-        f64::from(if exposed_m2 > EXPOSED_LEAST * area_m2 { exposed_m2 } else { area_m2 })
+        let (area, exposed) = (self.area_m2(id), self.exposed_m2(id));
+        if exposed > EXPOSED_LEAST * area { exposed } else { area }
     }
 
     /// Whether two elements are on patches that rest against each other in one plane: what they exchange leaves neither, and
@@ -530,7 +548,10 @@ impl Forest {
     #[inline]
     pub fn rest_in_contact(&self, a: ElementId, b: ElementId) -> bool {
         let (Some(of_a), Some(of_b)) = (self.patch(a), self.patch(b)) else { return false };
-        self.fixed.covered[of_a.0 as usize].contacts.contains(&of_b)
+        let rests = |on: PatchId, other: PatchId| {
+            self.fixed.covered[on.0 as usize].contacts.binary_search(&other).is_ok()
+        };
+        rests(of_a, of_b) || rests(of_b, of_a)
     }
 
     /// Covered parts of the patch of an element.
@@ -542,8 +563,8 @@ impl Forest {
     /// Where what is exposed of an element lies in its patch's frame; the radius is that of the whole.
     pub fn exposed_extent(&self, id: ElementId) -> Extent {
         let extent = self.extent(id);
-        let Node { area_m2, exposed_m2, .. } = self.nodes[id.0 as usize];
-        let is_part = exposed_m2 > EXPOSED_LEAST * area_m2 && exposed_m2 < area_m2;
+        let (area, exposed) = (self.area_m2(id), self.exposed_m2(id));
+        let is_part = exposed > EXPOSED_LEAST * area && exposed < area;
         if is_part { exposed_extent(&self.shape(id), extent, self.covered(id)) } else { extent }
     }
 
@@ -744,14 +765,14 @@ impl Forest {
         let first = self.room_for(count);
         for (k, place) in places[..count].iter().enumerate() {
             let shape = chart.shape(place);
-            let (area_m2, of_parent) = (shape.area() as f32, self.nodes[id.0 as usize]);
-            let exposed_m2 = if of_parent.exposed_m2 < of_parent.area_m2 {
-                exposed_m2(&shape, self.covered(id)) as f32
-            } else {
-                area_m2
-            };
-            let node = Node { place: *place, fan: Fan::LEAF, area_m2, exposed_m2 };
-            self.nodes[first as usize + k] = node;
+            let area_m2 = shape.area() as f32;
+            self.nodes[first as usize + k] = Node { place: *place, fan: Fan::LEAF, area_m2 };
+            if self.exposed.contains_key(&id.0) {
+                let exposed_m2 = exposed_m2(&shape, self.covered(id)) as f32;
+                if exposed_m2 < area_m2 {
+                    self.exposed.insert(first + k as u32, exposed_m2);
+                }
+            }
         }
         for k in (0..count as u32).step_by(2) {
             let twins = self.twins_of(first + k);
@@ -822,6 +843,7 @@ impl Forest {
             );
             count += self.remove_children(ElementId(child));
             self.nodes[child as usize] = Node::VACANT;
+            self.exposed.remove(&child);
         }
         for first in children.clone().step_by(2) {
             let twins = self.twins_of(first);
@@ -871,6 +893,8 @@ impl Forest {
         self.vacant = [Vec::new(), Vec::new()];
         let mut new_of = vec![NONE; old.len()];
         old_of.iter().enumerate().for_each(|(new, &old)| new_of[old as usize] = new as u32);
+        let exposed = std::mem::take(&mut self.exposed);
+        self.exposed = exposed.into_iter().map(|(id, m2)| (new_of[id as usize], m2)).collect();
         Renumbering { new_of, old_of }
     }
 
@@ -884,14 +908,14 @@ impl Forest {
 
 /// The lines that patches are cut along before anything else, so that no element lies on both sides of a wall's foot.
 struct Cuts {
-    lines: Vec<Vec<Segment>>,
+    lines: Vec<Lines>,
     /// Smaller polygons are left whole, m2.
     least_m2: f64,
 }
 
 /// Those of one patch.
 struct PatchCuts<'a> {
-    lines: &'a [Segment],
+    lines: &'a Lines,
     least_m2: f64,
     slack_m: f64,
 }
@@ -902,32 +926,43 @@ const CUT_SHARE: f64 = 0.25;
 /// Polygons of a smaller share of the scene's area are not cut: light jumps from one to the next anyway.
 const CUT_LEAST: f64 = 1.0 / 64.0;
 
+/// Smaller ones too where another patch crosses them, so that one part is before a wall and one behind it: along lines that
+/// cover this share of the chord, into parts of at least this share of the area, and at most so often.
+const CROSSED_SHARE: f64 = 0.9;
+const CROSSED_PART: f64 = 1.0 / 64.0;
+const CROSSED_TIMES: u32 = 2;
+
 impl Cuts {
     fn new(scene: &Scene) -> Cuts {
         Cuts { lines: scene.discontinuities(), least_m2: CUT_LEAST * scene.area_m2() }
     }
 
     fn of(&self, patch: u32) -> PatchCuts<'_> {
-        let lines = &self.lines[patch as usize][..];
-        let ends = lines.iter().flatten();
+        let lines = &self.lines[patch as usize];
+        let ends = lines.all.iter().flatten();
         let reach = ends.fold(0.0_f64, |reach, p| reach.max(p.abs().max_element()));
         PatchCuts { lines, least_m2: self.least_m2, slack_m: 1e-6 * reach }
     }
 }
 
 impl PatchCuts<'_> {
-    /// Both parts of a polygon that is to be cut.
-    fn apply(&self, corners: &[DVec2]) -> Option<(Vec<DVec2>, Vec<DVec2>)> {
-        if self.lines.is_empty() || polygon_area(corners) < self.least_m2 {
+    /// Both parts of a polygon that is to be cut, after so many cuts before.
+    fn apply(&self, corners: &[DVec2], cut: u32) -> Option<(Vec<DVec2>, Vec<DVec2>)> {
+        let area = polygon_area(corners);
+        if area >= self.least_m2 {
+            return cut_along(corners, &self.lines.all, CUT_SHARE, self.slack_m);
+        }
+        if cut >= CROSSED_TIMES {
             return None;
         }
-        cut_along(corners, self.lines, CUT_SHARE, self.slack_m)
+        let is_part = |part: &[DVec2]| polygon_area(part) >= CROSSED_PART * area;
+        cut_along(corners, &self.lines.crossing, CROSSED_SHARE, self.slack_m)
+            .filter(|(one, two)| is_part(one) && is_part(two))
     }
 }
 
 impl Node {
-    const VACANT: Node =
-        Node { place: Place::WHOLE, fan: Fan::OTHER, area_m2: 0.0, exposed_m2: 0.0 };
+    const VACANT: Node = Node { place: Place::WHOLE, fan: Fan::OTHER, area_m2: 0.0 };
 }
 
 impl Twins {

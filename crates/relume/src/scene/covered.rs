@@ -33,15 +33,15 @@ const MANY: usize = 4_096;
 pub struct Covered {
     /// Disjoint convex polygons in the patch's frame, counter-clockwise, with boxes around them (low, high); metres.
     pub parts: Vec<(Vec<DVec2>, [DVec2; 2])>,
-    /// Patches that touch it: what they exchange leaves neither.
+    /// Patches that touch it, and inner sides of what stands on it: what they exchange leaves neither. Ascending.
     pub contacts: Vec<PatchId>,
 }
 
 impl Scene {
     /// What of each patch is covered by what rests on it; empty where nothing is. That is where it touches another patch or
-    /// another shows in its place ([`Sheet::lies_to`]), and where a body of one-sided polygons that look outwards stands on it
-    /// or sticks in it: one that is closed but for a border in the patch's plane or behind it, so that boxes without a bottom
-    /// count, and without lamps in it. Bodies that never move cover each other, a body that moves only itself.
+    /// another shows in its place ([`Sheet::lies_to`]), and where a body of polygons that look outwards, or are two-sided, stands on
+    /// it or sticks in it: one that is closed but for a border in the patch's plane or behind it, so that boxes without a bottom
+    /// count, all wound alike, and without lamps in it. Bodies that never move cover each other, a body that moves only itself.
     /// Exact to a millionth of the largest coordinate. Of patches that are covered by more than 0.999 by one thing nothing is said.
     /// Those that `is_displaced` names are not where the file has them: they cover themselves alone, as if they moved.
     pub fn covered(&self, solids: &Solids, is_displaced: &dyn Fn(BodyId) -> bool) -> Vec<Covered> {
@@ -56,6 +56,10 @@ impl Scene {
         };
         cover(&at_rest);
         moving.into_iter().for_each(|body| cover(&[body]));
+        for covered in &mut out {
+            covered.contacts.sort_unstable();
+            covered.contacts.dedup();
+        }
         out
     }
 }
@@ -75,10 +79,74 @@ struct Placed {
     bounds: Aabb,
 }
 
-/// One-sided polygons of a body that hang together along sides.
+/// Where what emits can get in the whole animation, in the world.
+struct Lamps {
+    patches: Vec<(PatchId, Aabb)>,
+    lights: Vec<Aabb>,
+}
+
+impl Lamps {
+    fn of(scene: &Scene) -> Lamps {
+        let emits = |id: &u32| scene.patch_emits(&scene.patches[*id as usize]);
+        let patch = |id: u32| {
+            let patch = &scene.patches[id as usize];
+            (PatchId(id), way(scene, patch.body, &Aabb::of(patch.corners_in_body())))
+        };
+        let [from, to] = scene.motion.span_s();
+        let light = |l: &super::Light| {
+            let at = scene.motion.place(l.node, from).translation;
+            Aabb::of([at]).sum(&scene.motion.drift(l.node, 0.0, [from, to]).reach())
+        };
+        Lamps {
+            patches: (0..scene.patches.len() as u32).filter(emits).map(patch).collect(),
+            lights: scene.lights.iter().map(light).collect(),
+        }
+    }
+
+    /// Whether a lamp is, or may get, among the polygons of a body; touching is not enough. An inner side that emits counts.
+    fn may_shine_in(
+        &self,
+        scene: &Scene,
+        (placed, hull): (&[Placed], &Hull),
+        slack_m: f64,
+    ) -> bool {
+        let own = |id: PatchId, of: &[usize]| of.iter().any(|&k| placed[k].id == id);
+        let body = scene.patches[placed[hull.polygons[0]].id.0 as usize].body;
+        let bounds = way(scene, body, &hull.bounds);
+        let within = |lamp: &Aabb| {
+            let lamp = lamp.grown(2.0 * slack_m);
+            let least = bounds.lo.max(lamp.lo).cmplt(bounds.hi.min(lamp.hi) - 3.0 * slack_m);
+            least.all()
+        };
+        self.lights.iter().any(within)
+            || self.patches.iter().any(|(id, lamp)| {
+                within(lamp) && (!own(*id, &hull.polygons) || own(*id, &hull.twins))
+                    || !hull.twins.is_empty() && own(*id, &hull.polygons)
+            })
+    }
+}
+
+/// Where something of a body can get in the whole animation, in the world.
+fn way(scene: &Scene, body: BodyId, bounds: &Aabb) -> Aabb {
+    if !scene.moves(body) {
+        return *bounds;
+    }
+    let [from, to] = scene.motion.span_s();
+    let pose = scene.motion.place(scene.bodies[body.0 as usize].node, from);
+    let corner = |k: u32| {
+        let pick = |axis: u32, lo: f64, hi: f64| if k >> axis & 1 == 0 { lo } else { hi };
+        let (lo, hi) = (bounds.lo, bounds.hi);
+        pose.point(DVec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z)))
+    };
+    Aabb::of((0..8).map(corner)).sum(&scene.drift(body, [from, to]).reach())
+}
+
+/// Polygons of a body that hang together along sides.
 struct Hull {
-    /// Numbers of its patches in the group.
+    /// Numbers of its patches in the group; of two sides the first.
     polygons: Vec<usize>,
+    /// The other sides.
+    twins: Vec<usize>,
     /// Ends of sides that no other polygon has.
     border: Vec<DVec3>,
     bounds: Aabb,
@@ -99,20 +167,8 @@ impl Group {
         }
         let reach = |p: &Placed| p.bounds.lo.abs().max(p.bounds.hi.abs()).max_element();
         let slack_m = IN_PLANE * placed.iter().map(reach).fold(0.0, f64::max);
-        let lamps: Vec<usize> = (0..placed.len())
-            .filter(|&k| scene.patch_emits(&scene.patches[placed[k].id.0 as usize]))
-            .collect();
-        let overlaps = |a: &Aabb, b: &Aabb| {
-            a.lo.cmplt(b.hi - slack_m).all() && b.lo.cmplt(a.hi - slack_m).all()
-        };
-        hulls.retain(|hull: &Hull| {
-            let own = |k: &usize| hull.polygons.binary_search(k).is_ok();
-            let inside =
-                |k: &usize| overlaps(&placed[*k].bounds.grown(2.0 * slack_m), &hull.bounds);
-            let point = |l: &super::Light| scene.motion.place(l.node, 0.0).translation;
-            let lit = |l: &super::Light| Aabb::of([point(l)]).meets(&hull.bounds);
-            !lamps.iter().any(|k| !own(k) && inside(k)) && !scene.lights.iter().any(lit)
-        });
+        let lamps = Lamps::of(scene);
+        hulls.retain(|hull: &Hull| !lamps.may_shine_in(scene, (&placed, hull), slack_m));
         Group { placed, hulls, slack_m }
     }
 
@@ -128,10 +184,9 @@ impl Group {
             }
         }
         for hull in &self.hulls {
-            let own = |k: usize| hull.polygons.binary_search(&k).is_ok();
             let grown = hull.bounds.grown(self.slack_m);
             for (k, patch) in self.placed.iter().enumerate() {
-                if patch.bounds.meets(&grown) && !own(k) {
+                if patch.bounds.meets(&grown) && !hull.holds(k) {
                     self.stand(scene, hull, patch, (&mut out[patch.id.0 as usize], left));
                 }
             }
@@ -208,10 +263,27 @@ impl Group {
             let [p, q] = if along.dot(q - p) < 0.0 { [q, p] } else { [p, q] };
             outline.push([p, q].map(|c| in_frame(scene, patch.id, c)));
         }
-        if !outline.is_empty() && outline.len() <= MANY {
-            *left = left.saturating_sub(outline.len());
-            add(scene, patch.id, within_outlines(&outline, self.slack_m), (covered, left));
+        if outline.is_empty() || outline.len() > MANY {
+            return;
         }
+        *left = left.saturating_sub(outline.len());
+        let around: f64 = outline.iter().map(|[p, q]| p.perp_dot(*q)).sum();
+        // Two-sided polygons may all be wound either way.
+        let turned = around < 0.0 && hull.twins.len() == hull.polygons.len();
+        if turned {
+            outline.iter_mut().for_each(|line| line.reverse());
+        }
+        let inner = if turned { &hull.polygons } else { &hull.twins };
+        if add(scene, patch.id, within_outlines(&outline, self.slack_m), (&mut *covered, left)) {
+            covered.contacts.extend(inner.iter().map(|&k| self.placed[k].id));
+        }
+    }
+}
+
+impl Hull {
+    /// Whether a patch of the group is one of its own.
+    fn holds(&self, k: usize) -> bool {
+        self.polygons.binary_search(&k).is_ok() || self.twins.binary_search(&k).is_ok()
     }
 }
 
@@ -273,13 +345,14 @@ fn in_frame(scene: &Scene, patch: PatchId, p: DVec3) -> DVec2 {
     DVec2::new(d.dot(frame.u), d.dot(frame.v))
 }
 
-/// Adds the groups of one-sided polygons of a body, from the number `first` on, that hang together along sides, each of which
+/// Adds the groups of polygons of a body, from the number `first` on, that hang together along sides, each of which
 /// is run as often one way as the other, or is on the border.
 fn hulls_of(scene: &Scene, (placed, first): (&[Placed], usize), out: &mut Vec<Hull>) {
-    let is_one_sided = |p: &Placed| scene.patches[p.id.0 as usize].twin.is_none();
-    let one_sided: Vec<usize> =
-        (first..placed.len()).filter(|&k| is_one_sided(&placed[k])).collect();
-    let all = || one_sided.iter().map(|&k| &placed[k]);
+    let twin = |p: &Placed| scene.patches[p.id.0 as usize].twin;
+    let firsts: Vec<usize> = (first..placed.len())
+        .filter(|&k| twin(&placed[k]).is_none_or(|twin| twin > placed[k].id))
+        .collect();
+    let all = || firsts.iter().map(|&k| &placed[k]);
     let mut weld = Weld::of_corners(all().flat_map(|p| p.corners.iter().copied()));
     let polygon = |p: &Placed| {
         let mut corners: Vec<u32> = p.corners.iter().map(|&c| weld.vertex(c)).collect();
@@ -291,12 +364,23 @@ fn hulls_of(scene: &Scene, (placed, first): (&[Placed], usize), out: &mut Vec<Hu
     let component = components(polygons.len(), &sides);
     let count = component.iter().max().map_or(0, |&most| most as usize + 1);
     let mut hulls: Vec<Hull> = (0..count)
-        .map(|_| Hull { polygons: Vec::new(), border: Vec::new(), bounds: Aabb::EMPTY })
+        .map(|_| Hull {
+            polygons: Vec::new(),
+            twins: Vec::new(),
+            border: Vec::new(),
+            bounds: Aabb::EMPTY,
+        })
         .collect();
+    let number_of = |patch: PatchId| {
+        let start = placed[first].id.0;
+        first + (patch.0 - start) as usize
+    };
     for (at, &of) in component.iter().enumerate() {
         let hull = &mut hulls[of as usize];
-        hull.polygons.push(one_sided[at]);
-        hull.bounds = hull.bounds.union(placed[one_sided[at]].bounds);
+        let own = &placed[firsts[at]];
+        hull.polygons.push(firsts[at]);
+        hull.twins.extend(twin(own).map(number_of));
+        hull.bounds = hull.bounds.union(own.bounds);
     }
     for group in &sides {
         let forth = group.iter().filter(|s| s.start < s.end).count();
@@ -305,6 +389,7 @@ fn hulls_of(scene: &Scene, (placed, first): (&[Placed], usize), out: &mut Vec<Hu
             hulls[component[group[0].polygon as usize] as usize].border.extend(ends);
         }
     }
+    hulls.iter_mut().for_each(|hull| hull.twins.sort_unstable());
     out.extend(hulls.into_iter().filter(|hull| (3..=MANY).contains(&hull.polygons.len())));
 }
 
@@ -318,6 +403,16 @@ mod tests {
     /// What is covered of a floor of 4 x 4 m, a patch of its own, by a box of 1 x 2 m that is made by `skip` without some of its
     /// sides (4 is the bottom), lowered by `sunk_m`.
     fn covered_m2(skip: &[usize], sunk_m: f64, moves: bool, lamp: bool) -> f64 {
+        covered(skip, sunk_m, (moves, lamp), None).0
+    }
+
+    /// The same of a box of two-sided polygons, wound inwards or not, and in how many contacts the floor is.
+    fn covered(
+        skip: &[usize],
+        sunk_m: f64,
+        (moves, lamp): (bool, bool),
+        two_sided: Option<bool>,
+    ) -> (f64, usize) {
         let mut b = SceneBuilder::new("floor and box");
         let grey = b.material("grey", [0.5; 3], [0.0; 3]);
         let floor = b.node("floor", None, DVec3::ZERO, DQuat::IDENTITY);
@@ -328,8 +423,14 @@ mod tests {
         let p = |k: usize| DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64 * 2.0, (k >> 2) as f64);
         let sides =
             [[0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let thin = b.double_sided_material("thin", [0.5; 3], [0.0; 3]);
         for (k, side) in sides.iter().enumerate().filter(|(k, _)| !skip.contains(k)) {
-            b.polygon(node, &format!("side {k}"), grey, &side.map(p));
+            let mut corners = side.map(p);
+            if two_sided == Some(true) {
+                corners.reverse();
+            }
+            let of = if two_sided.is_some() { thin } else { grey };
+            b.polygon(node, &format!("side {k}"), of, &corners);
         }
         if lamp {
             let glow = b.material("glow", [0.0; 3], [1.0; 3]);
@@ -343,7 +444,17 @@ mod tests {
         }
         let scene = b.build().unwrap();
         let covered = scene.covered(&scene.solids(), &|_| false);
-        covered[0].parts.iter().map(|(p, _)| Moments::of(p).area).sum()
+        let area_m2 = covered[0].parts.iter().map(|(p, _)| Moments::of(p).area).sum();
+        (area_m2, covered[0].contacts.len())
+    }
+
+    #[test]
+    fn two_sided_boxes_without_a_bottom_cover_too_and_see_nothing_of_the_floor() {
+        for inwards in [false, true] {
+            let (area_m2, contacts) = covered(&[4], 0.0, (false, false), Some(inwards));
+            assert!((area_m2 - 2.0).abs() < 1e-6 && contacts == 5, "{area_m2} {contacts}");
+        }
+        assert_eq!(covered(&[4, 5], 0.0, (false, false), Some(false)), (0.0, 0));
     }
 
     #[test]

@@ -11,12 +11,21 @@ use crate::geometry::{Aabb, Plane, Segment, segment_within};
 /// What lies this close to a plane, as a share of the largest coordinate, lies in it: a few roundings of 32-bit numbers.
 const IN_PLANE: f64 = 1e-6;
 
+/// Lines within a patch along which others meet it, in its frame, metres.
+#[derive(Clone, Debug, Default)]
+pub struct Lines {
+    /// Where others stand on its plane or cross it.
+    pub all: Vec<Segment>,
+    /// Of these, where others have parts on both sides of it.
+    pub crossing: Vec<Segment>,
+}
+
 impl Scene {
     /// For each patch, where others meet its plane within it. Bodies that never move meet each other, a body that moves
     /// only itself: lines of contact that move are not found. Outer edges of the patch are left out. In the patch's frame,
     /// metres; exact to a millionth of the largest coordinate. Cost: pairs of patches whose boxes meet along x.
-    pub fn discontinuities(&self) -> Vec<Vec<Segment>> {
-        let mut out = vec![Vec::new(); self.patches.len()];
+    pub fn discontinuities(&self) -> Vec<Lines> {
+        let mut out = vec![Lines::default(); self.patches.len()];
         let bodies = (0..self.bodies.len() as u32).map(BodyId);
         let (moving, at_rest): (Vec<BodyId>, Vec<BodyId>) =
             bodies.filter(|&body| !self.is_distant(body)).partition(|&body| self.moves(body));
@@ -26,7 +35,7 @@ impl Scene {
     }
 
     /// Adds where patches of some bodies that share a frame meet.
-    fn meet(&self, bodies: &[BodyId], out: &mut [Vec<Segment>]) {
+    fn meet(&self, bodies: &[BodyId], out: &mut [Lines]) {
         let mut placed: Vec<Placed> = bodies
             .iter()
             .flat_map(|&body| self.patches_of(body))
@@ -44,15 +53,15 @@ impl Scene {
                     // The back of a polygon lies where its front does.
                     let is_back = twin.is_some_and(|twin| twin < by.id);
                     if twin != Some(of.id) && !is_back {
-                        out[of.id.0 as usize].extend(self.met(of, by, slack_m));
+                        self.met((of, by), slack_m, &mut out[of.id.0 as usize]);
                     }
                 }
             }
         }
     }
 
-    /// Where the polygon `by` meets the plane of `of` within that patch.
-    fn met(&self, of: &Placed, by: &Placed, slack_m: f64) -> Vec<Segment> {
+    /// Adds where the polygon `by` meets the plane of `of` within that patch.
+    fn met(&self, (of, by): (&Placed, &Placed), slack_m: f64, out: &mut Lines) {
         let patch = &self.patches[of.id.0 as usize];
         let frame = patch.frame;
         let plane = Plane::through(frame.origin, frame.normal);
@@ -76,7 +85,12 @@ impl Scene {
             let points: Vec<DVec2> = on.chain(through).map(in_frame).collect();
             farthest(&points).into_iter().collect()
         };
-        lines.iter().filter_map(|&line| segment_within(&patch.corners, line, slack_m)).collect()
+        let within = lines.iter().filter_map(|&line| segment_within(&patch.corners, line, slack_m));
+        let first = out.all.len();
+        out.all.extend(within);
+        if above.iter().any(|&d| d > slack_m) && above.iter().any(|&d| d < -slack_m) {
+            out.crossing.extend_from_slice(&out.all[first..]);
+        }
     }
 }
 
@@ -106,10 +120,11 @@ impl Placed {
 mod tests {
     use glam::{DQuat, DVec2, DVec3};
 
+    use super::Lines;
     use crate::scene::{Interpolation, SceneBuilder, Track};
 
     /// A floor of 4 x 4 m with a wall across it, on a body of its own; where the wall is, and whether it moves.
-    fn lines(at: DVec3, moves: bool) -> Vec<Vec<[DVec2; 2]>> {
+    fn lines(at: DVec3, moves: bool) -> Vec<Lines> {
         let mut b = SceneBuilder::new("floor and wall");
         let grey = b.material("grey", [0.5; 3], [0.0; 3]);
         let floor = b.node("floor", None, DVec3::ZERO, DQuat::IDENTITY);
@@ -131,16 +146,18 @@ mod tests {
         for depth in [0.0, 0.5] {
             let found = lines(DVec3::Z * -depth, false);
             let length = |s: &[DVec2; 2]| s[0].distance(s[1]);
-            assert_eq!(found[0].len(), 1, "{depth}: {found:?}");
-            assert!((length(&found[0][0]) - 2.0).abs() < 1e-12);
+            assert_eq!(found[0].all.len(), 1, "{depth}: {found:?}");
+            assert!((length(&found[0].all[0]) - 2.0).abs() < 1e-12);
             // Along the wall's own lower edge nothing is cut; where the floor crosses the wall, it is.
-            assert_eq!(found[1].len(), usize::from(depth > 0.0));
+            let crosses = usize::from(depth > 0.0);
+            assert_eq!(found[1].all.len(), crosses);
+            assert_eq!([0, 1].map(|k| found[k].crossing.len()), [crosses; 2]);
         }
     }
 
     #[test]
     fn what_moves_or_stays_above_meets_nothing() {
-        let none = |found: Vec<Vec<_>>| found.iter().all(Vec::is_empty);
+        let none = |found: Vec<Lines>| found.iter().all(|lines| lines.all.is_empty());
         assert!(none(lines(DVec3::Z * 0.01, false)));
         assert!(none(lines(DVec3::ZERO, true)));
     }

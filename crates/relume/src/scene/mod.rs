@@ -51,6 +51,7 @@ mod world;
 pub use builder::SceneBuilder;
 pub use check::check;
 pub use covered::Covered;
+pub use discontinuity::Lines;
 pub use drift::Drift;
 pub use edit::Edits;
 pub use error::SceneError;

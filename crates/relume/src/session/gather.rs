@@ -54,7 +54,7 @@ impl Session {
     #[doc(hidden)]
     pub fn irradiances_at(&self, sensors: &[Sensor]) -> Vec<[f64; 3]> {
         let solved = self.solved.as_ref().expect("a step comes before a query");
-        let one = |sensor: &Sensor| Look::new((self, solved), sensor, true).gather();
+        let one = |sensor: &Sensor| Look::new((self, solved), sensor, true).irradiance();
         sensors.par_chunks(SENSORS_AT_ONCE).flat_map_iter(|some| some.iter().map(one)).collect()
     }
 }
@@ -73,6 +73,16 @@ const FAR: f64 = 1.0 / 32.0;
 /// Form factor to a part of a leaf below which it is taken to send what the leaf's line says.
 const LITTLE: f64 = 0.01;
 
+/// Share of what a point sees above which leaves that are large against their distance are not taken at their word: it
+/// is in a gap, and what leaves them is followed on.
+const IN_A_GAP: f64 = 0.5;
+
+/// Share of the light below which nobody follows on what leaves a leaf, and how often at most.
+const FOLLOWED: (f64, usize) = (1e-3, 24);
+
+/// Share of what arrives in a gap that may come from parts that are taken at their leaf's word.
+const BY_LINES: f64 = 0.02;
+
 /// Halvings of a leaf that falls into too many pieces; then its middle decides.
 const SPLITS: u32 = 6;
 
@@ -86,15 +96,43 @@ struct Look<'a> {
     /// Where the sensor's front begins.
     tangent: Plane,
     slack_m: f64,
-    /// Whether what leaves surfaces close by is gathered anew where they are looked at.
-    looks_again: bool,
+    /// Whether it is the sensor itself: all that leaves surfaces close by is gathered anew where they are looked at.
+    is_first: bool,
+}
+
+/// What a point gathers.
+#[derive(Default)]
+struct Gathered {
+    /// From what is far enough for its size, W/m2.
+    sum: [f64; 3],
+    /// Parts of leaves that are large against their distance; of the sensor itself.
+    parts: Vec<Part>,
+    /// Such leaves as wholes; of other points.
+    near: Vec<Near>,
+}
+
+/// A part of a leaf, as large as it is far.
+#[derive(Clone, Copy)]
+struct Part {
+    leaf: ElementId,
+    /// The middle of what is seen of it.
+    at: DVec3,
+    factor: f64,
+}
+
+/// A leaf that is large against its distance.
+struct Near {
+    leaf: ElementId,
+    factor: f64,
+    /// What its line says that it sends, W/m2.
+    sent: [f64; 3],
 }
 
 impl<'a> Look<'a> {
     fn new(
         (session, solved): (&'a Session, &'a Solved),
         sensor: &Sensor,
-        looks_again: bool,
+        is_first: bool,
     ) -> Look<'a> {
         let slack_m = SENSOR_ROUNDING * solved.view.fixed_box(Forest::ROOT).diagonal();
         Look {
@@ -105,23 +143,55 @@ impl<'a> Look<'a> {
             normal: sensor.normal,
             tangent: Plane::through(sensor.at, sensor.normal),
             slack_m,
-            looks_again,
+            is_first,
         }
     }
 
-    fn gather(&self) -> [f64; 3] {
+    /// What arrives at the sensor, W/m2.
+    fn irradiance(&self) -> [f64; 3] {
+        let Gathered { mut sum, parts, .. } = self.gather();
+        let add = |sum: &mut [f64; 3], part: &Part, b: [f64; 3]| {
+            (0..3).for_each(|c| sum[c] += part.factor * b[c]);
+        };
+        let is_in_a_gap = parts.iter().map(|p| p.factor).sum::<f64>() > IN_A_GAP;
+        let (large, little): (Vec<_>, Vec<_>) =
+            parts.iter().enumerate().partition(|(_, part)| part.factor > LITTLE);
+        for (k, part) in large {
+            add(&mut sum, part, self.sent_by(part, k));
+        }
+        let all = |e: [f64; 3]| e.iter().sum::<f64>();
+        let mut little: Vec<(f64, [f64; 3], (usize, &Part))> = little
+            .into_iter()
+            .map(|(k, part)| {
+                let e = WorldElement::new(&self.solved.view, self.forest, part.leaf, false);
+                let line = self.radiosity_at(&e, part.leaf, part.at).map(f64::from);
+                (part.factor * all(line), line, (k, part))
+            })
+            .collect();
+        // In the dark of a gap what lines say of little parts is more than all that arrives.
+        little.sort_by(|one, other| other.0.total_cmp(&one.0));
+        let mut left: f64 = little.iter().map(|part| part.0).sum();
+        for (brings, line, (k, part)) in little {
+            let is_much = is_in_a_gap && left > BY_LINES * (all(sum) + left);
+            add(&mut sum, part, if is_much { self.sent_by(part, k) } else { line });
+            left -= brings;
+        }
+        sum
+    }
+
+    fn gather(&self) -> Gathered {
         let session = self.session;
-        let mut sum = [0.0; 3];
+        let mut out = Gathered::default();
         for patch in 0..session.scene.patches.len() as u32 {
-            self.add_patch(PatchId(patch), &mut sum);
+            self.add_patch(PatchId(patch), &mut out);
         }
         for id in self.forest.children(Forest::ROOT).map(ElementId) {
             if self.forest.kind(id) == Kind::Light {
                 let e = self.light_arriving(id);
-                (0..3).for_each(|c| sum[c] += e[c]);
+                (0..3).for_each(|c| out.sum[c] += e[c]);
             }
         }
-        sum
+        out
     }
 
     fn light_arriving(&self, id: ElementId) -> [f64; 3] {
@@ -139,7 +209,7 @@ impl<'a> Look<'a> {
         intensity.map(|i| if clear { i * e } else { 0.0 })
     }
 
-    fn add_patch(&self, patch: PatchId, sum: &mut [f64; 3]) {
+    fn add_patch(&self, patch: PatchId, out: &mut Gathered) {
         let (view, root) = (&self.solved.view, self.forest.patch_root(patch));
         if !view.is_present(view.patch(patch).body) {
             return;
@@ -155,7 +225,7 @@ impl<'a> Look<'a> {
         let mut stack = vec![root];
         while let Some(id) = stack.pop() {
             match self.forest.kind(id) {
-                Kind::Element => self.add_element(id, &all, sum),
+                Kind::Element => self.add_element(id, &all, out),
                 _ => stack.extend(self.forest.children(id).rev().map(ElementId)),
             }
         }
@@ -201,54 +271,72 @@ impl<'a> Look<'a> {
     }
 
     /// Adds what an element sends past the occluders that may be in its way.
-    fn add_element(&self, id: ElementId, occluders: &[&Occluder], sum: &mut [f64; 3]) {
+    fn add_element(&self, id: ElementId, occluders: &[&Occluder], out: &mut Gathered) {
         let e = WorldElement::new(&self.solved.view, self.forest, id, false);
-        let whole = &e.corners[..e.len];
-        let mut cut = Vec::new();
-        let seen = if whole.iter().all(|&c| self.tangent.distance(c) >= 0.0) {
-            whole
-        } else {
-            cut.extend_from_slice(whole);
-            keep_in_front(&mut cut, &self.tangent);
-            &cut
-        };
+        let seen = self.in_front(&e);
         if seen.len() < 3 {
             return;
         }
-        let mut in_the_way = Vec::new();
+        let Some(in_the_way) = self.in_the_way(&seen, occluders) else { return };
+        let children = self.forest.children(id);
+        let distance = (e.centre - self.point).length();
+        let as_one = in_the_way.is_empty() && e.radius < FAR * distance;
+        if !children.is_empty() && !as_one {
+            children.for_each(|child| self.add_element(ElementId(child), &in_the_way, out));
+            return;
+        }
+        let is_near = e.radius > e.bounds.distance(&Aabb::of([self.point]));
+        if self.is_first && is_near {
+            return self.add_parts(id, &seen, (&in_the_way, SPLITS), &mut out.parts);
+        }
+        let (factor, b) = if in_the_way.is_empty() && !is_near {
+            (
+                form_factor_from_point(self.point, self.normal, &seen),
+                self.solved.radiosity.radiosity(id.0),
+            )
+        } else {
+            // The part in view may be much brighter or darker than the rest.
+            let (factor, moment) = self.factor_past(&seen, &in_the_way, SPLITS);
+            (factor, self.radiosity_at(&e, id, moment / factor.max(f64::MIN_POSITIVE)))
+        };
+        if factor <= 0.0 {
+            return;
+        }
+        let sent = b.map(|b| factor * f64::from(b));
+        if is_near {
+            out.near.push(Near { leaf: id, factor, sent });
+        } else {
+            (0..3).for_each(|c| out.sum[c] += sent[c]);
+        }
+    }
+
+    /// The part of an element before the point.
+    fn in_front(&self, e: &WorldElement) -> Vec<DVec3> {
+        let mut seen = e.corners[..e.len].to_vec();
+        if !seen.iter().all(|&c| self.tangent.distance(c) >= 0.0) {
+            keep_in_front(&mut seen, &self.tangent);
+        }
+        seen
+    }
+
+    /// Which occluders hide some of a polygon; `None` if one hides all of it.
+    fn in_the_way<'o>(
+        &self,
+        seen: &[DVec3],
+        occluders: &[&'o Occluder],
+    ) -> Option<Vec<&'o Occluder>> {
+        let mut out = Vec::new();
         if !occluders.is_empty() {
             let pyramid = pyramid(self.point, seen);
             for &occluder in occluders {
                 match occluder.hides(seen, &pyramid) {
                     Hides::Nothing => {}
-                    Hides::Some => in_the_way.push(occluder),
-                    Hides::All => return,
+                    Hides::Some => out.push(occluder),
+                    Hides::All => return None,
                 }
             }
         }
-        let children = self.forest.children(id);
-        let distance = (e.centre - self.point).length();
-        let as_one = in_the_way.is_empty() && e.radius < FAR * distance;
-        if !children.is_empty() && !as_one {
-            children.for_each(|child| self.add_element(ElementId(child), &in_the_way, sum));
-            return;
-        }
-        if self.looks_again && e.radius > e.bounds.distance(&Aabb::of([self.point])) {
-            return self.add_near(&e, id, seen, (&in_the_way, SPLITS), sum);
-        }
-        let (factor, b) = if in_the_way.is_empty() {
-            (
-                form_factor_from_point(self.point, self.normal, seen),
-                self.solved.radiosity.radiosity(id.0),
-            )
-        } else {
-            // The part in view may be much brighter or darker than the rest.
-            let (factor, moment) = self.factor_past(seen, &in_the_way, SPLITS);
-            (factor, self.radiosity_at(&e, id, moment / factor.max(f64::MIN_POSITIVE)))
-        };
-        if factor > 0.0 {
-            (0..3).for_each(|c| sum[c] += factor * f64::from(b[c]));
-        }
+        Some(out)
     }
 
     /// Radiosity of an element at a point of it, from its line, never negative.
@@ -262,16 +350,13 @@ impl<'a> Look<'a> {
         b.at(at.x as f32, at.y as f32).map(|b| b.max(0.0))
     }
 
-    /// Adds what a part of a leaf sends that is large against its distance: the leaf knows its radiosity as a line
-    /// only, and beside it may be the shadow of what the sensor is close to. What leaves it is gathered where it is
-    /// looked at, in parts as large as they are far.
-    fn add_near(
+    /// Adds the parts, as large as they are far, of a part of a leaf that is seen.
+    fn add_parts(
         &self,
-        e: &WorldElement,
-        id: ElementId,
+        leaf: ElementId,
         part: &[DVec3],
         (occluders, splits): (&[&Occluder], u32),
-        sum: &mut [f64; 3],
+        out: &mut Vec<Part>,
     ) {
         let middle = part.iter().sum::<DVec3>() / part.len() as f64;
         let radius = part.iter().map(|c| c.distance(middle)).fold(0.0, f64::max);
@@ -281,28 +366,71 @@ impl<'a> Look<'a> {
                 let pyramid = pyramid(self.point, &part);
                 let hides = |o: &&&Occluder| o.hides(&part, &pyramid) != Hides::Nothing;
                 let rest: Vec<&Occluder> = occluders.iter().filter(hides).copied().collect();
-                self.add_near(e, id, &part, (&rest, splits - 1), sum);
+                self.add_parts(leaf, &part, (&rest, splits - 1), out);
             }
             return;
         }
         let (factor, moment) = self.factor_past(part, occluders, SPLITS);
-        if factor <= 0.0 {
-            return;
+        if factor > 0.0 {
+            out.push(Part { leaf, at: moment / factor, factor });
         }
-        let at = moment / factor;
-        let b = if factor > LITTLE {
-            let patch = self.forest.patch(id).expect("an element has a patch");
-            let scene = &self.session.scene;
+    }
+
+    /// What leaves a part of a leaf that is large against its distance, W/m2: the leaf knows its radiosity as a line only, and
+    /// beside it may be the shadow of what the sensor is close to. What arrives there is gathered there.
+    ///
+    /// In a gap most of what is seen there is as close again, and so on: one part of it is followed, chosen by its form
+    /// factor and the number `k` of the first part, so that many of them together show all ways that light takes.
+    fn sent_by(&self, part: &Part, k: usize) -> [f64; 3] {
+        let scene = &self.session.scene;
+        let (mut b, mut share, mut part) = ([0.0; 3], [1.0; 3], *part);
+        for step in 0.. {
+            let patch = self.forest.patch(part.leaf).expect("an element has a patch");
+            let sensor =
+                Sensor { at: part.at, normal: self.solved.view.occluder(patch).plane.normal };
             let patch = &scene.patches[patch.0 as usize];
-            let sensor = Sensor { at, normal: e.plane.normal };
-            let h = Look::new((self.session, self.solved), &sensor, false).gather();
             let now = &self.solved.world;
             let (m, rho) = (now.exitance(scene, patch), now.reflectance(scene, patch));
-            [0, 1, 2].map(|c| m[c] + rho[c] * h[c])
-        } else {
-            self.radiosity_at(e, id, at).map(f64::from)
-        };
-        (0..3).for_each(|c| sum[c] += factor * b[c]);
+            let look = Look::new((self.session, self.solved), &sensor, false);
+            let Gathered { sum, near, .. } = look.gather();
+            for c in 0..3 {
+                b[c] += share[c] * m[c];
+                share[c] *= rho[c];
+                b[c] += share[c] * sum[c];
+            }
+            let seen: f64 = near.iter().map(|n| n.factor).sum();
+            let left = seen * share.iter().fold(0.0, |most: f64, s| most.max(*s));
+            if seen > IN_A_GAP && left <= FOLLOWED.0 {
+                return b;
+            }
+            let next = (seen > IN_A_GAP && step < FOLLOWED.1)
+                .then(|| look.choose(&near, [spread(k, 2 * step), spread(k, 2 * step + 1)]));
+            match next.flatten() {
+                Some(next) => (share, part) = (share.map(|s| s * seen), next),
+                None => {
+                    for n in &near {
+                        (0..3).for_each(|c| b[c] += share[c] * n.sent[c]);
+                    }
+                    return b;
+                }
+            }
+        }
+        b
+    }
+
+    /// One part of some leaves close by, each as likely as its form factor is large if both numbers, from 0 to 1, are equally
+    /// distributed; `None` if nothing is seen of them.
+    fn choose(&self, near: &[Near], [which, where_]: [f64; 2]) -> Option<Part> {
+        let leaf = near[at_share(near.iter().map(|n| n.factor), which)?].leaf;
+        let patch = self.forest.patch(leaf).expect("an element has a patch");
+        let occluders = self.between(patch, self.solved.view.patch(patch).rounding_m);
+        let e = WorldElement::new(&self.solved.view, self.forest, leaf, false);
+        let seen = self.in_front(&e);
+        let all: Vec<&Occluder> = occluders.iter().collect();
+        let in_the_way = self.in_the_way(&seen, &all)?;
+        let mut parts = Vec::new();
+        self.add_parts(leaf, &seen, (&in_the_way, SPLITS), &mut parts);
+        Some(parts[at_share(parts.iter().map(|p| p.factor), where_)?])
     }
 
     /// The form factor to what is seen of a polygon past occluders, and that times the middle of it.
@@ -330,6 +458,27 @@ impl<'a> Look<'a> {
         };
         (0..n).map(part).fold((0.0, DVec3::ZERO), |sum, part| (sum.0 + part.0, sum.1 + part.1))
     }
+}
+
+/// The first of some numbers up to which all sum to a share of the whole.
+fn at_share(values: impl Iterator<Item = f64> + Clone, share: f64) -> Option<usize> {
+    let mut left = share * values.clone().sum::<f64>();
+    let last = values.clone().count().checked_sub(1)?;
+    let found = values.into_iter().position(|value| {
+        left -= value;
+        left < 0.0
+    });
+    Some(found.unwrap_or(last))
+}
+
+/// Number `k` of a sequence that fills (0, 1) evenly, another for each dimension: multiples of the roots of primes, less whole
+/// numbers (Richtmyer 1951).
+fn spread(k: usize, dimension: usize) -> f64 {
+    const PRIMES: [f64; 26] = [
+        2., 3., 5., 7., 11., 13., 17., 19., 23., 29., 31., 37., 41., 43., 47., 53., 59., 61., 67.,
+        71., 73., 79., 83., 89., 97., 101.,
+    ];
+    (0.5 + k as f64 * PRIMES[dimension % PRIMES.len()].sqrt()).fract()
 }
 
 /// The part of a polygon towards its corner `k`: a quadrilateral with a corner in the middle.

@@ -28,6 +28,7 @@ mod glow;
 mod import;
 mod inside;
 mod join;
+mod lamp;
 pub mod limits;
 mod merge;
 mod mesh_file;

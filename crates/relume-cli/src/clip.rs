@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use glam::DVec3;
 use indicatif::HumanBytes;
 use relume::scene::Scene;
 use relume::session::{Options, Oracle, Session, SessionError, Snapshot};
@@ -18,7 +19,7 @@ use crate::failure::Failure;
 use crate::frames;
 use crate::memory;
 use crate::output::{self, count, counted};
-use crate::outside::{self, Unlit};
+use crate::outside;
 use crate::scene_file;
 
 /// Default tolerance, relative error of irradiance, of what makes numbers.
@@ -133,13 +134,35 @@ impl Clip {
         !self.flags.outside.is_empty() || !self.flags.animation.edits.emit.is_empty()
     }
 
-    /// The same clip in the light of a default sky, which is said: a black picture shows nothing.
-    pub(crate) fn lit(self, why: &Unlit) -> Result<Clip, Failure> {
-        let (scene, said) = outside::lit_by_default((*self.scene).clone(), self.tolerance, why)?;
+    /// The same clip in the light of a default sky too.
+    pub(crate) fn under_sky(&self) -> Result<Clip, Failure> {
+        let scene = Arc::new(outside::lit_by_default(&self.scene, self.tolerance)?);
+        Ok(self.with_scene(scene))
+    }
+
+    /// The same clip with a lamp at a place in the world (metres), which is said: what is half the scene's extent away gets
+    /// 1 W/m2 at most.
+    pub(crate) fn with_lamp(&self, at: DVec3) -> Clip {
+        let extent =
+            self.scene.bounds(self.time_of(self.frames[0])).map_or(1.0, |(a, b)| a.distance(b));
+        let intensity = extent * extent / 4.0;
+        self.say(&format!(
+            "note: no light from outside gets to what the view shows of `{}`: a lamp is put where the view is from; choose \
+             with --emit MATERIAL=RADIANCE, or --sky none for what the file has alone",
+            self.scene.name
+        ));
+        self.with_scene(Arc::new(self.scene.with_point_light(at, [intensity; 3])))
+    }
+
+    fn with_scene(&self, scene: Arc<Scene>) -> Clip {
+        Clip { scene, frames: self.frames.clone(), flags: self.flags.clone(), ..*self }
+    }
+
+    /// Says a line on stderr, unless the user wants quiet.
+    pub(crate) fn say(&self, line: &str) {
         if !self.flags.quiet {
-            output::complain(&said);
+            output::complain(line);
         }
-        Ok(Clip { scene: Arc::new(scene), ..self })
     }
 
     /// The same clip with nothing that emits, for form factors.

@@ -1,12 +1,13 @@
 //! Scenes in which nothing shines, or little of what is looked at: nothing is solved for a black picture.
 
+use glam::DVec3;
 use relume::scene::Scene;
 use relume_picture::picture::Sketch;
 
 use crate::clip::Clip;
 use crate::failure::Failure;
 use crate::output;
-use crate::outside::Unlit;
+use crate::outside::{self, Unlit};
 use crate::viewing::{ViewFlags, Viewing};
 
 /// Most materials that are named.
@@ -14,30 +15,52 @@ const NAMED: usize = 5;
 
 /// Share of what is seen of surfaces that has to be lit at some time, so that a picture shows what it is of: eyes that glow
 /// and headlights light less, lamps in rooms and streets more.
-const LIT_MIN: f64 = 0.25;
+const LIT_MIN: f64 = 0.5;
 
 /// Instants of a clip at which that is looked at.
 const INSTANTS: usize = 3;
 
 /// A clip of which pictures are to be made: with light, that of a default sky too where nothing was said of light and
-/// what emits lights little of what is seen.
+/// what emits lights little of what is seen, and where that does not get in a lamp where the view is from.
 pub(crate) fn for_pictures(clip: Clip, view: &ViewFlags) -> Result<Clip, Failure> {
-    let clip = match unlit(&clip, view)? {
-        Some(why) => clip.lit(&why)?,
-        None => clip,
-    };
-    required(&clip.scene)?;
-    Ok(clip)
+    if clip.light_is_chosen() {
+        return required(&clip.scene).map(|()| clip);
+    }
+    let Some(why) = unlit(&clip, view)? else { return Ok(clip) };
+    let under_sky = clip.under_sky()?;
+    // A sky lights no closed room.
+    match share_lit(&under_sky, view)? {
+        Some(lit) if lit < LIT_MIN => Ok(clip.with_lamp(eye(&under_sky, view)?)),
+        _ => {
+            clip.say(&outside::said_of_default(&clip.scene.name, &why));
+            Ok(under_sky)
+        }
+    }
+}
+
+/// Where a clip is looked at from in its first frame, metres.
+fn eye(clip: &Clip, flags: &ViewFlags) -> Result<DVec3, Failure> {
+    let views = Viewing::new(&clip.scene, flags)?;
+    let first = clip.frames.first().copied().unwrap_or_default();
+    Ok(views.at(&clip.scene, first, clip.fps())?.world_from_camera.translation)
 }
 
 /// Whether a clip needs the light of a default sky, and why.
 fn unlit(clip: &Clip, flags: &ViewFlags) -> Result<Option<Unlit>, Failure> {
-    if clip.light_is_chosen() {
-        return Ok(None);
-    }
     if !clip.scene.emits() {
         return Ok(Some(Unlit::Dark));
     }
+    let lit = share_lit(clip, flags)?;
+    if let (Some(lit), true) = (lit, clip.is_verbose()) {
+        let percent = 100.0 * lit;
+        clip.say(&format!("note: what emits light reaches {percent:.0} % of what the view shows"));
+    }
+    // Where a view sees no surface it is no matter of light.
+    Ok(lit.filter(|&lit| lit < LIT_MIN).map(Unlit::Dim))
+}
+
+/// The largest share of what is seen of surfaces that is lit at some of a clip's instants; `None` where none is seen.
+fn share_lit(clip: &Clip, flags: &ViewFlags) -> Result<Option<f64>, Failure> {
     let views = Viewing::new(&clip.scene, flags)?;
     let mut most = None;
     for frame in instants(&clip.frames) {
@@ -45,14 +68,7 @@ fn unlit(clip: &Clip, flags: &ViewFlags) -> Result<Option<Unlit>, Failure> {
         let lit = Sketch::new(&clip.scene, clip.time_of(frame)).lit(&view);
         most = [most, lit].into_iter().flatten().reduce(f64::max);
     }
-    if let (Some(lit), true) = (most, clip.is_verbose()) {
-        let percent = 100.0 * lit;
-        output::complain(&format!(
-            "note: what emits light reaches {percent:.0} % of what the view shows"
-        ));
-    }
-    // Where a view sees no surface it is no matter of light.
-    Ok(most.filter(|&lit| lit < LIT_MIN).map(Unlit::Dim))
+    Ok(most)
 }
 
 /// Some of the frames, the first among them.

@@ -161,17 +161,19 @@ pub(crate) enum Unlit {
     Dim(f64),
 }
 
-/// A scene in the light that pictures have by default, with what is said of it.
-pub(crate) fn lit_by_default(
-    scene: Scene,
-    fineness: f64,
-    why: &Unlit,
-) -> Result<(Scene, String), Failure> {
+/// A scene in the light that pictures have by default.
+pub(crate) fn lit_by_default(scene: &Scene, fineness: f64) -> Result<Scene, Failure> {
     let (radiance, ground) = DEFAULT_SKY;
     let sky = Some(Sky::Uniform([radiance; 3]));
     let outside = Outside { sky, ground, fineness, ..Outside::default() };
-    let (name, light) = (&scene.name, format!("--sky uniform={radiance} --ground {ground}"));
-    let said = match why {
+    scene.clone().with_outside(outside).map_err(scene_file::failure)
+}
+
+/// What is said of that light.
+pub(crate) fn said_of_default(name: &str, why: &Unlit) -> String {
+    let (radiance, ground) = DEFAULT_SKY;
+    let light = format!("--sky uniform={radiance} --ground {ground}");
+    match why {
         Unlit::Dark => format!(
             "note: nothing emits light in `{name}`: lit by {light}; choose with --sky, --sun or --environment"
         ),
@@ -180,8 +182,7 @@ pub(crate) fn lit_by_default(
              out",
             100.0 * share
         ),
-    };
-    Ok((scene.with_outside(outside).map_err(scene_file::failure)?, said))
+    }
 }
 
 /// Numbers between commas.

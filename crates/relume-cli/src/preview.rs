@@ -18,7 +18,7 @@ use crate::output::{self, counted};
 use crate::viewing::Viewing;
 
 /// The first frame has this long before a rough picture is drawn beside it.
-const PATIENCE: Duration = Duration::from_secs(5);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(5);
 
 /// A rough picture that is drawn where the first frame takes long, and goes when that is finished.
 pub(crate) struct Meanwhile {
@@ -39,7 +39,7 @@ impl Meanwhile {
     pub(crate) fn new(
         (scene, time_s): (Arc<Scene>, f64),
         (view, settings): (View, Settings),
-        path: PathBuf,
+        (path, patience): (PathBuf, Duration),
         say: impl Fn(&str) + Send + 'static,
     ) -> Meanwhile {
         let (wanted, over) = mpsc::channel::<()>();
@@ -48,7 +48,7 @@ impl Meanwhile {
         // No work of the engine: its results do not depend on it.
         #[allow(clippy::disallowed_methods)]
         std::thread::spawn(move || {
-            if over.recv_timeout(PATIENCE) != Err(RecvTimeoutError::Timeout) {
+            if over.recv_timeout(patience) != Err(RecvTimeoutError::Timeout) {
                 return;
             }
             let image = Sketch::new(&scene, time_s).draw(&view, &settings);
@@ -120,4 +120,44 @@ pub(crate) fn draw(
     }
     let count = counted(clip.frames.len(), "rough picture");
     output::print(&format!("{count} in {}, nothing was solved\n", dir.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use relume_picture::picture::is_whole_png;
+
+    use super::*;
+    use crate::args::DemoScene;
+    use crate::demo;
+
+    fn start(path: &Path, patience: Duration) -> (Meanwhile, mpsc::Receiver<String>) {
+        let scene = Arc::new((demo::demo(DemoScene::Room).build)().unwrap());
+        let view = View::automatic(&scene);
+        let settings = Settings { width: 32, height: 24, ..Settings::default() };
+        let (tell, told) = mpsc::channel();
+        let say = move |line: &str| tell.send(line.to_owned()).unwrap();
+        (Meanwhile::new((scene, 0.0), (view, settings), (path.to_owned(), patience), say), told)
+    }
+
+    #[test]
+    fn a_rough_picture_is_there_until_there_is_a_better_one() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = path(dir.path());
+        let (mut meanwhile, told) = start(&path, Duration::ZERO);
+        assert!(told.recv().unwrap().contains("preview.png"));
+        let bytes = fs::read(&path).unwrap();
+        assert!(is_whole_png(&bytes));
+        meanwhile.end(&path);
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn what_is_soon_finished_needs_none() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = path(dir.path());
+        let (mut meanwhile, told) = start(&path, Duration::from_secs(3600));
+        meanwhile.end(&path);
+        assert!(told.recv().is_err());
+        assert!(!path.exists());
+    }
 }

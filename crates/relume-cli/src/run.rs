@@ -28,7 +28,7 @@ use crate::light;
 use crate::lock::Lock;
 use crate::memory;
 use crate::output::{self, count, counted};
-use crate::preview::{self, Meanwhile};
+use crate::preview::{self, Meanwhile, PATIENCE};
 use crate::progress::Progress;
 use crate::report::{PictureOptions, Report, RunOptions, SceneSummary};
 use crate::resume;
@@ -333,10 +333,10 @@ impl Job {
             (None, _) => {}
         }
         if let Some(energy) = &run.energy {
-            line += &balance(energy, &run.suspects);
-            if gets_no_light(run.session.scene(), energy) {
-                line += NO_LIGHT_GETS_IN;
-            }
+            line += &match gets_no_light(run.session.scene(), energy) {
+                true => NO_LIGHT_GETS_IN.to_owned(),
+                false => balance(energy, &run.suspects),
+            };
         }
         output::print(&(line + "\n"))
     }
@@ -447,7 +447,8 @@ impl Run<'_> {
             }
         };
         let path = preview::path(dir);
-        let picture = Meanwhile::new(of, (view, preview::settings(flags)), path.clone(), say);
+        let picture =
+            Meanwhile::new(of, (view, preview::settings(flags)), (path.clone(), PATIENCE), say);
         Ok(Some((picture, path)))
     }
 

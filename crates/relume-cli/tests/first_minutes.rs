@@ -8,6 +8,7 @@ use common::{json, relume, text};
 use glam::{DQuat, DVec3};
 use relume::scene::SceneBuilder;
 use relume_picture::export::write_glb;
+use relume_picture::picture::is_whole_png;
 
 /// A dark room with a crate in it, of which nothing emits, in a file.
 fn dark_room(dir: &Path) -> PathBuf {
@@ -72,6 +73,71 @@ fn a_material_that_is_told_to_shine_lights_the_scene() {
     relume(&["info", text(&scene), "--emit", "wood=2"])
         .says(&["wood", "emits (6.283, 6.283, 6.283)"]);
     relume(&["verify", "--demo", "room", "--hide", "lamp"]).fails(2, &["relume demo"]);
+}
+
+/// A statue with eyes that glow, in a file.
+fn statue(dir: &Path) -> PathBuf {
+    let mut b = SceneBuilder::new("statue");
+    let stone = b.material("stone", [0.6; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.5; 3], [1.0; 3]);
+    let node = b.node("statue", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.cuboid(node, "body", stone, DVec3::ZERO, DVec3::new(1.0, 2.0, 1.0));
+    b.cuboid(node, "eyes", glow, DVec3::new(0.4, 1.7, 1.01), DVec3::new(0.6, 1.75, 1.02));
+    let path = dir.join("statue.glb");
+    write_glb(&b.build().unwrap(), &path).unwrap();
+    path
+}
+
+const SMALL: [&str; 4] = ["--size", "64x48", "--tolerance", "0.3"];
+
+#[test]
+fn a_sky_is_added_where_what_emits_lights_little_of_what_is_seen() {
+    let dir = tempfile::tempdir().unwrap();
+    let (scene, out) = (statue(dir.path()), dir.path().join("out"));
+    let emitted = |more: &[&str]| {
+        let ran = relume(&[&["render", text(&scene), "-o", text(&out)], &SMALL[..], more].concat());
+        let ran = ran.succeeds();
+        let watts = json(&out.join("report.json"))["frames"][0]["energy"]["emitted_w"].clone();
+        (ran.err, watts.as_f64().unwrap())
+    };
+    let (said, with_sky) = emitted(&[]);
+    assert!(said.contains("% of what the view shows: --sky uniform=1"), "{said}");
+    assert!(said.contains("--sky none leaves it out"), "{said}");
+    let (said, without) = emitted(&["--sky", "none"]);
+    assert!(!said.contains("--sky"), "{said}");
+    assert!(with_sky > 10.0 * without, "{with_sky} {without}");
+    // Chosen light is left as it is, and so is a room that its lamp lights.
+    let (said, _) = emitted(&["--emit", "glow=2"]);
+    assert!(!said.contains("--sky"), "{said}");
+    let demo = ["demo", "room", "-o", text(&out), "--frames", "0"];
+    let ran = relume(&[&demo[..], &SMALL].concat()).succeeds();
+    assert!(!ran.err.contains("--sky"), "{}", ran.err);
+}
+
+#[test]
+fn a_closed_room_without_a_lamp_gets_one_for_its_picture() {
+    let dir = tempfile::tempdir().unwrap();
+    let (scene, out) = (dark_room(dir.path()), dir.path().join("out"));
+    let render = ["render", text(&scene), "-o", text(&out)];
+    let ran = relume(&[&render[..], &SMALL].concat()).succeeds();
+    assert!(ran.err.contains("a lamp is put where the view is from"), "{}", ran.err);
+    assert!(!ran.err.contains("almost no light"), "{}", ran.err);
+    // Under a sky that was asked for it stays dark, and that is said in place of a balance of nothing.
+    let ran = relume(&[&render[..], &SMALL, &["--sky", "uniform=1"]].concat()).succeeds();
+    assert!(ran.out.contains("next to no light from outside gets in"), "{}", ran.out);
+    assert!(!ran.out.contains("unbalanced"), "{}", ran.out);
+}
+
+#[test]
+fn rough_pictures_are_drawn_without_solving() {
+    let dir = tempfile::tempdir().unwrap();
+    let (scene, out) = (statue(dir.path()), dir.path().join("out"));
+    let render = ["render", text(&scene), "-o", text(&out), "--size", "64x48", "--preview"];
+    relume(&[&render[..], &["--turntable", "3"]].concat()).says(&["3 rough pictures"]);
+    let picture = |k: u32| std::fs::read(out.join(format!("preview-000{k}.png"))).unwrap();
+    assert!(is_whole_png(&picture(0)) && picture(0) != picture(1) && picture(1) != picture(2));
+    assert!(!out.join("report.json").exists() && !out.join("frame-0000.png").exists());
+    relume(&[&render[..], &["--resume"]].concat()).fails(2, &["--preview"]);
 }
 
 #[test]

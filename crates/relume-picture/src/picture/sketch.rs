@@ -267,3 +267,74 @@ fn spread(normal: Vec3, turn: f64) -> impl Iterator<Item = Vec3> {
         (u * (cos as f32 * out) + v * (sin as f32 * out) + normal * up).normalize()
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+    use relume::scene::SceneBuilder;
+    use relume::scene::outside::{Outside, Sky};
+
+    use super::super::tone::Tone;
+    use super::*;
+
+    /// A floor of reflectance 0.5 and 2 m, and a lamp far below it that shines on the floor's black back.
+    fn floor() -> Scene {
+        let mut b = SceneBuilder::new("floor");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let glow = b.material("glow", [0.5; 3], [1.0; 3]);
+        let n = b.node("n", None, DVec3::ZERO, DQuat::IDENTITY);
+        let square =
+            |y: f64| [(-1., 1.), (1., 1.), (1., -1.), (-1., -1.)].map(|(x, z)| DVec3::new(x, y, z));
+        b.polygon(n, "floor", grey, &square(0.0));
+        b.polygon(n, "lamp", glow, &square(-5.0));
+        b.build().unwrap()
+    }
+
+    fn settings() -> Settings {
+        let (exposure, tone) = (Exposure::Fixed(1.0), Tone::Clip);
+        Settings {
+            width: 32,
+            height: 24,
+            exposure,
+            tone,
+            background: [0.2; 3],
+            ..Settings::default()
+        }
+    }
+
+    #[test]
+    fn an_open_floor_has_the_radiance_of_the_sky_times_its_reflectance() {
+        let sky = Some(Sky::Uniform([1.0; 3]));
+        let scene = floor().with_outside(Outside { sky, ..Outside::default() }).unwrap();
+        let view = View::look_at(DVec3::new(0.0, 3.0, 0.5), DVec3::ZERO, 0.5);
+        let sketch = Sketch::new(&scene, 0.0);
+        let encoder = SrgbEncoder::new();
+        let image = sketch.draw(&view, &settings());
+        let half = encoder.encode(0.5);
+        assert!(
+            image.pixels.iter().all(|p| p.iter().all(|c| c.abs_diff(half) <= 1)),
+            "{:?}",
+            image.pixel(5, 5)
+        );
+        assert_eq!(sketch.lit(&view), Some(1.0));
+        // Past the floor's edges is the sky, below the horizon nothing.
+        let level = View::look_at(DVec3::new(0.0, 1.0, 9.0), DVec3::new(0.0, 1.0, 0.0), 0.5);
+        let image = sketch.draw(&level, &settings());
+        assert_eq!(image.pixel(16, 2), [255; 3]);
+        assert_eq!(image.pixel(0, 23), [0; 3]);
+    }
+
+    #[test]
+    fn what_a_lamp_does_not_reach_is_not_lit() {
+        let sketch = Sketch::new(&floor(), 0.0);
+        let floor_only = View::look_at(DVec3::new(0.0, 3.0, 0.5), DVec3::ZERO, 0.5);
+        assert_eq!(sketch.lit(&floor_only), Some(0.0));
+        assert_eq!(sketch.draw(&floor_only, &settings()).pixel(16, 12), [0; 3]);
+        let lamp_only = View::look_at(DVec3::new(0.0, -2.0, 0.5), DVec3::new(0.0, -5.0, 0.0), 0.3);
+        assert_eq!(sketch.lit(&lamp_only), Some(1.0));
+        let away = View::look_at(DVec3::new(0.0, 3.0, 0.5), DVec3::new(0.0, 9.0, 0.0), 0.5);
+        assert_eq!(sketch.lit(&away), None);
+        let background = SrgbEncoder::new().encode(0.2);
+        assert_eq!(sketch.draw(&away, &settings()).pixel(3, 3), [background; 3]);
+    }
+}

@@ -31,6 +31,7 @@ mod in_plane;
 mod insert;
 mod inside;
 mod join;
+mod lamp;
 pub mod limits;
 mod merge;
 mod mesh_file;

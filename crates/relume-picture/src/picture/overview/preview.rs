@@ -62,8 +62,8 @@ pub(in super::super) struct Preview {
     pub(in super::super) is_lit: bool,
 }
 
-/// Rays from a point that look for the sky.
-const SKY_RAYS: usize = 16;
+/// Rays that look for the sky: from a point, at least and at most, and from all of them.
+const SKY_RAYS: (usize, usize, usize) = (4, 16, 1 << 19);
 
 /// Stops below the typical radiosity at which a surface counts as black.
 const STOPS: f64 = 8.0;
@@ -151,15 +151,16 @@ impl Preview {
             caster.is_free(point.at + point.normal * LIFT, *towards, f32::INFINITY)
         };
         let grey = |l: [f64; 3]| luminance(l.map(|l| l as f32));
-        let count = SKY_RAYS as f64;
-        let open = self.directions(k, SKY_RAYS).filter(is_open);
+        let (least, most, all) = SKY_RAYS;
+        let rays = (all / self.points.len().max(1)).clamp(least, most);
+        let open = self.directions(k, rays).filter(is_open);
         let sum = open.map(|towards| grey(sky.sky_radiance(towards.as_dvec3()))).sum::<f64>();
         let sun = sky.sun_beam().map_or(0.0, |(towards, beam_w_m2)| {
             let towards = towards.as_vec3();
             let cosine = f64::from(point.normal.dot(towards)).max(0.0);
             if cosine > 0.0 && is_open(&towards) { grey(beam_w_m2) * cosine } else { 0.0 }
         });
-        std::f64::consts::PI * sum / count + sun
+        std::f64::consts::PI * sum / rays as f64 + sun
     }
 
     /// Directions from a point, spread by the cosine.

@@ -7,7 +7,7 @@ use crate::element::{ElementId, Forest, WorldView};
 use crate::event::Ticks;
 use crate::pair::{LinkEvent, PairHash, PairTree};
 use crate::scene::{BodyId, Scene};
-use crate::solver::{Links, Radiosity};
+use crate::solver::{GroupLinks, Links, Radiosity};
 use crate::transport::Simd;
 
 mod advance;
@@ -21,6 +21,7 @@ mod estimate;
 mod events;
 mod factors;
 mod gather;
+mod groups;
 mod lossy;
 mod names;
 mod options;
@@ -41,7 +42,7 @@ pub use gather::Sensor;
 pub use lossy::{Missed, RadiosityError, missed, radiosity_error};
 pub use names::ElementName;
 pub use options::{Options, Oracle, Update};
-pub use report::{Energy, FrameReport, PairCounts, RowSumError, Seconds};
+pub use report::{Energy, FrameReport, LinkKinds, PairCounts, RowSumError, Seconds};
 pub use snapshot::{Leaf, Snapshot};
 pub use solution::Solution;
 pub use watch::Watch;
@@ -136,6 +137,7 @@ struct Solved {
     tree: PairTree,
     hash: PairHash,
     links: Links,
+    groups: GroupLinks,
     coarse: Coarse,
     radiosity: Radiosity,
     /// Mean radiosity when no link was extrapolated last, W/m2.
@@ -171,7 +173,10 @@ impl Session {
     /// [`SessionError::Option`] if an option is out of its range.
     pub fn new(scene: Arc<Scene>, options: Options) -> Result<Session, SessionError> {
         options.validate()?;
-        let mut seed = Forest::new(&scene);
+        let mut seed = match (options.oracle, options.groups) {
+            (Oracle::Error, true) => Forest::with_groups(&scene),
+            _ => Forest::new(&scene),
+        };
         let coarse_ids = match options.oracle {
             Oracle::Error => coarse::number(&scene, &mut seed),
             Oracle::FormFactor { .. } => Vec::new(),
@@ -326,7 +331,8 @@ impl Session {
         let fixed = self.seed.memory_bytes() + self.seed.shared_bytes();
         let mut memory = Memory { fixed, ..Memory::default() };
         if let Some(s) = &self.solved {
-            memory.pairs = s.tree.memory_bytes() + s.links.pool_bytes();
+            memory.pairs =
+                s.tree.memory_bytes() + s.links.pool_bytes() + s.groups.memory_bytes();
             memory.elements =
                 s.forest.memory_bytes() + s.radiosity.memory_bytes() + s.links.span_bytes();
             memory.fixed += s.coarse.memory_bytes();

@@ -228,3 +228,74 @@ impl GroupLinks {
             + self.rows.elements.capacity() * size_of::<(u32, Linear)>()) as u64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MOMENT: f32 = 1.0 / 6.0;
+
+    /// A group of three facets within one of four, and an element: links of the element with the smaller, and of the
+    /// fourth facet's own group with it.
+    fn links() -> GroupLinks {
+        let facets = vec![(4, 1.0), (5, 2.0), (6, 0.5), (8, 4.0)];
+        let element =
+            GroupEnd::Element { id: 9, area_m2: 3.0, radius: 2.0, mean: 0.5, gradient: [0.2, 0.0] };
+        let small = |first| GroupEnd::Group { facets: 0..3, first };
+        let last = GroupEnd::Group { facets: 3..4, first: 6 };
+        let list = vec![
+            GroupLink { ends: [small(0), element], coupling: 0.1 },
+            GroupLink { ends: [last, small(3)], coupling: 0.2 },
+        ];
+        let factors = vec![1.0, 0.5, 0.0, 0.25, 0.0, 2.0, 0.75];
+        GroupLinks::new(facets, vec![0..4], (list, factors), MOMENT)
+    }
+
+    /// K A_i f_i A_j f_j of every two ends.
+    const EXCHANGES: [(u32, u32, f32); 4] = [
+        (4, 9, 0.1 * 1.0 * 1.0 * 3.0 * 0.5),
+        (5, 9, 0.1 * 2.0 * 0.5 * 3.0 * 0.5),
+        (4, 8, 0.2 * 1.0 * 0.25 * 4.0 * 0.75),
+        (6, 8, 0.2 * 0.5 * 2.0 * 4.0 * 0.75),
+    ];
+
+    #[test]
+    fn facets_receive_what_the_sum_over_all_pairs_of_facets_brings() {
+        let links = links();
+        let radiosity = |id: u32| [f32::from(id as u8), 1.0, 0.5];
+        let sent = |id: u32| Linear { mean: radiosity(id), ..Linear::default() };
+        let arriving = links.arriving(&sent, MOMENT);
+        for (id, area) in [(4, 1.0), (5, 2.0), (6, 0.5), (8, 4.0), (9, 3.0)] {
+            let mut want = [0.0_f32; 3];
+            for (one, two, x) in EXCHANGES {
+                let other = if one == id { two } else if two == id { one } else { continue };
+                let b = radiosity(other);
+                (0..3).for_each(|c| want[c] += x / area * b[c]);
+            }
+            let found = links.at(&arriving, id);
+            for c in 0..3 {
+                assert!((found.mean[c] - want[c]).abs() < 1e-6, "{id}: {found:?} {want:?}");
+            }
+            let row = links.row(id, true).mean[0];
+            assert!((row - 2.0 * want[2]).abs() < 1e-6, "{id}: {row} {want:?}");
+        }
+    }
+
+    #[test]
+    fn an_element_sends_more_where_it_is_brighter_towards_the_group_and_receives_a_line() {
+        let links = links();
+        let even = |_: u32| Linear { mean: [1.0; 3], ..Linear::default() };
+        let uneven = |id: u32| match id {
+            9 => Linear { mean: [1.0; 3], gradient: [[0.5; 3], [0.0; 3]] },
+            _ => even(id),
+        };
+        let [flat, steep] = [
+            links.at(&links.arriving(&even, MOMENT), 5),
+            links.at(&links.arriving(&uneven, MOMENT), 5),
+        ];
+        let more = 1.0 + MOMENT * 0.5 * 0.2;
+        assert!((steep.mean[0] / flat.mean[0] - more).abs() < 1e-6);
+        let line = links.at(&links.arriving(&even, MOMENT), 9);
+        assert!((line.gradient[0][0] - line.mean[0] * 0.2 / 2.0).abs() < 1e-6);
+    }
+}

@@ -379,3 +379,136 @@ impl GroupSight<'_> {
         false
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use glam::DQuat;
+
+    use super::*;
+    use crate::scene::SceneBuilder;
+
+    /// Two balls of 0.5 m and so many facets around, some distance apart in a large room, and what `fill` adds.
+    fn balls(around: u32, apart_m: f64, fill: impl Fn(&mut SceneBuilder)) -> (Forest, WorldView) {
+        let mut b = SceneBuilder::new("two balls");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let node = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+        b.cuboid_inward(node, "walls", grey, DVec3::splat(-12.0), DVec3::splat(12.0));
+        for (k, x) in [-0.5 * apart_m, 0.5 * apart_m].into_iter().enumerate() {
+            let at = DVec3::new(x, 0.1, 0.2);
+            let node = b.node(&format!("ball {k}"), None, at, DQuat::from_rotation_y(0.3));
+            ball(&mut b, node, grey, around);
+        }
+        fill(&mut b);
+        let scene = b.build().unwrap();
+        let forest = Forest::with_groups(&scene);
+        let view = WorldView::new(&scene, &forest, 0.0);
+        (forest, view)
+    }
+
+    fn ball(
+        b: &mut SceneBuilder,
+        node: crate::scene::NodeId,
+        material: crate::scene::MaterialId,
+        around: u32,
+    ) {
+        let at = |i: u32, k: u32| {
+            let (a, c) = (
+                2.0 * PI * f64::from(i % around) / f64::from(around),
+                2.0 * PI * f64::from(k) / f64::from(around),
+            );
+            0.5 * DVec3::new(libm::sin(c) * libm::cos(a), libm::cos(c), libm::sin(c) * libm::sin(a))
+        };
+        for (i, k) in (0..around).flat_map(|i| (0..around / 2).map(move |k| (i, k))) {
+            if k + 1 < around / 2 {
+                b.polygon(node, "ball", material, &[at(i, k), at(i + 1, k + 1), at(i, k + 1)]);
+            }
+            if k > 0 {
+                b.polygon(node, "ball", material, &[at(i, k), at(i + 1, k), at(i + 1, k + 1)]);
+            }
+        }
+    }
+
+    /// The groups that hold a whole ball each.
+    fn ends(forest: &Forest) -> Vec<ElementId> {
+        let roots = forest.groups().roots();
+        assert_eq!(roots.len(), 2, "each ball is a group");
+        roots.to_vec()
+    }
+
+    #[test]
+    fn what_groups_exchange_is_the_sum_over_all_pairs_of_their_facets() {
+        let mut errors = Vec::new();
+        for apart_m in [2.0, 4.0, 8.0] {
+            let (forest, view) = balls(16, apart_m, |_| {});
+            let [a, b] = ends(&forest)[..] else { unreachable!() };
+            let (one, other) =
+                (Spread::new(&forest, &view, a, None), Spread::new(&forest, &view, b, None));
+            let leaves = |id| forest.groups().leaves_of(forest.group(id).unwrap());
+            let mut sum = 0.0;
+            for (p, q) in leaves(a).iter().flat_map(|p| leaves(b).iter().map(move |q| (p, q))) {
+                let d = q.centre - p.centre;
+                let (cos_p, cos_q) = (p.normal.dot(d).max(0.0), q.normal.dot(-d).max(0.0));
+                sum += p.area_m2 * q.area_m2 * cos_p * cos_q / (PI * d.length_squared().powi(2));
+            }
+            let found = one.projected_m2(&other) * other.projected_m2(&one)
+                / (PI * one.centre.distance_squared(other.centre));
+            errors.push((found / sum - 1.0).abs());
+        }
+        println!("{errors:?}");
+        // Of the second order in size over distance.
+        assert!(errors[0] < 0.08 && errors[1] < 0.4 * errors[0] && errors[2] < 0.4 * errors[1]);
+    }
+
+    #[test]
+    fn a_ball_shows_a_disc() {
+        let (forest, view) = balls(32, 9.0, |_| {});
+        let [a, b] = ends(&forest)[..] else { unreachable!() };
+        let (one, other) =
+            (Spread::new(&forest, &view, a, None), Spread::new(&forest, &view, b, None));
+        let disc = one.projected_far_m2(&other);
+        assert!((disc / (PI * 0.25) - 1.0).abs() < 0.02, "{disc}");
+        assert!(forest.group(a).unwrap().is_convex && forest.group(a).unwrap().solid.is_some());
+    }
+
+    #[test]
+    fn an_element_and_a_group_exchange_as_both_see_it() {
+        let (forest, view) = balls(16, 6.0, |_| {});
+        let [a, _] = ends(&forest)[..] else { unreachable!() };
+        let wall = forest.patch_root(crate::scene::PatchId(0));
+        let wall = Spread::new(&forest, &view, wall, None);
+        let ball = Spread::new(&forest, &view, a, None);
+        let slope = wall.slope(&ball);
+        assert!(slope.mean > 0.0 && slope.gradient.is_finite());
+        assert!((wall.projected_m2(&ball) - wall.area_m2 * slope.mean).abs() < 1e-9);
+    }
+
+    fn visibility(forest: &Forest, view: &WorldView) -> (f64, u32) {
+        let [a, b] = ends(forest)[..] else { unreachable!() };
+        let end = |id| Spread::new(forest, view, id, None);
+        let candidates = [Forest::ROOT.0];
+        GroupSight { forest, view, common: None, candidates: &candidates }
+            .visibility(&end(a), &end(b), 7)
+    }
+
+    #[test]
+    fn convex_groups_do_not_hide_themselves_and_walls_hide_them() {
+        let wall = |low: f64, high: f64| {
+            move |b: &mut SceneBuilder| {
+                let grey = b.double_sided_material("wall", [0.5; 3], [0.0; 3]);
+                let node = b.node("wall", None, DVec3::ZERO, DQuat::IDENTITY);
+                let corners = [(low, -9.0), (high, -9.0), (high, 9.0), (low, 9.0)];
+                b.polygon(node, "wall", grey, &corners.map(|(y, z)| DVec3::new(0.0, y, z)));
+            }
+        };
+        let (forest, view) = balls(16, 6.0, |_| {});
+        assert_eq!(visibility(&forest, &view).0, 1.0);
+        let (forest, view) = balls(16, 6.0, wall(-9.0, 9.0));
+        assert_eq!(visibility(&forest, &view).0, 0.0);
+        // All above the middle of both.
+        let (forest, view) = balls(16, 6.0, wall(0.1, 9.0));
+        let half = visibility(&forest, &view).0;
+        assert!((half - 0.5).abs() < 0.2, "{half}");
+    }
+}

@@ -81,6 +81,11 @@ impl Layout {
         if layout.has_groups() { layout } else { Layout::default() }
     }
 
+    /// How many patches are small and may be in groups.
+    fn small_count(&self) -> usize {
+        self.sorts.iter().filter(|&&sort| sort != Sort::Large).count()
+    }
+
     /// Whether there may be any groups.
     pub(super) fn has_groups(&self) -> bool {
         self.sorted.contains(&true) || self.staged.contains(&true)
@@ -97,6 +102,12 @@ impl Layout {
     pub(super) fn sort(&self, patch: u32) -> Sort {
         self.sorts.get(patch as usize).copied().unwrap_or(Sort::Large)
     }
+}
+
+/// How many patches of a scene groups are made of ([`Forest::with_groups`]); 0 where there are none. Cost: proportional to
+/// the patches.
+pub fn grouped_patches(scene: &Scene) -> usize {
+    Layout::of(scene).small_count()
 }
 
 /// A facet of a group, as a point that radiates.

@@ -10,6 +10,6 @@ mod split;
 mod world;
 
 pub use forest::{Counts, ElementId, ElementKey, Forest, Kind, Renumbering};
-pub use groups::{Group, GroupLeaf, Groups};
+pub use groups::{Group, GroupLeaf, Groups, grouped_patches};
 pub use split::{Extent, Shape, bilinear, bilinear_area};
 pub use world::{OccluderPolygon, WorldElement, WorldLight, WorldPatch, WorldView};

@@ -13,7 +13,7 @@ use glam::{DVec2, DVec3};
 use crate::element::{
     ElementId, Forest, GroupLeaf, Kind, WorldElement, WorldView, bilinear, bilinear_area,
 };
-use crate::geometry::{Aabb, Pose, shaft_meets_box};
+use crate::geometry::{Aabb, Pose, ShaftOfBoxes};
 use crate::scene::{BodyId, PatchId};
 
 use super::segments::EDGE_OVERLAP;
@@ -182,6 +182,7 @@ impl<'a> Spread<'a> {
                         * factor(out.points[k], e.plane.normal, other.centre, r2);
                 }
                 out.patches = [forest.patch(self.id).map_or(u32::MAX, |p| p.0); 16];
+                out.normals = [e.plane.normal; 16];
             }
             Points::Group(leaves, pose) => {
                 let (to, r2) = seen_from(pose, self, other);
@@ -234,6 +235,7 @@ fn gauss_points() -> [[f64; 2]; 4] {
 /// Sixteen points of one end.
 struct Samples {
     points: [DVec3; 16],
+    normals: [DVec3; 16],
     weights: [f64; 16],
     /// The patches they are on.
     patches: [u32; 16],
@@ -241,7 +243,8 @@ struct Samples {
 
 impl Default for Samples {
     fn default() -> Samples {
-        Samples { points: [DVec3::ZERO; 16], weights: [0.0; 16], patches: [u32::MAX; 16] }
+        let (points, normals) = ([DVec3::ZERO; 16], [DVec3::ZERO; 16]);
+        Samples { points, normals, weights: [0.0; 16], patches: [u32::MAX; 16] }
     }
 }
 
@@ -264,6 +267,7 @@ impl Samples {
         };
         let corners = shape.corners.map(|c| frame.point(c));
         self.points[k] = pose.point(bilinear(&corners, unit(turn), unit(turn >> 16)));
+        self.normals[k] = pose.direction(leaf.normal);
         self.weights[k] = 1.0;
         self.patches[k] = patch.0;
     }
@@ -306,12 +310,16 @@ impl GroupSight<'_> {
         let from = a.samples(self.forest, self.view, b, key);
         let to = b.samples(self.forest, self.view, a, key.rotate_left(32));
         let (mut clear, mut all) = (0.0, 0.0);
+        let mut stack = Vec::with_capacity(64);
         for k in 0..GROUP_SEGMENTS as usize {
             let other = (k as u32).reverse_bits() as usize >> 28;
-            let weight = from.weights[k] * to.weights[other];
+            // What is behind one of the planes is out of sight: candidates may leave out what would block it.
+            let way = to.points[other] - from.points[k];
+            let faces = from.normals[k].dot(way) > 0.0 && to.normals[other].dot(way) < 0.0;
+            let weight = if faces { from.weights[k] * to.weights[other] } else { 0.0 };
             all += weight;
             let ends = [(from.points[k], from.patches[k]), (to.points[other], to.patches[other])];
-            if weight > 0.0 && !self.is_blocked(&candidates, ends, (a, b)) {
+            if weight > 0.0 && !self.is_blocked(&candidates, ends, (a, b), &mut stack) {
                 clear += weight;
             }
         }
@@ -333,6 +341,7 @@ impl GroupSight<'_> {
         candidates: &[u32],
         [(p, on_p), (q, on_q)]: [(DVec3, u32); 2],
         (a, b): (&Spread<'_>, &Spread<'_>),
+        stack: &mut Vec<ElementId>,
     ) -> bool {
         let (forest, view) = (self.forest, self.view);
         let pose = self.common.map(|body| view.poses()[body.0 as usize].unwrap_or(Pose::IDENTITY));
@@ -345,12 +354,13 @@ impl GroupSight<'_> {
             patch => view.patch(PatchId(patch)).rounding_m,
         };
         let slack_m = 4.0 * (rounding(on_p) + rounding(on_q));
-        let boxes = (Aabb::of([world.0]), Aabb::of([world.1]));
-        let mut stack: Vec<ElementId> = candidates.iter().map(|&id| ElementId(id)).collect();
+        let segment = ShaftOfBoxes::new(&Aabb::of([world.0]), &Aabb::of([world.1]));
+        stack.clear();
+        stack.extend(candidates.iter().map(|&id| ElementId(id)));
         while let Some(id) = stack.pop() {
             let bounds = view.fixed_box(id);
             if bounds.is_empty()
-                || !shaft_meets_box(&boxes.0, &boxes.1, &bounds.grown(slack_m))
+                || !segment.meets(bounds, slack_m)
                 || !self.may_block(id.0, a, b)
             {
                 continue;

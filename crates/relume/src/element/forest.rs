@@ -368,7 +368,8 @@ impl Forest {
             match subject {
                 // Together with others: in the world, where it rests.
                 STAGE => {
-                    let pose = scene.pose(patch.body, 0.0).unwrap_or(crate::geometry::Pose::IDENTITY);
+                    let pose =
+                        scene.pose(patch.body, 0.0).unwrap_or(crate::geometry::Pose::IDENTITY);
                     Aabb::of(patch.corners_in_body().map(|c| pose.point(c)))
                 }
                 _ => Aabb::of(patch.corners_in_body()),
@@ -520,7 +521,8 @@ impl Forest {
             + f.body_roots.capacity()
             + f.facets.capacity();
         let kinds = f.kinds.capacity() * size_of::<Kind>() + f.child_counts.capacity() * 2;
-        (f.charts.capacity() * size_of::<Chart>() + ids * 4 + kinds) as u64 + f.groups.memory_bytes()
+        (f.charts.capacity() * size_of::<Chart>() + ids * 4 + kinds) as u64
+            + f.groups.memory_bytes()
     }
 
     /// Room that no element has.

@@ -69,9 +69,8 @@ impl Layout {
         };
         let rests = |body: &BodyId| !scene.is_distant(*body) && !scene.moves(*body);
         let resting: usize = bodies().filter(rests).map(small).sum();
-        let sorted = |body: BodyId| {
-            !rests(&body) && !scene.is_distant(body) && small(body) >= PATCHES_MIN
-        };
+        let sorted =
+            |body: BodyId| !rests(&body) && !scene.is_distant(body) && small(body) >= PATCHES_MIN;
         let staged = |body: BodyId| rests(&body) && resting >= PATCHES_MIN;
         let layout = Layout {
             sorted: bodies().map(sorted).collect(),

@@ -83,11 +83,12 @@ impl Placed<'_> {
         if solid(a).is_some() && solid(a) == solid(b) {
             return culled(CullReason::FacingAway);
         }
-        if self.is_behind_an_element((a, b)) {
-            return culled(CullReason::FacingAway);
-        }
         let body = body_of(self.forest, self.view, a)
             .filter(|&body| body_of(self.forest, self.view, b) == Some(body));
+        // As of groups that are always refined: both stages agree on what is culled.
+        if self.is_out_of_sight((a, b), body.is_some()) {
+            return culled(CullReason::FacingAway);
+        }
         let start = narrowed.len();
         BoxShaft::new(self.view, self.forest, (a, b), body).narrow(candidates, narrowed);
         let candidates = &narrowed[start..];
@@ -109,20 +110,6 @@ impl Placed<'_> {
             return carrying(Verdict::Hold, area_m2, v, Margin::Firm, segments);
         };
         self.decide_group_pair((a, b), (&ends.0, &ends.1), &sight, key, brightness)
-    }
-
-    /// Whether all of one end is behind the plane of the other, which is an element, and nothing of it lies in that plane.
-    fn is_behind_an_element(&self, (a, b): (ElementId, ElementId)) -> bool {
-        let body = body_of(self.forest, self.view, a)
-            .filter(|&body| body_of(self.forest, self.view, b) == Some(body));
-        let behind = |of: ElementId, other: ElementId| {
-            let bounds = match body {
-                Some(_) => self.view.box_in_body(self.forest.fixed(other)),
-                None => self.view.end_box(self.forest.fixed(other)),
-            };
-            self.box_is_behind(of, bounds, body.is_some()) == Some(false)
-        };
-        behind(a, b) || behind(b, a)
     }
 
     fn decide_group_pair(

@@ -268,17 +268,7 @@ impl Placed<'_> {
             return passing(Verdict::Refine(side), 0);
         }
         let body = self.body_of(a).filter(|&body| self.body_of(b) == Some(body));
-        // What is decided on two parts of one body must not depend on where the body is.
-        let (box_a, box_b) = match body {
-            Some(_) => (self.view.box_in_body(fixed_a), self.view.box_in_body(fixed_b)),
-            None => (box_a, box_b),
-        };
-        let one_body = body.is_some();
-        let is_behind = |(of, other): (ElementId, ElementId), bounds: &Aabb| {
-            self.box_is_behind(of, bounds, one_body)
-                .is_some_and(|is_in_plane| !is_in_plane || !self.may_touch(of, other, one_body))
-        };
-        if is_behind((a, b), box_b) || is_behind((b, a), box_a) {
+        if self.is_out_of_sight((a, b), body.is_some()) {
             return culled(CullReason::FacingAway);
         }
         BoxShaft::new(self.view, self.forest, (a, b), body).narrow(candidates, narrowed);
@@ -292,6 +282,20 @@ impl Placed<'_> {
         };
         let side = if no_smaller(size(a), size(b)) { Side::A } else { Side::B };
         passing(Verdict::Refine(side), 0)
+    }
+
+    /// Whether one end of a pair is wholly behind the plane of the other, and does not touch it.
+    pub(super) fn is_out_of_sight(&self, (a, b): (ElementId, ElementId), one_body: bool) -> bool {
+        // What is decided on two parts of one body must not depend on where the body is.
+        let bounds = |id| match one_body {
+            true => self.view.box_in_body(self.forest.fixed(id)),
+            false => self.view.end_box(self.forest.fixed(id)),
+        };
+        let is_behind = |of: ElementId, other: ElementId| {
+            self.box_is_behind(of, bounds(other), one_body)
+                .is_some_and(|is_in_plane| !is_in_plane || !self.may_touch(of, other, one_body))
+        };
+        is_behind(a, b) || is_behind(b, a)
     }
 
     /// Whether one end of a pair is a group, and the other is above the coarse level.
@@ -315,7 +319,7 @@ impl Placed<'_> {
 
     /// Whether a box is wholly behind the plane of a polygon or element, and if so whether it reaches into the
     /// plane; the box is in the body's frame if `in_body`.
-    pub(super) fn box_is_behind(&self, id: ElementId, bounds: &Aabb, in_body: bool) -> Option<bool> {
+    fn box_is_behind(&self, id: ElementId, bounds: &Aabb, in_body: bool) -> Option<bool> {
         let patch = self.forest.patch(id)?;
         let patch = self.view.patch(patch);
         let frame = if in_body { &patch.local } else { &patch.world };

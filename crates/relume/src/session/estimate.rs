@@ -97,11 +97,7 @@ impl Estimate {
     }
 
     /// See [`PAIRS_OF_PATCHES`] and what follows it.
-    fn from_counts(
-        facing_of_all: u64,
-        (patches, grouped): (u64, u64),
-        tolerance: f64,
-    ) -> Estimate {
+    fn from_counts(facing_of_all: u64, (patches, grouped): (u64, u64), tolerance: f64) -> Estimate {
         let all = (patches as f64).max(1.0);
         let of = |k: usize| {
             // Those that groups are not made of, and some groups.

@@ -21,9 +21,8 @@ pub(super) fn group_links(forest: &Forest, view: &WorldView, tree: &PairTree) ->
         return GroupLinks::default();
     }
     let is_group = |id| forest.group(id).is_some();
-    let ends_on_group = |link: &pair::Link| {
-        (is_group(link.a) || is_group(link.b)) && link.carried.visibility > 0
-    };
+    let ends_on_group =
+        |link: &pair::Link| (is_group(link.a) || is_group(link.b)) && link.carried.visibility > 0;
     let all: Vec<pair::Link> = tree.links().filter(ends_on_group).collect();
     let place = |links: &[pair::Link]| {
         let mut factors = Vec::new();
@@ -31,8 +30,7 @@ pub(super) fn group_links(forest: &Forest, view: &WorldView, tree: &PairTree) ->
             links.iter().map(|link| placed((forest, view), link, &mut factors)).collect();
         (links, factors)
     };
-    let parts: Vec<(Vec<GroupLink>, Vec<f32>)> =
-        all.par_chunks(LINKS_AT_ONCE).map(place).collect();
+    let parts: Vec<(Vec<GroupLink>, Vec<f32>)> = all.par_chunks(LINKS_AT_ONCE).map(place).collect();
     let (mut links, mut factors) = (Vec::with_capacity(all.len()), Vec::new());
     for (of_part, more) in parts {
         let shift = factors.len() as u32;

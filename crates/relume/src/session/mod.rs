@@ -331,8 +331,7 @@ impl Session {
         let fixed = self.seed.memory_bytes() + self.seed.shared_bytes();
         let mut memory = Memory { fixed, ..Memory::default() };
         if let Some(s) = &self.solved {
-            memory.pairs =
-                s.tree.memory_bytes() + s.links.pool_bytes() + s.groups.memory_bytes();
+            memory.pairs = s.tree.memory_bytes() + s.links.pool_bytes() + s.groups.memory_bytes();
             memory.elements =
                 s.forest.memory_bytes() + s.radiosity.memory_bytes() + s.links.span_bytes();
             memory.fixed += s.coarse.memory_bytes();

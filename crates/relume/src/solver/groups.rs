@@ -112,11 +112,7 @@ impl GroupLinks {
     }
 
     /// What arrives everywhere where elements send what `sent` says: means, and first moments.
-    pub(super) fn arriving(
-        &self,
-        sent: &(impl Fn(u32) -> Linear + Sync),
-        moment: f32,
-    ) -> Arriving {
+    pub(super) fn arriving(&self, sent: &(impl Fn(u32) -> Linear + Sync), moment: f32) -> Arriving {
         let leaving: Vec<[[f32; 3]; 2]> = self
             .links
             .par_iter()
@@ -268,7 +264,13 @@ mod tests {
         for (id, area) in [(4, 1.0), (5, 2.0), (6, 0.5), (8, 4.0), (9, 3.0)] {
             let mut want = [0.0_f32; 3];
             for (one, two, x) in EXCHANGES {
-                let other = if one == id { two } else if two == id { one } else { continue };
+                let other = if one == id {
+                    two
+                } else if two == id {
+                    one
+                } else {
+                    continue;
+                };
                 let b = radiosity(other);
                 (0..3).for_each(|c| want[c] += x / area * b[c]);
             }

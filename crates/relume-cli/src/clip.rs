@@ -182,7 +182,9 @@ impl Clip {
         scene: Scene,
         update: UpdateChoice,
     ) -> Result<Session, Failure> {
-        Session::new(Arc::new(scene), self.options(update, false)?).map_err(Failure::new)
+        // Rows of patches are asked for one by one.
+        let options = Options { groups: false, ..self.options(update, false)? };
+        Session::new(Arc::new(scene), options).map_err(Failure::new)
     }
 
     /// Says on stderr what is doubtful about the scene, unless the user wants quiet.
@@ -236,6 +238,7 @@ impl Clip {
             tolerance: self.tolerance,
             oracle,
             update,
+            groups: true,
             balance,
             events: false,
             max_memory_bytes: memory::limit_bytes(),

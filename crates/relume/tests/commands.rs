@@ -40,6 +40,27 @@ fn room() -> Scene {
     b.build().unwrap()
 }
 
+/// A room full of small crates: enough for groups of patches.
+fn clutter() -> Scene {
+    let mut b = SceneBuilder::new("clutter");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let red = b.material("red", [0.7, 0.2, 0.1], [0.0; 3]);
+    let glow = b.material("glow", [0.1; 3], [9.0, 8.0, 7.0]);
+    let walls = b.body("walls");
+    let (corners, triangles) = cube(1.0, true);
+    b.mesh(walls, "walls", grey, &corners, &triangles);
+    let (corners, triangles) = cube(0.045, false);
+    for k in 0..24 {
+        let at = [k % 3, k / 3 % 3, k / 9].map(|n| 0.5 * f64::from(n) - 0.5);
+        let corners: Vec<[f64; 3]> =
+            corners.iter().map(|c| [0, 1, 2].map(|axis| c[axis] + at[axis])).collect();
+        let body = b.body(&format!("crate {k}"));
+        let material = if k == 13 { glow } else { red };
+        b.mesh(body, "crate", material, &corners, &triangles);
+    }
+    b.build().unwrap()
+}
+
 /// The first poses: nothing inside anything else.
 fn start(session: &mut Session) {
     for (body, at) in [(1, v(0.0, 0.0, 0.8)), (2, v(-0.4, 0.3, -0.6)), (3, v(0.5, -0.3, 0.0))] {
@@ -166,6 +187,11 @@ fn follow(scene: &Scene, seeds: std::ops::Range<u64>, steps: usize, insert: f64)
 #[test]
 fn any_log_equals_a_cold_build_and_leads_back() {
     follow(&room(), 0..10, 6, 0.0);
+}
+
+#[test]
+fn bodies_leave_groups_of_patches_and_come_back() {
+    follow(&clutter(), 400..403, 5, 0.1);
 }
 
 #[test]

@@ -8,6 +8,7 @@ use glam::{DVec2, DVec3};
 
 use super::clusters::{Branch, binary_tree};
 use super::exposed::{exposed_extent, exposed_m2};
+use super::groups::{Group, Groups, Layout, Sort};
 use super::split::{Chart, Extent, Place, Shape};
 use crate::geometry::{Aabb, cut_along, polygon_area, split_convex};
 use crate::scene::{BodyId, Covered, Enclosure, Lines, PatchId, Scene, Solid, Solids};
@@ -99,6 +100,12 @@ impl Fan {
 
 const NONE: u32 = u32::MAX;
 
+/// In place of a body: all that never moves, planted as one.
+const STAGE: u32 = u32::MAX - 1;
+
+/// What is planted, with the lines that patches are cut along, and in which order.
+type Plot<'a> = (&'a Scene, &'a Cuts, &'a Layout);
+
 /// Vectors of the forest are given room for this share more than they need.
 const SLACK: usize = 32;
 
@@ -162,6 +169,8 @@ struct Fixed {
     distant: Vec<bool>,
     /// How many facets receive light: they come before those that are distant.
     near_facets: usize,
+    /// Clusters that may be ends of links.
+    groups: Groups,
 }
 
 /// Where elements went when the forest was put together: those that stayed keep their order.
@@ -194,8 +203,33 @@ pub struct Counts {
 }
 
 impl Forest {
-    /// The fixed part of the forest of a scene.
+    /// The fixed part of the forest of a scene, in which no cluster is an end of links.
     pub fn new(scene: &Scene) -> Forest {
+        Forest::displaced(scene, &|_| false)
+    }
+
+    /// The same where bodies that no clip moves are not where the scene has them at rest.
+    pub fn displaced(scene: &Scene, is_displaced: &dyn Fn(BodyId) -> bool) -> Forest {
+        Forest::planted(scene, &Layout::default(), is_displaced)
+    }
+
+    /// The same with clusters of small patches as ends of links, where there are many such patches; where there are not,
+    /// it is that of [`Forest::displaced`].
+    pub fn with_groups(scene: &Scene, is_displaced: &dyn Fn(BodyId) -> bool) -> Forest {
+        let layout = Layout::of(scene, is_displaced);
+        let mut forest = Forest::planted(scene, &layout, is_displaced);
+        if layout.has_groups() {
+            let groups = Groups::of(scene, &forest, &layout);
+            for id in groups.ids() {
+                let twins = &mut forest.twins[id.0 as usize];
+                (twins.facet, twins.path) = (id.0, 1);
+            }
+            forest.fixed_mut().groups = groups;
+        }
+        forest
+    }
+
+    fn planted(scene: &Scene, layout: &Layout, is_displaced: &dyn Fn(BodyId) -> bool) -> Forest {
         let solids = scene.solids();
         let mut forest = Forest {
             nodes: Vec::new(),
@@ -207,7 +241,7 @@ impl Forest {
             fixed: Arc::new(Fixed {
                 patch_roots: vec![ElementId(NONE); scene.patches.len()],
                 body_roots: vec![ElementId(NONE); scene.bodies.len()],
-                covered: scene.covered(&solids, &|_| false),
+                covered: scene.covered(&solids, is_displaced),
                 solids,
                 ..Fixed::default()
             }),
@@ -239,11 +273,11 @@ impl Forest {
         }
         let cuts = Cuts::new(scene);
         if !near.is_empty() {
-            forest.plant_bodies((scene, &cuts), &near, 1);
+            forest.plant_bodies((scene, &cuts, layout), &near, 1);
         }
         if !far.is_empty() {
             let first = forest.nodes.len();
-            forest.plant_bodies((scene, &cuts), &far, after_lights);
+            forest.plant_bodies((scene, &cuts, layout), &far, after_lights);
             let mut distant = vec![false; forest.nodes.len()];
             distant[after_lights as usize] = true;
             distant[first..].fill(true);
@@ -293,24 +327,75 @@ impl Forest {
         Arc::make_mut(&mut self.fixed)
     }
 
-    fn plant_bodies(&mut self, (scene, cuts): (&Scene, &Cuts), bodies: &[u32], at: u32) {
-        let boxes: Vec<Aabb> = bodies.iter().map(|&b| box_at_start(scene, BodyId(b))).collect();
+    fn plant_bodies(&mut self, to: Plot<'_>, bodies: &[u32], at: u32) {
+        let (scene, _, layout) = to;
+        let is_staged = |body: &&u32| layout.is_staged(**body);
+        let staged: Vec<u32> = bodies.iter().filter(is_staged).copied().collect();
+        let alone = bodies.iter().filter(|body| !is_staged(body));
+        // What is planted as one comes first.
+        let mut wholes: Vec<Vec<u32>> = alone.map(|&body| vec![body]).collect();
+        if !staged.is_empty() {
+            wholes.insert(0, staged);
+        }
+        let of_whole = |whole: &Vec<u32>| {
+            let boxes = whole.iter().map(|&body| box_at_start(scene, BodyId(body)));
+            boxes.fold(Aabb::EMPTY, Aabb::union)
+        };
+        let boxes: Vec<Aabb> = wholes.iter().map(of_whole).collect();
         let tree = binary_tree(&boxes);
         self.plant(&tree, 0, at, NONE, &mut |forest, leaf, id| {
-            forest.plant_body((scene, cuts), bodies[leaf as usize], id);
+            let whole = &wholes[leaf as usize];
+            match layout.is_staged(whole[0]) {
+                true => forest.plant_sorted(to, whole, STAGE, id),
+                false => forest.plant_body(to, whole[0], id),
+            }
         });
     }
 
-    fn plant_body(&mut self, (scene, cuts): (&Scene, &Cuts), body: u32, at: u32) {
+    fn plant_body(&mut self, to: Plot<'_>, body: u32, at: u32) {
         self.fixed_mut().body_roots[body as usize] = ElementId(at);
-        let range = scene.bodies[body as usize].patches.clone();
-        let boxes: Vec<Aabb> =
-            range.clone().map(|p| Aabb::of(scene.patches[p as usize].corners_in_body())).collect();
-        let tree = binary_tree(&boxes);
+        if to.2.is_sorted(body) {
+            return self.plant_sorted(to, &[body], body, at);
+        }
+        let patches: Vec<u32> = to.0.bodies[body as usize].patches.clone().collect();
         self.set(at, Kind::Cluster, body);
         let child = self.add_children(at, 1);
-        self.plant(&tree, 0, child, body, &mut |forest, leaf, id| {
-            let patch = range.start + leaf;
+        self.plant_patches(to, &patches, body, child);
+    }
+
+    /// Some bodies as one, with a tree for each sort of their patches.
+    fn plant_sorted(&mut self, to: Plot<'_>, bodies: &[u32], subject: u32, at: u32) {
+        let (scene, _, layout) = to;
+        let all = || bodies.iter().flat_map(|&body| scene.bodies[body as usize].patches.clone());
+        let of_sort =
+            |sort: Sort| all().filter(|&patch| layout.sort(patch) == sort).collect::<Vec<u32>>();
+        let sorts = Sort::ALL.map(of_sort);
+        let sorts: Vec<&Vec<u32>> = sorts.iter().filter(|patches| !patches.is_empty()).collect();
+        self.set(at, Kind::Cluster, subject);
+        let first = self.add_children(at, sorts.len() as u16);
+        for (child, patches) in (first..).zip(sorts) {
+            self.plant_patches(to, patches, subject, child);
+        }
+    }
+
+    fn plant_patches(&mut self, to: Plot<'_>, patches: &[u32], subject: u32, at: u32) {
+        let (scene, cuts, _) = to;
+        let of_patch = |&patch: &u32| {
+            let patch = &scene.patches[patch as usize];
+            match subject {
+                // Together with others: in the world, where it rests.
+                STAGE => {
+                    let pose =
+                        scene.pose(patch.body, 0.0).unwrap_or(crate::geometry::Pose::IDENTITY);
+                    Aabb::of(patch.corners_in_body().map(|c| pose.point(c)))
+                }
+                _ => Aabb::of(patch.corners_in_body()),
+            }
+        };
+        let boxes: Vec<Aabb> = patches.iter().map(of_patch).collect();
+        let tree = binary_tree(&boxes);
+        self.plant(&tree, 0, at, subject, &mut |forest, leaf, id| {
+            let patch = patches[leaf as usize];
             forest.fixed_mut().patch_roots[patch as usize] = ElementId(id);
             let corners = &scene.patches[patch as usize].corners;
             forest.plant_polygon((patch, &cuts.of(patch), 0), corners, id);
@@ -467,6 +552,7 @@ impl Forest {
             + f.facets.capacity();
         let kinds = f.kinds.capacity() * size_of::<Kind>() + f.child_counts.capacity() * 2;
         (f.charts.capacity() * size_of::<Chart>() + ids * 4 + kinds) as u64
+            + f.groups.memory_bytes()
     }
 
     /// Room that no element has.
@@ -598,7 +684,38 @@ impl Forest {
     #[inline]
     pub fn cluster_body(&self, id: ElementId) -> Option<BodyId> {
         let subject = *self.fixed.subjects.get(id.0 as usize)?;
-        (self.kind(id) == Kind::Cluster && subject != NONE).then_some(BodyId(subject))
+        (self.kind(id) == Kind::Cluster && subject < STAGE).then_some(BodyId(subject))
+    }
+
+    /// Whether this is a cluster of patches that never move, of whichever bodies.
+    #[inline]
+    pub fn is_of_stage(&self, id: ElementId) -> bool {
+        self.fixed.subjects.get(id.0 as usize) == Some(&STAGE) && self.kind(id) == Kind::Cluster
+    }
+
+    /// What is known of a cluster that may be an end of links; `None` for all else.
+    #[inline]
+    pub fn group(&self, id: ElementId) -> Option<&Group> {
+        self.fixed.groups.get(id)
+    }
+
+    /// Whether a node of the fixed part is a group or in one.
+    pub fn is_in_group(&self, id: ElementId) -> bool {
+        self.fixed.groups.holds(id)
+    }
+
+    /// Whether groups that a facet is in are in the frame of its body, not in the world.
+    pub fn moves_with_group(&self, facet: ElementId) -> bool {
+        let above = self.parent(facet).map(|parent| match self.kind(parent) {
+            Kind::Polygon => self.moves_with_group(parent),
+            _ => !self.is_of_stage(parent),
+        });
+        above.unwrap_or(true)
+    }
+
+    /// The clusters that may be ends of links.
+    pub fn groups(&self) -> &Groups {
+        &self.fixed.groups
     }
 
     /// The name of an element or light that does not depend on history.
@@ -643,13 +760,17 @@ impl Forest {
         self.coarse(id).is_some() && self.parent(id).is_none_or(|p| self.coarse(p).is_none())
     }
 
-    /// Makes `id` the coarse element number `index`; elements made later, once all that exist are
-    /// kept, inherit it if they are below.
+    /// Makes `id` the coarse element number `index`, and all below it a part of it; elements made later, once all that
+    /// exist are kept, inherit it.
     pub fn set_coarse(&mut self, id: ElementId, index: usize) {
         let len = self.nodes.len();
-        let coarse = &mut self.fixed_mut().coarse;
-        coarse.resize(len, NONE);
-        coarse[id.0 as usize] = index as u32;
+        let mut below = vec![id];
+        while let Some(id) = below.pop() {
+            let coarse = &mut self.fixed_mut().coarse;
+            coarse.resize(len, NONE);
+            coarse[id.0 as usize] = index as u32;
+            below.extend(self.children(id).map(ElementId));
+        }
     }
 
     /// The root node of a patch.
@@ -681,16 +802,11 @@ impl Forest {
         differs
     }
 
-    /// Finds anew what of each patch is covered, with some bodies displaced, and what of each element is exposed. Whether
-    /// that differs from before.
-    pub fn cover(&mut self, scene: &Scene, is_displaced: &dyn Fn(BodyId) -> bool) -> bool {
-        let covered = scene.covered(&self.fixed.solids, is_displaced);
-        let differs = self.fixed.covered != covered;
-        if differs {
-            self.fixed_mut().covered = covered;
-            self.sum_areas();
-        }
-        differs
+    /// Whether this is another forest of the same scene though other bodies are displaced: as much of patches is covered, and
+    /// there are no groups.
+    pub fn is_as_displaced(&self, other: &Forest) -> bool {
+        let no_groups = self.fixed.groups.is_empty() && other.fixed.groups.is_empty();
+        no_groups && self.fixed.covered == other.fixed.covered
     }
 
     /// Area of the patches that are connected with a patch by common corners, itself among them, m2.

@@ -6,9 +6,11 @@
 mod clusters;
 mod exposed;
 mod forest;
+mod groups;
 mod split;
 mod world;
 
 pub use forest::{Counts, ElementId, ElementKey, Forest, Kind, Renumbering};
+pub use groups::{Group, GroupLeaf, Groups, grouped_patches};
 pub use split::{Extent, Shape, bilinear, bilinear_area};
 pub use world::{OccluderPolygon, WorldElement, WorldLight, WorldPatch, WorldView};

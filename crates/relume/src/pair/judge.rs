@@ -1,5 +1,6 @@
 //! Judging pairs of the three-dimensional forest.
 
+use std::cell::Cell;
 use std::ops::Range;
 
 use glam::DVec3;
@@ -15,7 +16,7 @@ use crate::transport::{
 };
 
 use super::brightness::Brightness;
-use super::certificate::SpaceOutlook;
+use super::certificate::{EFFORT, SpaceOutlook};
 use super::hash::pair_key;
 use super::margin::{Margin, SideMargin};
 use super::oracle::{End, Estimate, Oracle, Side, estimate};
@@ -93,9 +94,18 @@ impl Judge for Placed<'_> {
         if receives_nothing(a) && receives_nothing(b) {
             return culled(CullReason::NoReceiver);
         }
+        if self.is_group_pair(a, b) {
+            return self.judge_group_pair((a, b), candidates, narrowed);
+        }
         match (self.forest.kind(a), self.forest.kind(b)) {
             (Kind::Element, Kind::Element) => {
                 self.judge_elements((a, b), known, candidates, narrowed)
+            }
+            (Kind::Cluster, Kind::Light) if self.is_group(a) => {
+                self.judge_group_light((b, a), Side::A, candidates, narrowed)
+            }
+            (Kind::Light, Kind::Cluster) if self.is_group(b) => {
+                self.judge_group_light((a, b), Side::B, candidates, narrowed)
             }
             (Kind::Element, Kind::Light) => self.judge_light(b, a, Side::A, candidates, narrowed),
             (Kind::Light, Kind::Element) => self.judge_light(a, b, Side::B, candidates, narrowed),
@@ -128,6 +138,14 @@ impl Judge for Placed<'_> {
         candidates: &[u32],
         narrowed: &mut Vec<u32>,
     ) -> bool {
+        if self.is_group_pair(a, b) {
+            // Whether a group is refined depends on what hides it.
+            let is_self = a == b && matches!(self.stage, Stage::Fine(_));
+            if is_self {
+                narrowed.extend_from_slice(candidates);
+            }
+            return is_self;
+        }
         match (self.forest.kind(a), self.forest.kind(b)) {
             (Kind::Element, Kind::Element) => {
                 // Of what is distant the form-factor oracle goes by what is seen, too.
@@ -169,7 +187,8 @@ impl Judge for Placed<'_> {
 
     fn foresee(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick {
         let Some(ahead) = self.ahead else { return 0 };
-        SpaceOutlook { forest: self.forest, view: self.view, ahead }.until(a, b, finding)
+        let effort = Cell::new(EFFORT);
+        SpaceOutlook { forest: self.forest, view: self.view, ahead, effort }.until(a, b, finding)
     }
 
     fn holds(&self, a: ElementId, b: ElementId) -> bool {
@@ -182,11 +201,11 @@ impl Judge for Placed<'_> {
 const IN_PLANE: f64 = 64.0;
 
 /// A verdict of which the numbers do not matter.
-fn passing(verdict: Verdict, segments: u32) -> Judgement {
+pub(super) fn passing(verdict: Verdict, segments: u32) -> Judgement {
     Judgement { verdict, carried: Carried::default(), margin: Margin::Firm, segments }
 }
 
-fn culled(reason: CullReason) -> Judgement {
+pub(super) fn culled(reason: CullReason) -> Judgement {
     passing(Verdict::Cull(reason), 0)
 }
 
@@ -230,7 +249,8 @@ impl Placed<'_> {
         candidates: &[u32],
         narrowed: &mut Vec<u32>,
     ) -> Judgement {
-        let (box_a, box_b) = (self.view.end_box(a), self.view.end_box(b));
+        let (fixed_a, fixed_b) = (self.forest.fixed(a), self.forest.fixed(b));
+        let (box_a, box_b) = (self.view.end_box(fixed_a), self.view.end_box(fixed_b));
         let lit = |id| self.forest.kind(id) == Kind::Light;
         if (box_a.is_empty() && !lit(a)) || (box_b.is_empty() && !lit(b)) {
             return culled(CullReason::Absent);
@@ -248,29 +268,40 @@ impl Placed<'_> {
             return passing(Verdict::Refine(side), 0);
         }
         let body = self.body_of(a).filter(|&body| self.body_of(b) == Some(body));
-        // What is decided on two parts of one body must not depend on where the body is.
-        let (box_a, box_b) = match body {
-            Some(_) => (self.view.box_in_body(a), self.view.box_in_body(b)),
-            None => (box_a, box_b),
-        };
-        let one_body = body.is_some();
-        let is_behind = |(of, other): (ElementId, ElementId), bounds: &Aabb| {
-            self.box_is_behind(of, bounds, one_body)
-                .is_some_and(|is_in_plane| !is_in_plane || !self.may_touch(of, other, one_body))
-        };
-        if is_behind((a, b), box_b) || is_behind((b, a), box_a) {
+        if self.is_out_of_sight((a, b), body.is_some()) {
             return culled(CullReason::FacingAway);
         }
         BoxShaft::new(self.view, self.forest, (a, b), body).narrow(candidates, narrowed);
         // By area, which no motion changes: the extent of a group follows each of its bodies, and all
-        // pairs below would be made anew.
+        // pairs below would be made anew. What is above the coarse level comes first.
         let size = |id: ElementId| match self.forest.kind(id) {
+            _ if self.is_only_coarse((a, b), id) => -1.0,
             Kind::Element => 0.0,
             // What is distant has no area: it comes after all that has.
             _ => self.forest.area_m2(id).max(f64::MIN_POSITIVE),
         };
         let side = if no_smaller(size(a), size(b)) { Side::A } else { Side::B };
         passing(Verdict::Refine(side), 0)
+    }
+
+    /// Whether one end of a pair is wholly behind the plane of the other, and does not touch it.
+    pub(super) fn is_out_of_sight(&self, (a, b): (ElementId, ElementId), one_body: bool) -> bool {
+        // What is decided on two parts of one body must not depend on where the body is.
+        let bounds = |id| match one_body {
+            true => self.view.box_in_body(self.forest.fixed(id)),
+            false => self.view.end_box(self.forest.fixed(id)),
+        };
+        let is_behind = |of: ElementId, other: ElementId| {
+            self.box_is_behind(of, bounds(other), one_body)
+                .is_some_and(|is_in_plane| !is_in_plane || !self.may_touch(of, other, one_body))
+        };
+        is_behind(a, b) || is_behind(b, a)
+    }
+
+    /// Whether one end of a pair is a group, and the other is above the coarse level.
+    fn is_only_coarse(&self, (a, b): (ElementId, ElementId), id: ElementId) -> bool {
+        let other = if id == a { b } else { a };
+        self.is_group(id) && self.forest.coarse(other).is_none()
     }
 
     /// Whether a group may hold a patch that opposes a polygon or element.
@@ -523,7 +554,7 @@ impl Placed<'_> {
 
     /// Area at which an element weighs 1 in the error norm, m2: by the size of the scene, or of the connected patches that
     /// it belongs to where these are small.
-    fn reference_area(&self, brightness: &Brightness, id: ElementId) -> f64 {
+    pub(super) fn reference_area(&self, brightness: &Brightness, id: ElementId) -> f64 {
         let of_scene = brightness.reference_area_m2();
         let of_patch = |patch| CONNECTED_SHARE * self.forest.connected_m2(patch);
         self.forest.patch(id).map_or(of_scene, |patch| of_scene.min(of_patch(patch)))
@@ -872,7 +903,7 @@ impl<'a> BoxShaft<'a> {
     }
 
     /// Which of `parents` may block; clusters large against the shaft are opened.
-    fn narrow(&self, parents: &[u32], out: &mut Vec<u32>) {
+    pub(super) fn narrow(&self, parents: &[u32], out: &mut Vec<u32>) {
         let mut stack: Vec<u32> = parents.iter().rev().copied().collect();
         while let Some(id) = stack.pop() {
             let element = ElementId(id);
@@ -883,7 +914,8 @@ impl<'a> BoxShaft<'a> {
                 Some(patch) if self.is_spared_by(patch) => {}
                 Some(_) => out.push(id),
                 None => {
-                    let mixed = self.forest.cluster_body(element).is_none();
+                    let mixed = self.forest.cluster_body(element).is_none()
+                        && (self.own.is_some() || !self.forest.is_of_stage(element));
                     if !mixed && self.view.fixed_box(element).diagonal() <= self.keep_m {
                         out.push(id);
                     } else {

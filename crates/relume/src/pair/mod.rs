@@ -5,6 +5,7 @@
 
 mod brightness;
 mod certificate;
+mod groups;
 mod hash;
 mod judge;
 mod margin;

@@ -10,11 +10,12 @@ use crate::pair::{
     Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Record, Since, Stage, update,
 };
 use crate::scene::{self, BodyId, LightId, LightKind, World};
-use crate::solver::{Dirty, Links, Radiosity};
+use crate::solver::{Dirty, GroupLinks, Links, Radiosity};
 
 use super::ahead::{Ahead, Void, most_mean, while_extrapolated};
 use super::budget;
 use super::coarse::{self, Coarse};
+use super::groups::group_links;
 use super::promise::Promise;
 use super::report::FrameReport;
 use super::surfaces::{LitForest, apply_edits, links_of};
@@ -75,6 +76,7 @@ impl Session {
         report.seconds.evaluate = clock.lap();
 
         let mut dirty = self.edit_links(&mut solved, &changes, cold, &mut report);
+        solved.groups = group_links(&solved.forest, &solved.view, &solved.tree);
         if let Dirty::Some { parents, .. } = &mut dirty {
             let facets = solved.forest.near_facets();
             parents.extend(self.came_or_went(&solved, &old, facets));
@@ -89,10 +91,13 @@ impl Session {
         }
         report.seconds.judge = clock.lap();
 
-        let lit = LitForest::new(&self.scene, &solved.forest, now).present_in(&solved.view);
+        let lit = LitForest::new(&self.scene, &solved.forest, now)
+            .with_groups(&solved.groups)
+            .present_in(&solved.view);
         if relights {
             coarse::set_sources(now, (&solved.forest, &lit), &mut solved.radiosity);
         }
+        let dirty = if solved.groups.is_empty() { dirty } else { Dirty::All };
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
         let share = if cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE };
         let residual = self.options.tolerance * share;
@@ -216,6 +221,7 @@ impl Session {
             tree: PairTree::new(Forest::ROOT),
             hash: PairHash::default(),
             links: Links::default(),
+            groups: GroupLinks::default(),
             coarse: Coarse::default(),
             radiosity: Radiosity::default(),
             sound_mean_w_m2: 0.0,

@@ -7,7 +7,7 @@ use crate::pair::{self, Brightness, Carried, Changes, Held, Light};
 use crate::scene::{LightId, PatchId, Scene, World};
 use crate::solver::{Dirty, Link, Links, Radiosity, Stop, Surfaces};
 
-use super::surfaces::{LitForest, set_pairs};
+use super::surfaces::{CoarseReceivers, CoarseSurfaces, LitForest, set_pairs};
 
 /// Coarse elements are no larger than this share of the scene's area: some 1/31, which equal quadtrees do not meet
 /// exactly.
@@ -32,8 +32,10 @@ const LOST: f64 = 1e-4;
 pub(super) fn number(scene: &Scene, forest: &mut Forest) -> Vec<u32> {
     let largest = forest.area_m2(Forest::ROOT) * COARSE_SHARE;
     let mut out = Vec::new();
+    let groups = forest.groups().roots().to_vec();
     for patch in 0..scene.patches.len() as u32 {
         let mut stack = vec![forest.patch_root(PatchId(patch))];
+        stack.retain(|&root| !forest.is_in_group(root));
         while let Some(id) = stack.pop() {
             let whole = forest.kind(id) == Kind::Element
                 && (forest.area_m2(id) <= largest || !forest.can_split(id));
@@ -48,6 +50,10 @@ pub(super) fn number(scene: &Scene, forest: &mut Forest) -> Vec<u32> {
             };
             stack.extend(children.rev().map(ElementId));
         }
+    }
+    for group in groups {
+        forest.set_coarse(group, out.len());
+        out.push(group.0);
     }
     forest.keep_all();
     out
@@ -72,6 +78,7 @@ impl Coarse {
             let carried = Carried { visibility: u16::MAX, ..link.carried };
             pair::Link { carried, ..link }
         });
+        let seed = &CoarseReceivers(seed);
         set_pairs(&mut self.links, seed, changes.dropped.iter().copied(), held);
         set_pairs(&mut self.open, seed, changes.dropped.iter().copied(), open);
         self.links.tidy();
@@ -85,8 +92,12 @@ impl Coarse {
             self.links.sort(id);
             self.open.sort(id);
         }
-        let surfaces = LitForest::new(scene, seed, now).with_places();
-        self.radiosity = start(now, seed, &surfaces);
+        let lit = LitForest::new(scene, seed, now).with_places();
+        self.radiosity = start(now, seed, &lit);
+        let surfaces = CoarseSurfaces::new(lit);
+        for &group in seed.groups().roots() {
+            self.radiosity.set(group.0, surfaces.lit(group.0).exitance);
+        }
         self.radiosity.solve(&surfaces, &self.links, Dirty::All, Stop::Sweeps(SWEEPS));
         self.brightness = self.measure((scene, now), seed, coarse, &surfaces);
     }
@@ -96,7 +107,7 @@ impl Coarse {
         (scene, now): (&Scene, &World),
         seed: &Forest,
         coarse: &[u32],
-        surfaces: &LitForest<'_>,
+        surfaces: &CoarseSurfaces<'_>,
     ) -> Brightness {
         let total_area = seed.area_m2(Forest::ROOT);
         let mean = |v: [f32; 3]| v.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;

@@ -1,15 +1,18 @@
 //! How much there is to solve, said beforehand.
 //!
-//! What decides is how many pairs of patches face each other: all of them are judged, whatever the tolerance, and
-//! most of them become links. What refinement adds is small for many patches, and large for few. The numbers
-//! were fitted to scenes measured (docs/performance.md). Nothing that is solved depends on an estimate.
+//! What decides is how many pairs of patches face each other that are in no group: all of them are judged, whatever the
+//! tolerance, and most of them become links. What refinement adds is small for many patches, and large for few. Patches of groups
+//! cost a number of pairs each. The numbers were fitted to scenes measured (docs/performance.md). Nothing that is solved depends on an
+//! estimate.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::scene::{BodyId, Scene};
 
-use super::Options;
+use crate::element::grouped_patches;
+
+use super::{Options, Oracle};
 
 /// Pairs of patches that are tried at most: of more, an even share.
 const TRIED: u64 = 4_000_000;
@@ -85,25 +88,36 @@ impl Estimate {
         let placed = placed(scene, time_s);
         let extent_m = scene.bounds(time_s).map_or(0.0, |(low, high)| low.distance(high));
         let facing = count_facing(&placed, 1e-6 * extent_m, TRIED);
-        Estimate::from_counts(facing, placed.len() as u64, options.tolerance)
+        let patches = placed.len() as u64;
+        let grouped = match options.oracle {
+            Oracle::Error if options.groups => (grouped_patches(scene) as u64).min(patches),
+            _ => 0,
+        };
+        Estimate::from_counts(facing, (patches, grouped), options.tolerance)
     }
 
     /// See [`PAIRS_OF_PATCHES`] and what follows it.
-    fn from_counts(facing: u64, patches: u64, tolerance: f64) -> Estimate {
-        let n = patches as f64;
-        let base = n * (n - 1.0).max(0.0) / 2.0 + PAIRS_OF_FACING * facing as f64;
-        let finer = |(fixed, of_patch): (f64, f64)| {
+    fn from_counts(facing_of_all: u64, (patches, grouped): (u64, u64), tolerance: f64) -> Estimate {
+        let all = (patches as f64).max(1.0);
+        let of = |k: usize| {
+            // Those that groups are not made of, and some groups.
+            let n = (patches - grouped) as f64 + if grouped > 0 { GROUPS[k] } else { 0.0 };
+            let facing = facing_of_all as f64 * (n / all).min(1.0).powi(2);
+            let base = n * (n - 1.0).max(0.0) / 2.0 + PAIRS_OF_FACING * facing;
+            let (fixed, of_patch) = REFINED[k];
             let refined = (fixed + of_patch * n) * FITTED_AT / tolerance;
-            refined.min(facing as f64 * REFINED_MOST)
+            let finer = if k == 0 { 1.0 } else { (GROUPED_AT / tolerance).max(1.0) };
+            let of_groups = grouped as f64 * PAIRS_OF_GROUPED[k] * finer;
+            (PAIRS_OF_PATCHES[k] * base, refined.min(facing * REFINED_MOST) + of_groups)
         };
-        let pairs = [0, 1].map(|k| PAIRS_OF_PATCHES[k] * base + finer(REFINED[k]));
+        let pairs = [0, 1].map(|k| of(k).0 + of(k).1);
         Estimate {
             patches,
-            facing,
+            facing: facing_of_all,
             pairs: pairs.map(|pairs| pairs as u64),
             bytes: [0, 1].map(|k| (pairs[k] * BYTES[k]) as u64),
             core_seconds: [0, 1].map(|k| pairs[k] * SECONDS[k]),
-            by_refinement: 2.0 * finer(REFINED[1]) > pairs[1],
+            by_refinement: 2.0 * of(1).1 > pairs[1],
         }
     }
 }
@@ -117,6 +131,14 @@ const PAIRS_OF_FACING: f64 = 1.7;
 const REFINED: [(f64, f64); 2] = [(0.0, 100.0), (70_000.0, 2_000.0)];
 const FITTED_AT: f64 = 0.02;
 const REFINED_MOST: f64 = 1e4;
+
+/// Groups that are in no other, low and high.
+const GROUPS: [f64; 2] = [50.0, 600.0];
+
+/// Pairs for each patch of groups, low and high; the latter at the tolerance [`GROUPED_AT`], of finer ones in inverse
+/// proportion.
+const PAIRS_OF_GROUPED: [f64; 2] = [40.0, 700.0];
+const GROUPED_AT: f64 = 0.1;
 
 /// Bytes and seconds of one core for a pair, low and high.
 const BYTES: [f64; 2] = [55.0, 200.0];
@@ -184,9 +206,12 @@ mod tests {
 
     #[test]
     fn halls_of_thousands_of_polygons_are_no_matter_of_tolerance() {
-        let estimate = Estimate::from_counts(90_000_000, 33_000, 0.1);
+        let estimate = Estimate::from_counts(90_000_000, (33_000, 0), 0.1);
         assert!(estimate.pairs[0] > 400_000_000 && !estimate.by_refinement, "{estimate:?}");
-        assert!(Estimate::from_counts(40, 16, 0.005).by_refinement);
-        assert_eq!(Estimate::from_counts(0, 1, 0.02).pairs, [0, 0]);
+        // The same of small patches in groups.
+        let grouped = Estimate::from_counts(90_000_000, (33_000, 32_000), 0.1);
+        assert!(grouped.pairs[1] < 40_000_000 && grouped.by_refinement, "{grouped:?}");
+        assert!(Estimate::from_counts(40, (16, 0), 0.005).by_refinement);
+        assert_eq!(Estimate::from_counts(0, (1, 0), 0.02).pairs, [0, 0]);
     }
 }

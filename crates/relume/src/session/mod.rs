@@ -9,7 +9,7 @@ use crate::event::Ticks;
 use crate::geometry::Pose;
 use crate::pair::{LinkEvent, PairHash, PairTree};
 use crate::scene::{BodyId, Held, Patch, Scene, World};
-use crate::solver::{Links, Radiosity};
+use crate::solver::{GroupLinks, Links, Radiosity};
 use crate::transport::Simd;
 
 mod advance;
@@ -25,6 +25,7 @@ mod events;
 mod factors;
 mod frame;
 mod gather;
+mod groups;
 mod log;
 mod lossy;
 mod names;
@@ -50,7 +51,7 @@ pub use log::{Log, LogError};
 pub use lossy::{Missed, RadiosityError, missed, radiosity_error};
 pub use names::ElementName;
 pub use options::{Options, Oracle, Update};
-pub use report::{Energy, FrameReport, PairCounts, RowSumError, Seconds};
+pub use report::{Energy, FrameReport, LinkKinds, PairCounts, RowSumError, Seconds};
 pub use snapshot::{Leaf, Snapshot};
 pub use solution::Solution;
 pub use watch::Watch;
@@ -173,6 +174,7 @@ struct Solved {
     tree: PairTree,
     hash: PairHash,
     links: Links,
+    groups: GroupLinks,
     coarse: Coarse,
     radiosity: Radiosity,
     /// Mean radiosity when no link was extrapolated last, W/m2.
@@ -209,7 +211,7 @@ impl Session {
     pub fn new(scene: impl Into<Arc<Scene>>, options: Options) -> Result<Session, SessionError> {
         options.validate()?;
         let scene = scene.into();
-        let (seed, coarse_ids) = seed_of(&scene, options.oracle);
+        let (seed, coarse_ids) = seed_of(&scene, &options, &BTreeSet::new());
         let simd = Simd::detect();
         let (watch, solved, came_from) = (Arc::default(), None, None);
         let (held, time_s, frames) = (Held::default(), 0.0, 0);
@@ -360,9 +362,9 @@ impl Session {
     /// Goes on with another scene: nothing that was solved stays.
     fn change_scene(&mut self, scene: Scene) {
         self.scene = Arc::new(scene);
-        (self.seed, self.coarse_ids) = seed_of(&self.scene, self.options.oracle);
+        self.displaced = self.displaced_now();
+        (self.seed, self.coarse_ids) = seed_of(&self.scene, &self.options, &self.displaced);
         self.solved = None;
-        self.displaced = BTreeSet::new();
     }
 
     /// Tells the seed what hands have changed of it: which patches emit at any time, and which bodies at rest are where
@@ -370,8 +372,9 @@ impl Session {
     fn follow_hands(&mut self) {
         let displaced = self.displaced_now();
         if displaced != self.displaced {
-            if self.seed.cover(&self.scene, &|body| displaced.contains(&body)) {
-                self.solved = None;
+            let (seed, coarse_ids) = seed_of(&self.scene, &self.options, &displaced);
+            if !seed.is_as_displaced(&self.seed) {
+                (self.seed, self.coarse_ids, self.solved) = (seed, coarse_ids, None);
             }
             self.displaced = displaced;
         }
@@ -468,7 +471,7 @@ impl Session {
         let fixed = self.seed.memory_bytes() + self.seed.shared_bytes();
         let mut memory = Memory { fixed, ..Memory::default() };
         if let Some(s) = &self.solved {
-            memory.pairs = s.tree.memory_bytes() + s.links.pool_bytes();
+            memory.pairs = s.tree.memory_bytes() + s.links.pool_bytes() + s.groups.memory_bytes();
             memory.elements =
                 s.forest.memory_bytes() + s.radiosity.memory_bytes() + s.links.span_bytes();
             memory.fixed += s.coarse.memory_bytes();
@@ -484,9 +487,13 @@ impl Session {
 }
 
 /// The part of the forest that is always there, and its coarse elements by number.
-fn seed_of(scene: &Scene, oracle: Oracle) -> (Forest, Vec<u32>) {
-    let mut seed = Forest::new(scene);
-    let coarse_ids = match oracle {
+fn seed_of(scene: &Scene, options: &Options, displaced: &BTreeSet<BodyId>) -> (Forest, Vec<u32>) {
+    let is_displaced = |body: BodyId| displaced.contains(&body);
+    let mut seed = match (options.oracle, options.groups) {
+        (Oracle::Error, true) => Forest::with_groups(scene, &is_displaced),
+        _ => Forest::displaced(scene, &is_displaced),
+    };
+    let coarse_ids = match options.oracle {
         Oracle::Error => coarse::number(scene, &mut seed),
         Oracle::FormFactor { .. } => Vec::new(),
     };

@@ -11,6 +11,13 @@ use crate::scene::Scene;
 pub enum ElementName {
     /// A punctual light.
     Light(String),
+    /// A group of patches.
+    Group {
+        /// How many facets it has.
+        facets: u32,
+        /// The first of them.
+        first: Box<ElementName>,
+    },
     /// An element of a patch.
     Element {
         /// Its body.
@@ -30,6 +37,11 @@ pub enum ElementName {
 /// The name of an element or light by its key.
 pub(super) fn name_of(scene: &Scene, forest: &Forest, key: ElementKey) -> ElementName {
     let facet = ElementId(key.facet);
+    if let Some(group) = forest.group(facet) {
+        let leaves = forest.groups().leaves_of(group);
+        let first = name_of(scene, forest, ElementKey { facet: leaves[0].facet.0, path: 1 });
+        return ElementName::Group { facets: leaves.len() as u32, first: Box::new(first) };
+    }
     let Some(id) = forest.patch(facet) else {
         let light = forest.light(facet).expect("links end on elements and lights");
         return ElementName::Light(scene.lights[light].name.clone());
@@ -73,6 +85,7 @@ impl ElementName {
     pub fn short(&self) -> String {
         match self {
             ElementName::Light(name) => name.clone(),
+            ElementName::Group { facets, first } => format!("{}+{}", first.short(), facets - 1),
             ElementName::Element { surface, patch, facet, path, .. } => {
                 let mut out = surface.clone();
                 for (mark, number) in [('#', patch), ('/', facet)] {
@@ -91,6 +104,9 @@ impl fmt::Display for ElementName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (body, surface, patch, facet, path) = match self {
             ElementName::Light(name) => return write!(f, "light `{name}`"),
+            ElementName::Group { facets, first } => {
+                return write!(f, "group of {facets} facets from {first} on");
+            }
             ElementName::Element { body, surface, patch, facet, path } => {
                 (body, surface, patch, facet, path)
             }

@@ -9,6 +9,9 @@ pub struct Options {
     pub oracle: Oracle,
     /// How the pair tree follows the motion.
     pub update: Update,
+    /// Whether groups of small patches of one rigid body may be ends of links, where there are many such patches: with the
+    /// error oracle alone. Default true. Tables of form factors go without.
+    pub groups: bool,
     /// Whether every step measures row sums and energies: a pass over all links, whatever moved.
     pub balance: bool,
     /// Whether every step keeps the events of its links, for [`Session::events`](super::Session::events).
@@ -23,6 +26,7 @@ impl Default for Options {
             tolerance: 0.02,
             oracle: Oracle::Error,
             update: Update::Certificate,
+            groups: true,
             balance: true,
             events: false,
             max_memory_bytes: None,

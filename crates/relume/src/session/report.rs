@@ -23,6 +23,9 @@ pub struct FrameReport {
     pub dynamic_links: u64,
     /// Nodes of the pair tree by state.
     pub pairs: PairCounts,
+    /// Links by what they end on; absent where no group of patches is an end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub link_kinds: Option<LinkKinds>,
     /// Pairs met on the walk through the pair tree: those examined, and those next to them that
     /// turned out to be unaffected.
     pub visited: u64,
@@ -87,6 +90,17 @@ pub struct PairCounts {
     pub refined: u64,
     /// Pairs that exchange nothing.
     pub culled: u64,
+}
+
+/// Links by what they end on: groups of patches, or elements (and lights).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct LinkKinds {
+    /// Between two elements.
+    pub element_element: u64,
+    /// Between a group and an element.
+    pub group_element: u64,
+    /// Between two groups.
+    pub group_group: u64,
 }
 
 /// |1 - row sum| over the leaf elements of one frame.
@@ -163,6 +177,7 @@ impl FrameReport {
             leaves: self.leaves,
             links: self.links,
             pairs: self.pairs,
+            link_kinds: self.link_kinds,
             residual: self.residual,
             row_sum_error: self.row_sum_error,
             energy: self.energy,

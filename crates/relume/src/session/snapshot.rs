@@ -113,7 +113,7 @@ pub(super) fn take(
     (links, radiosity): (&Links, &Radiosity),
 ) -> Snapshot {
     let (scene, forest) = (&session.scene, &solved.forest);
-    let surfaces = LitForest::new(scene, forest, &solved.world);
+    let surfaces = LitForest::new(scene, forest, &solved.world).with_groups(&solved.groups);
     let bends = Bends { simd: session.simd, solved, links, radiosity };
     let of_facet = |facet: ElementId, out: &mut Vec<Leaf>| {
         let lit = surfaces.lit(facet.0);

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::element::{ElementId, Forest, Kind, WorldView};
 use crate::pair::{self, Edit, PairTree};
 use crate::scene::{PatchId, Scene, World};
-use crate::solver::{Link, Links, LinksBuilder, Lit, Place, Surfaces};
+use crate::solver::{GroupLinks, Link, Links, LinksBuilder, Lit, Place, Surfaces};
 
 /// A forest with its materials at one instant.
 pub(super) struct LitForest<'a> {
@@ -15,6 +15,7 @@ pub(super) struct LitForest<'a> {
     patch_lit: Vec<Lit>,
     /// Places of all elements, where they were worth computing ahead.
     places: Vec<Place>,
+    groups: Option<&'a GroupLinks>,
 }
 
 impl<'a> LitForest<'a> {
@@ -25,7 +26,13 @@ impl<'a> LitForest<'a> {
             Lit { reflectance: single(now.reflectance(scene, patch)), exitance }
         };
         let patch_lit = scene.patches.iter().map(of_patch).collect();
-        LitForest { forest, patch_lit, places: Vec::new() }
+        LitForest { forest, patch_lit, places: Vec::new(), groups: None }
+    }
+
+    /// With links that end on groups.
+    pub(super) fn with_groups(mut self, groups: &'a GroupLinks) -> LitForest<'a> {
+        self.groups = (!groups.is_empty()).then_some(groups);
+        self
     }
 
     /// Absent bodies emit nothing: they do not count in the mean that residuals are relative to.
@@ -104,6 +111,108 @@ impl Surfaces for LitForest<'_> {
         let patch = self.forest.patch(ElementId(facet)).expect("elements have patches");
         &self.patch_lit[patch.0 as usize]
     }
+
+    fn groups(&self) -> Option<&GroupLinks> {
+        self.groups
+    }
+}
+
+/// The coarse elements as the coarse solution sees them: groups as facets, of the mean material of their patches.
+pub(super) struct CoarseSurfaces<'a> {
+    lit: LitForest<'a>,
+    /// Facets that are in no group, and groups that are in no other; ascending.
+    facets: Vec<ElementId>,
+    /// By place in [`Forest::groups`]' roots.
+    means: Vec<Lit>,
+}
+
+impl<'a> CoarseSurfaces<'a> {
+    pub(super) fn new(lit: LitForest<'a>) -> CoarseSurfaces<'a> {
+        let forest = lit.forest;
+        let groups = forest.groups();
+        let roots = groups.roots().iter();
+        let is_free = |facet: &&ElementId| !forest.is_in_group(**facet);
+        let free = forest.near_facets().iter().filter(is_free).copied();
+        let mut facets: Vec<ElementId> = free.chain(roots.clone().copied()).collect();
+        facets.sort_unstable();
+        let mean_of = |root: &ElementId| {
+            let group = forest.group(*root).expect("a root is a group");
+            let mut sum = Lit { reflectance: [0.0; 3], exitance: [0.0; 3] };
+            let leaves = groups.leaves_of(group);
+            let area: f64 = leaves.iter().map(|leaf| leaf.area_m2).sum();
+            for leaf in leaves {
+                let (own, share) = (lit.lit(leaf.facet.0), (leaf.area_m2 / area) as f32);
+                for c in 0..3 {
+                    sum.reflectance[c] += share * own.reflectance[c];
+                    sum.exitance[c] += share * own.exitance[c];
+                }
+            }
+            sum
+        };
+        let means = roots.clone().map(mean_of).collect();
+        CoarseSurfaces { lit, facets, means }
+    }
+}
+
+impl Surfaces for CoarseSurfaces<'_> {
+    fn len(&self) -> usize {
+        self.lit.len()
+    }
+
+    fn facets(&self) -> &[ElementId] {
+        &self.facets
+    }
+
+    fn is_surface(&self, id: u32) -> bool {
+        self.lit.is_surface(id)
+    }
+
+    fn facet_of(&self, id: u32) -> u32 {
+        self.lit.facet_of(id)
+    }
+
+    fn parent(&self, id: u32) -> Option<u32> {
+        self.lit.parent(id)
+    }
+
+    fn children(&self, id: u32) -> Range<u32> {
+        match self.lit.forest.group(ElementId(id)) {
+            Some(_) => 0..0,
+            None => self.lit.children(id),
+        }
+    }
+
+    fn area_m2(&self, id: u32) -> f64 {
+        self.lit.area_m2(id)
+    }
+
+    fn place(&self, id: u32) -> Place {
+        self.lit.place(id)
+    }
+
+    fn lit(&self, facet: u32) -> &Lit {
+        match self.lit.forest.groups().root_number(ElementId(facet)) {
+            Some(number) => &self.means[number],
+            None => self.lit.lit(facet),
+        }
+    }
+}
+
+/// Who receives in the coarse solution: groups too.
+pub(super) struct CoarseReceivers<'a>(pub(super) &'a Forest);
+
+impl Receivers for CoarseReceivers<'_> {
+    fn room(&self) -> usize {
+        self.0.len()
+    }
+
+    fn receives(&self, id: ElementId) -> bool {
+        self.0.receives(id) || self.0.group(id).is_some()
+    }
+
+    fn receiving_area_m2(&self, id: ElementId) -> f64 {
+        self.0.area_m2(id)
+    }
 }
 
 /// Who receives over links: all that turning pairs into links asks of a hierarchy.
@@ -116,6 +225,10 @@ pub(crate) trait Receivers {
     fn receiving_area_m2(&self, id: ElementId) -> f64;
     /// Whether two elements rest against each other, so that what they exchange counts for nothing.
     fn rest_in_contact(&self, _a: ElementId, _b: ElementId) -> bool {
+        false
+    }
+    /// Whether a link that ends there is gathered in another way.
+    fn is_apart(&self, _id: ElementId) -> bool {
         false
     }
 }
@@ -136,6 +249,10 @@ impl Receivers for Forest {
     fn rest_in_contact(&self, a: ElementId, b: ElementId) -> bool {
         Forest::rest_in_contact(self, a, b)
     }
+
+    fn is_apart(&self, id: ElementId) -> bool {
+        self.group(id).is_some()
+    }
 }
 
 /// Both directions of a link: (receiver, link), for the ends that receive. Links of visibility 0
@@ -149,7 +266,8 @@ pub(super) fn directions(
     let g = carried.gradients;
     let exchange = if forest.rest_in_contact(link.a, link.b) { 0.0 } else { exchange };
     let one = |receiver: ElementId, source: ElementId, over_receiver, over_source| {
-        let receives = forest.receives(receiver) && exchange > 0.0;
+        let apart = forest.is_apart(link.a) || forest.is_apart(link.b);
+        let receives = forest.receives(receiver) && exchange > 0.0 && !apart;
         receives.then(|| {
             let coupling = exchange / forest.receiving_area_m2(receiver) as f32;
             // Nothing at all would take the link out.

@@ -16,6 +16,7 @@ pub(super) fn fill(report: &mut FrameReport, solved: &Solved) {
     report.links = counts.active;
     report.pairs =
         PairCounts { active: counts.active, refined: counts.refined, culled: counts.culled };
+    report.link_kinds = super::groups::kinds(&solved.forest, &solved.tree);
     (report.elements, report.leaves) =
         (solved.forest.counts().elements, solved.forest.counts().leaves);
     report.sweeps = solved.radiosity.sweeps;
@@ -43,7 +44,10 @@ pub(super) fn dynamic_links(
     moved: &dyn Fn(BodyId) -> bool,
     light_moved: &dyn Fn(usize) -> bool,
 ) -> u64 {
-    let body = |id| forest.patch(id).map(|p| scene.patches[p.0 as usize].body);
+    let body = |id| match forest.patch(id) {
+        Some(patch) => Some(scene.patches[patch.0 as usize].body),
+        None => forest.cluster_body(id),
+    };
     let moves = |id| match forest.light(id) {
         Some(light) => light_moved(light),
         None => body(id).is_some_and(moved),
@@ -54,7 +58,7 @@ pub(super) fn dynamic_links(
 
 fn balance(scene: &Scene, solved: &Solved) -> (RowSumError, Energy) {
     let forest = &solved.forest;
-    let surfaces = LitForest::new(scene, forest, &solved.world);
+    let surfaces = LitForest::new(scene, forest, &solved.world).with_groups(&solved.groups);
     let present = |facet: &ElementId| {
         let patch = forest.patch(*facet).expect("has a patch");
         solved.view.is_present(scene.patches[patch.0 as usize].body)
@@ -174,7 +178,7 @@ pub(super) fn suspects(scene: &Scene, solved: &Solved) -> Vec<String> {
 /// Row sums of all leaves.
 pub(super) fn row_sums_of(scene: &Scene, solved: &Solved) -> Vec<(ElementId, f64)> {
     let forest = &solved.forest;
-    let surfaces = LitForest::new(scene, forest, &solved.world);
+    let surfaces = LitForest::new(scene, forest, &solved.world).with_groups(&solved.groups);
     let is_surface = |id: u32| forest.receives(ElementId(id));
     let mut out = Vec::with_capacity(forest.counts().leaves as usize);
     for facet in forest.near_facets() {

@@ -4,6 +4,7 @@
 
 mod field;
 mod gather;
+mod groups;
 mod jump;
 mod links;
 mod push;
@@ -14,6 +15,7 @@ mod trend;
 mod work;
 
 pub use field::Linear;
+pub use groups::{GroupEnd, GroupLink, GroupLinks};
 pub use links::{Link, Links, LinksBuilder};
 pub use push::row_sums;
 pub use radiosity::{Radiosity, Stop};

@@ -29,7 +29,10 @@ pub fn row_sums(
             let per_radius = 1.0 / surfaces.place(id).radius;
             sum.gradient.iter_mut().for_each(|g| g[0] *= per_radius);
         }
-        sum
+        match surfaces.groups() {
+            Some(groups) => sum.plus(&groups.row(id, linear)),
+            None => sum,
+        }
     };
     let place = surfaces.place(facet);
     push(surfaces, (facet, &place), &Linear::default(), &own, &mut |id, sum| {

@@ -67,6 +67,9 @@ pub struct Radiosity {
     held: f32,
 }
 
+/// Links of elements, and what comes to an element over groups, if there are any.
+type Sources<'a> = (&'a Links, &'a dyn Fn(u32) -> Option<Linear>);
+
 /// Sweeps after which a solve is given up as not converging (reflectances are below 1).
 const SWEEPS_MAX: u32 = 2_000;
 
@@ -321,11 +324,17 @@ impl Radiosity {
     ) -> f32 {
         let mut small = 0.0_f32;
         work.changed.clear();
+        let moment = surfaces.source_moment();
+        let arriving = surfaces
+            .groups()
+            .map(|groups| (groups, groups.arriving(&|id| self.radiosity.get(id), moment)));
         let mut scratch = std::mem::take(&mut work.scratch);
         for batch in 0..work.batches.len() {
             let mut now = work.take(surfaces, batch);
             let most_owed = if work.all { None } else { Some(limit) };
-            self.gather((surfaces, links), &mut now, most_owed, &mut scratch.gathered);
+            let over_groups = |id: u32| arriving.as_ref().map(|(groups, all)| groups.at(all, id));
+            let sources = (links, &over_groups as &dyn Fn(u32) -> Option<Linear>);
+            self.gather((surfaces, sources), &mut now, most_owed, &mut scratch.gathered);
             let way = if work.all { None } else { Some(work.way.mark(surfaces, &mut now)) };
             self.settle(surfaces, &now.facets, (limit, way), &mut scratch.settled);
             for settled in &scratch.settled[..now.facets.len()] {
@@ -366,11 +375,11 @@ impl Radiosity {
         if area > 0.0 { flux / area } else { 0.0 }
     }
 
-    /// Gathers the receivers of a batch anew. Those below which no more than `most_owed` is owed after that are
-    /// left out of it.
+    /// Gathers the receivers of a batch anew: over links, and what comes over groups. Those below which no more than
+    /// `most_owed` is owed after that are left out of it.
     fn gather(
         &mut self,
-        (surfaces, links): (&impl Surfaces, &Links),
+        (surfaces, (links, over_groups)): (&impl Surfaces, Sources<'_>),
         batch: &mut Batch,
         most_owed: Option<f32>,
         found: &mut Vec<Linear>,
@@ -393,7 +402,8 @@ impl Radiosity {
         }
         let mut next = found.iter();
         receivers.retain(|&id| {
-            let h = next.next().expect("one for each receiver");
+            let own = next.next().expect("one for each receiver");
+            let h = &over_groups(id).map_or(*own, |groups| own.plus(&groups));
             let Some(most) = most_owed else {
                 gathered.set(id, h);
                 owed[id as usize] = 0.0;

@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::element::ElementId;
 
 use super::field::Linear;
+use super::groups::GroupLinks;
 
 /// Reflectance and exitance of one material, linear RGB.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,6 +91,10 @@ pub trait Surfaces: Sync {
     fn place(&self, id: u32) -> Place;
     /// What a facet is made of.
     fn lit(&self, facet: u32) -> &Lit;
+    /// Links that end on groups of facets, if there are any.
+    fn groups(&self) -> Option<&GroupLinks> {
+        None
+    }
     /// Mean of x^2 / radius^2 over an element, for the product of two gradients: 1/6 for a square.
     fn source_moment(&self) -> f32 {
         SQUARE_MOMENT

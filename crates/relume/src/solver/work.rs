@@ -28,6 +28,8 @@ pub(super) struct Work {
     marks: Vec<u64>,
     /// Every sweep gathers everything.
     pub(super) all: bool,
+    /// Sweeps are over everything to the end: who gathers from a group is not known by element.
+    always_all: bool,
     /// Elements that the last sweep changed by more than the limit, and by how much.
     pub(super) changed: Vec<(u32, f32)>,
     pub(super) way: Way,
@@ -83,12 +85,15 @@ impl Work {
             batch_of,
             marks,
             all: false,
+            always_all: surfaces.groups().is_some(),
             changed: Vec::new(),
             way: Way::new(surfaces.len()),
             scratch: Scratch::default(),
         };
         match dirty {
-            Dirty::Some { receivers, parents } if receivers.len() <= surfaces.len() / MANY => {
+            Dirty::Some { receivers, parents }
+                if receivers.len() <= surfaces.len() / MANY && !work.always_all =>
+            {
                 for parent in parents {
                     let batch = work.batch_of(surfaces, parent);
                     work.batches[batch].parents.push(parent);
@@ -170,6 +175,9 @@ impl Work {
         limit: f32,
         pending: &mut [f32],
     ) -> bool {
+        if self.all && self.always_all {
+            return !self.changed.is_empty();
+        }
         let many = self.changed.len() > surfaces.len() / if self.all { FEW } else { MANY };
         if self.all && !many {
             // From now on only what depends on a change.

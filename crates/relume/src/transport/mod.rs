@@ -7,6 +7,7 @@ mod clip;
 mod contact;
 mod contour;
 mod exchange;
+mod group;
 mod kernel;
 mod lookout;
 mod point;
@@ -21,6 +22,7 @@ pub use exchange::{
     Exchange, Meeting, Variation, contact_exchange, exchange, exchange_by_points,
     exchange_of_points, light_at, light_exchange, meeting,
 };
+pub use group::{GROUP_SEGMENTS, GroupSight, Slope, Spread, common_body};
 pub use kernel::Simd;
 pub use lookout::{CELLS_MAX, Clipping, FactorPast, Looker, Lookout, form_factor_past};
 pub use point::form_factor_from_point;

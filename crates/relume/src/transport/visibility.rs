@@ -479,8 +479,9 @@ impl<'a> Shaft<'a> {
         if !shaft.meets(bounds, self.slack()) {
             return true;
         }
-        // Groups of bodies are never kept: their boxes mix frames.
-        if body.is_some() && bounds.diagonal() <= keep_m {
+        // Groups of bodies are never kept: their boxes mix frames. What never moves is in the world.
+        let in_one_frame = body.is_some() || (self.own.is_none() && self.forest.is_of_stage(id));
+        if in_one_frame && bounds.diagonal() <= keep_m {
             return visit(id, Standing::Beside);
         }
         self.forest.children(id).all(|c| self.walk(shafts, ElementId(c), keep_m, visit))

@@ -1,0 +1,348 @@
+//! Groups: clusters of small patches of one rigid body that may be ends of links.
+//!
+//! Which there are, and all that is known of them, is a pure function of the scene: in the frame of the body, or in the
+//! world for what never moves, which counts as one rigid body. Must not know light or links.
+
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::forest::{ElementId, Forest, Kind};
+use crate::geometry::Pose;
+use crate::scene::{BodyId, Scene};
+
+/// A patch of at most this share of the scene's area is small: larger ones are ends of links themselves.
+const SMALL_SHARE: f64 = 1.0 / 2_000.0;
+
+/// A rigid body of fewer small patches has no groups.
+const PATCHES_MIN: usize = 64;
+
+/// Share of the scene's area that a group has at most.
+const AREA_SHARE: f64 = 1.0 / 128.0;
+
+/// Share of the scene's diagonal that a group's box is at most across.
+const ACROSS_SHARE: f64 = 1.0 / 8.0;
+
+/// Height over the plane of a face, in radii of a group, from which a corner counts as in front of it.
+const IN_FRONT: f64 = 1e-6;
+
+/// Sorts of patches that are planted apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sort {
+    /// As large as a group.
+    Large,
+    /// Small, and emits light at some time.
+    Shines,
+    /// Small, and does not.
+    Small,
+}
+
+impl Sort {
+    pub(super) const ALL: [Sort; 3] = [Sort::Large, Sort::Shines, Sort::Small];
+}
+
+/// How the bodies of a scene are planted. By default each for itself, in one tree.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Layout {
+    /// By patch; empty if no body is sorted.
+    sorts: Vec<Sort>,
+    /// By body: whether its patches are planted by sorts.
+    sorted: Vec<bool>,
+    /// By body: whether it is planted together with all others that never move.
+    staged: Vec<bool>,
+}
+
+impl Layout {
+    /// How they are where some bodies that never move in the clip are displaced. Cost: proportional to the patches.
+    pub(super) fn of(scene: &Scene, is_displaced: &dyn Fn(BodyId) -> bool) -> Layout {
+        let small_m2 = SMALL_SHARE * scene.area_m2();
+        let sort_of = |patch: &crate::scene::Patch| match patch.area_m2() > small_m2 {
+            true => Sort::Large,
+            false if scene.patch_emits(patch) => Sort::Shines,
+            false => Sort::Small,
+        };
+        let sorts: Vec<Sort> = scene.patches.iter().map(sort_of).collect();
+        let bodies = || (0..scene.bodies.len() as u32).map(BodyId);
+        let small = |body: BodyId| {
+            let patches = scene.bodies[body.0 as usize].patches.clone();
+            patches.filter(|&patch| sorts[patch as usize] != Sort::Large).count()
+        };
+        let rests =
+            |body: &BodyId| !scene.is_distant(*body) && !scene.moves(*body) && !is_displaced(*body);
+        let resting: usize = bodies().filter(rests).map(small).sum();
+        let sorted =
+            |body: BodyId| !rests(&body) && !scene.is_distant(body) && small(body) >= PATCHES_MIN;
+        let staged = |body: BodyId| rests(&body) && resting >= PATCHES_MIN;
+        let layout = Layout {
+            sorted: bodies().map(sorted).collect(),
+            staged: bodies().map(staged).collect(),
+            sorts,
+        };
+        if layout.has_groups() { layout } else { Layout::default() }
+    }
+
+    /// How many patches are small and may be in groups.
+    fn small_count(&self) -> usize {
+        self.sorts.iter().filter(|&&sort| sort != Sort::Large).count()
+    }
+
+    /// Whether there may be any groups.
+    pub(super) fn has_groups(&self) -> bool {
+        self.sorted.contains(&true) || self.staged.contains(&true)
+    }
+
+    pub(super) fn is_sorted(&self, body: u32) -> bool {
+        self.sorted.get(body as usize).is_some_and(|&sorted| sorted)
+    }
+
+    pub(super) fn is_staged(&self, body: u32) -> bool {
+        self.staged.get(body as usize).is_some_and(|&staged| staged)
+    }
+
+    pub(super) fn sort(&self, patch: u32) -> Sort {
+        self.sorts.get(patch as usize).copied().unwrap_or(Sort::Large)
+    }
+}
+
+/// How many patches of a scene groups are made of ([`Forest::with_groups`]); 0 where there are none. Cost: proportional to
+/// the patches.
+pub fn grouped_patches(scene: &Scene) -> usize {
+    Layout::of(scene, &|_| false).small_count()
+}
+
+/// A facet of a group, as a point that radiates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroupLeaf {
+    /// The facet.
+    pub facet: ElementId,
+    /// Centroid, metres.
+    pub centre: DVec3,
+    /// Unit normal.
+    pub normal: DVec3,
+    /// Area, m2.
+    pub area_m2: f64,
+}
+
+/// What is known of a cluster that may be an end of links: in the frame of its body, or in the world if it is of several
+/// bodies that never move.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Group {
+    /// Its facets, by their places in [`Groups::leaves`].
+    pub leaves: Range<u32>,
+    /// Area-weighted middle of its facets, metres.
+    pub centre: DVec3,
+    /// Largest distance of a corner from the middle, metres.
+    pub radius: f64,
+    /// Its body; `None` for what never moves.
+    pub body: Option<BodyId>,
+    /// Whether no corner of it is in front of any of its planes: nothing of it sees anything else of it.
+    pub is_convex: bool,
+    /// The convex solid that all of its facets are of, if there is one.
+    pub solid: Option<u32>,
+}
+
+/// All groups of a forest.
+#[derive(Clone, Debug, Default)]
+pub struct Groups {
+    list: Vec<Group>,
+    /// Their ids.
+    ids: Vec<ElementId>,
+    /// Number of each node's group, by id; [`NONE`] for what is none.
+    numbers: Vec<u32>,
+    /// Places in `leaves` of what is at or below a node, by id; empty outside groups.
+    spans: Vec<Range<u32>>,
+    leaves: Vec<GroupLeaf>,
+    /// Those that are in no other.
+    roots: Vec<ElementId>,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Groups {
+    /// Those of a forest that is planted.
+    pub(super) fn of(scene: &Scene, forest: &Forest, layout: &Layout) -> Groups {
+        let len = forest.fixed_len() as usize;
+        let numbers = vec![NONE; len];
+        let spans = vec![0..0; len];
+        let mut out = Groups { numbers, spans, ..Groups::default() };
+        let area_max = AREA_SHARE * scene.area_m2();
+        let across_max =
+            scene.bounds(0.0).map_or(0.0, |(low, high)| ACROSS_SHARE * low.distance(high));
+        let mut stack = vec![Forest::ROOT];
+        while let Some(id) = stack.pop() {
+            let rigid = forest.cluster_body(id).is_some() || forest.is_of_stage(id);
+            if !rigid || forest.is_distant(id) {
+                if forest.kind(id) == Kind::Cluster {
+                    stack.extend(forest.children(id).rev().map(ElementId));
+                }
+                continue;
+            }
+            let fits = forest.area_m2(id) <= area_max
+                && 2.0 * reach_of(scene, forest, id) <= across_max
+                && is_of_one_small_sort(forest, layout, id);
+            if fits {
+                out.roots.push(id);
+                out.add(scene, forest, id);
+            } else {
+                stack.extend(forest.children(id).rev().map(ElementId));
+            }
+        }
+        out.roots.sort_unstable();
+        out
+    }
+
+    /// Adds a cluster with all below it; returns whether it is convex.
+    fn add(&mut self, scene: &Scene, forest: &Forest, id: ElementId) -> bool {
+        let start = self.leaves.len() as u32;
+        if forest.kind(id) == Kind::Element {
+            self.leaves.push(leaf_of(scene, forest, id));
+        }
+        let mut convex = true;
+        for child in forest.children(id).map(ElementId) {
+            convex &= self.add(scene, forest, child);
+        }
+        let leaves = start..self.leaves.len() as u32;
+        self.spans[id.0 as usize] = leaves.clone();
+        if forest.kind(id) != Kind::Cluster {
+            return true;
+        }
+        let own = &self.leaves[leaves.start as usize..leaves.end as usize];
+        let area: f64 = own.iter().map(|leaf| leaf.area_m2).sum();
+        let centre = own.iter().map(|leaf| leaf.centre * leaf.area_m2).sum::<DVec3>() / area;
+        let corners: Vec<DVec3> =
+            own.iter().flat_map(|leaf| corners_of(scene, forest, leaf.facet)).collect();
+        let radius = corners.iter().map(|c| c.distance(centre)).fold(0.0, f64::max);
+        let in_front = |leaf: &GroupLeaf, corner: &DVec3| {
+            leaf.normal.dot(*corner - leaf.centre) > IN_FRONT * radius
+        };
+        let is_convex =
+            convex && !own.iter().any(|leaf| corners.iter().any(|corner| in_front(leaf, corner)));
+        let solid_of = |leaf: &GroupLeaf| forest.patch(leaf.facet).and_then(|p| forest.solid(p));
+        let first = solid_of(&own[0]);
+        let solid = first.filter(|_| own.iter().all(|leaf| solid_of(leaf) == first));
+        self.numbers[id.0 as usize] = self.list.len() as u32;
+        self.ids.push(id);
+        let body = forest.cluster_body(id);
+        self.list.push(Group { leaves, centre, radius, body, is_convex, solid });
+        is_convex
+    }
+
+    /// The group that a node is.
+    #[inline]
+    pub(super) fn get(&self, id: ElementId) -> Option<&Group> {
+        let number = *self.numbers.get(id.0 as usize)?;
+        self.list.get(number as usize)
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// Ids of all groups.
+    pub fn ids(&self) -> impl Iterator<Item = ElementId> + '_ {
+        self.ids.iter().copied()
+    }
+
+    /// Those that are in no other.
+    pub fn roots(&self) -> &[ElementId] {
+        &self.roots
+    }
+
+    /// Which of [`Groups::roots`] a node is, if it is one.
+    pub fn root_number(&self, id: ElementId) -> Option<usize> {
+        self.roots.binary_search(&id).ok()
+    }
+
+    /// The facets of all groups: those of each side by side.
+    pub fn leaves(&self) -> &[GroupLeaf] {
+        &self.leaves
+    }
+
+    /// The facets of one group.
+    pub fn leaves_of(&self, group: &Group) -> &[GroupLeaf] {
+        &self.leaves[group.leaves.start as usize..group.leaves.end as usize]
+    }
+
+    /// Whether a node of the fixed part is a group's, or at or below it.
+    pub fn is_within(&self, id: ElementId, group: &Group) -> bool {
+        let Some(span) = self.spans.get(id.0 as usize) else { return false };
+        !span.is_empty() && span.start >= group.leaves.start && span.end <= group.leaves.end
+    }
+
+    /// Whether a node of the fixed part is in some group, or one itself.
+    pub(super) fn holds(&self, id: ElementId) -> bool {
+        self.spans.get(id.0 as usize).is_some_and(|span| !span.is_empty())
+    }
+
+    /// Bytes held.
+    pub(super) fn memory_bytes(&self) -> u64 {
+        let lists = self.list.capacity() * size_of::<Group>()
+            + self.leaves.capacity() * size_of::<GroupLeaf>();
+        let by_id = self.numbers.capacity() * 4 + self.spans.capacity() * 8;
+        (lists + by_id + (self.ids.capacity() + self.roots.capacity()) * 4) as u64
+    }
+}
+
+/// The pose that takes a facet's body to the frame that groups of it are in.
+fn pose_of(scene: &Scene, forest: &Forest, facet: ElementId) -> Pose {
+    let patch = forest.patch(facet).expect("a facet has a patch");
+    let body = scene.patches[patch.0 as usize].body;
+    match scene.moves(body) {
+        true => Pose::IDENTITY,
+        false => scene.pose(body, 0.0).unwrap_or(Pose::IDENTITY),
+    }
+}
+
+fn leaf_of(scene: &Scene, forest: &Forest, facet: ElementId) -> GroupLeaf {
+    let patch = forest.patch(facet).expect("a facet has a patch");
+    let frame = scene.patches[patch.0 as usize].frame;
+    let pose = pose_of(scene, forest, facet);
+    let shape = forest.shape(facet);
+    GroupLeaf {
+        facet,
+        centre: pose.point(frame.point(shape.centroid())),
+        normal: pose.direction(frame.normal),
+        area_m2: shape.area(),
+    }
+}
+
+fn corners_of(scene: &Scene, forest: &Forest, facet: ElementId) -> [DVec3; 4] {
+    let patch = forest.patch(facet).expect("a facet has a patch");
+    let frame = scene.patches[patch.0 as usize].frame;
+    let pose = pose_of(scene, forest, facet);
+    forest.shape(facet).corners.map(|c| pose.point(frame.point(c)))
+}
+
+/// Half the diagonal of the box of a node, metres.
+fn reach_of(scene: &Scene, forest: &Forest, id: ElementId) -> f64 {
+    let mut bounds = crate::geometry::Aabb::EMPTY;
+    for_each_facet(forest, id, &mut |facet| {
+        for corner in corners_of(scene, forest, facet) {
+            bounds = bounds.with(corner);
+        }
+    });
+    0.5 * bounds.diagonal()
+}
+
+/// Whether all patches of a node are small, and either all of them shine or none.
+fn is_of_one_small_sort(forest: &Forest, layout: &Layout, id: ElementId) -> bool {
+    let (mut all, mut first) = (true, None);
+    for_each_facet(forest, id, &mut |facet| {
+        let patch = forest.patch(facet).expect("a facet has a patch");
+        let sort = layout.sort(patch.0);
+        all &= sort != Sort::Large && *first.get_or_insert(sort) == sort;
+    });
+    all
+}
+
+fn for_each_facet(forest: &Forest, id: ElementId, visit: &mut dyn FnMut(ElementId)) {
+    let mut stack = vec![id];
+    while let Some(id) = stack.pop() {
+        if forest.kind(id) == Kind::Element {
+            visit(id);
+        } else {
+            stack.extend(forest.children(id).map(ElementId));
+        }
+    }
+}

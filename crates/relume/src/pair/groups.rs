@@ -1,0 +1,260 @@
+//! Judging pairs of which an end is a group of patches.
+
+use crate::element::{ElementId, Kind};
+use crate::geometry::no_smaller;
+use crate::transport::{GroupSight, Spread, common_body, light_at};
+
+use super::brightness::Brightness;
+use super::hash::pair_key;
+use super::judge::{BoxShaft, Placed, Stage, body_of, culled, passing};
+use super::margin::{Margin, SideMargin};
+use super::oracle::{Oracle, Side};
+use super::tree::{Carried, CullReason, Gradients, in_steps};
+use super::update::{Judgement, Verdict};
+
+/// Distance of two ends, in sums of their radii, below which they are refined whatever they bring.
+const APART: f64 = 1.3;
+
+/// Weight of the second order in size over distance, of either end: what facets at their own places leave out.
+const PLACE: f64 = 1.0;
+
+/// Weight of the standard deviation of visibility between the segments of a pair: what all facets of an end share.
+const SHARED: f64 = 1.0;
+
+/// Visibility that sixteen segments may miss, as a variance.
+const MISSED: f64 = 0.02;
+
+/// Share of its area that a group shows, for each radius over distance of the other end, beyond what it shows to its middle.
+const TURNED: f64 = 0.5;
+
+/// What a group pair carries, before occlusion.
+struct GroupExchange {
+    area_m2: f64,
+    /// Radius over distance of both ends.
+    size: (f64, f64),
+    /// What each end may show the other at most, m2.
+    shows_m2: (f64, f64),
+}
+
+impl Placed<'_> {
+    /// Whether a node is a cluster that may be an end of links.
+    pub(super) fn is_group(&self, id: ElementId) -> bool {
+        self.forest.group(id).is_some()
+    }
+
+    /// Whether a pair of which an end is a group is decided as one: both ends are at or below the coarse level, and what is
+    /// distant meets groups in the coarse solution only.
+    pub(super) fn is_group_pair(&self, a: ElementId, b: ElementId) -> bool {
+        let is_end = |id| {
+            self.forest.coarse(id).is_some()
+                && (self.is_group(id) || self.forest.kind(id) == Kind::Element)
+        };
+        let coarse = matches!(self.stage, Stage::Coarse);
+        let distant = self.forest.is_distant(a) || self.forest.is_distant(b);
+        (self.is_group(a) || self.is_group(b)) && is_end(a) && is_end(b) && (coarse || !distant)
+    }
+
+    /// Judges a pair of a group with a group or an element.
+    pub(super) fn judge_group_pair(
+        &self,
+        (a, b): (ElementId, ElementId),
+        candidates: &[u32],
+        narrowed: &mut Vec<u32>,
+    ) -> Judgement {
+        if self.view.end_box(self.forest.fixed(a)).is_empty()
+            || self.view.end_box(self.forest.fixed(b)).is_empty()
+        {
+            return culled(CullReason::Absent);
+        }
+        if a == b {
+            return match (self.forest.group(a).is_some_and(|group| group.is_convex), self.stage) {
+                (true, _) => culled(CullReason::FacingAway),
+                (false, Stage::Coarse) => passing(Verdict::Hold, 0),
+                (false, Stage::Fine(_)) => {
+                    narrowed.extend_from_slice(candidates);
+                    passing(Verdict::RefineSelf, 0)
+                }
+            };
+        }
+        let solid = |id: ElementId| match self.forest.group(id) {
+            Some(group) => group.solid,
+            None => self.forest.patch(id).and_then(|patch| self.forest.solid(patch)),
+        };
+        if solid(a).is_some() && solid(a) == solid(b) {
+            return culled(CullReason::FacingAway);
+        }
+        let body = body_of(self.forest, self.view, a)
+            .filter(|&body| body_of(self.forest, self.view, b) == Some(body));
+        // As of groups that are always refined: both stages agree on what is culled.
+        if self.is_out_of_sight((a, b), body.is_some()) {
+            return culled(CullReason::FacingAway);
+        }
+        let start = narrowed.len();
+        BoxShaft::new(self.view, self.forest, (a, b), body).narrow(candidates, narrowed);
+        let candidates = &narrowed[start..];
+        let common = common_body(self.forest, self.view, a, b);
+        let end = |id| Spread::new(self.forest, self.view, id, common);
+        let ends = (end(a), end(b));
+        let key = pair_key(self.forest.key(a), self.forest.key(b));
+        let sight = GroupSight { forest: self.forest, view: self.view, common, candidates };
+        let Stage::Fine(brightness) = self.stage else {
+            let (one, other) = match no_smaller(ends.0.radius, ends.1.radius) {
+                true => (&ends.0, &ends.1),
+                false => (&ends.1, &ends.0),
+            };
+            let area_m2 = one.rough_exchange_m2(other);
+            let (v, segments) = match area_m2 > 0.0 {
+                true => sight.visibility(&ends.0, &ends.1, key),
+                false => (1.0, 0),
+            };
+            return carrying(Verdict::Hold, area_m2, v, Margin::Firm, segments);
+        };
+        self.decide_group_pair((a, b), (&ends.0, &ends.1), &sight, key, brightness)
+    }
+
+    fn decide_group_pair(
+        &self,
+        (a, b): (ElementId, ElementId),
+        (end_a, end_b): (&Spread<'_>, &Spread<'_>),
+        sight: &GroupSight<'_>,
+        key: u64,
+        brightness: &Brightness,
+    ) -> Judgement {
+        let Oracle::Error { threshold } = self.oracle else {
+            unreachable!("only the error oracle has groups")
+        };
+        let side = self.larger_radius((a, end_a), (b, end_b));
+        let apart = end_a.centre.distance(end_b.centre);
+        let near = apart < APART * (end_a.radius + end_b.radius);
+        if let Some(side) = side.filter(|_| near) {
+            return passing(Verdict::Refine(side), 0);
+        }
+        let x = exchange_of(end_a, end_b);
+        let (v, segments) = match x.shows_m2.0 > 0.0 && x.shows_m2.1 > 0.0 {
+            true => sight.visibility(end_a, end_b, key),
+            false => (1.0, 0),
+        };
+        let on = [
+            self.group_error(brightness, (a, end_a.area_m2), (b, x.shows_m2.1), (apart, &x, v)),
+            self.group_error(brightness, (b, end_b.area_m2), (a, x.shows_m2.0), (apart, &x, v)),
+        ];
+        let error = on[0].max(on[1]);
+        if let Some(side) = side.filter(|_| error > threshold) {
+            let larger = if on[1] > on[0] { Side::B } else { Side::A };
+            let margin = Margin::Refined {
+                error: Margin::between(error, threshold),
+                on: larger,
+                both_ways: false,
+                side: SideMargin::ENDLESS,
+            };
+            return Judgement { margin, ..passing(Verdict::Refine(side), segments) };
+        }
+        let below = |error: f64| match side {
+            Some(_) => Margin::between(threshold, error.min(threshold)),
+            None => Margin::ENDLESS,
+        };
+        let margin = Margin::Link { on: on.map(below), both_ways: false };
+        carrying(Verdict::Link, x.area_m2, v, margin, segments)
+    }
+
+    /// The error of a link on one of its ends, relative to what arrives there and weighted as errors are: that of a facet
+    /// that faces the other end, never of those that happened to be looked at.
+    fn group_error(
+        &self,
+        brightness: &Brightness,
+        (receiver, area_m2): (ElementId, f64),
+        (source, shows_m2): (ElementId, f64),
+        (apart, x, v): (f64, &GroupExchange, f64),
+    ) -> f64 {
+        let light = brightness.of(self.forest, receiver);
+        let sent = brightness.of(self.forest, source).radiosity;
+        let reference_m2 = self.group_reference_m2(brightness, receiver);
+        let weight = (area_m2 / reference_m2).sqrt();
+        let arrives = sent * shows_m2 / (std::f64::consts::PI * apart * apart);
+        let place = PLACE * v * (x.size.0 * x.size.0 + x.size.1 * x.size.1);
+        let hidden = if v < 1.0 { SHARED * SHARED * v * (1.0 - v) + MISSED / 16.0 } else { 0.0 };
+        weight * arrives / light.irradiance * (place * place + hidden).sqrt()
+    }
+
+    /// Area at which an end weighs 1 in the error norm, m2.
+    fn group_reference_m2(&self, brightness: &Brightness, id: ElementId) -> f64 {
+        match self.forest.group(id) {
+            Some(group) => {
+                let first = self.forest.groups().leaves_of(group)[0].facet;
+                self.reference_area(brightness, first)
+            }
+            None => self.reference_area(brightness, id),
+        }
+    }
+
+    /// The end to refine: that of the larger radius, which no motion changes, or the other where that cannot be.
+    fn larger_radius(
+        &self,
+        (a, end_a): (ElementId, &Spread<'_>),
+        (b, end_b): (ElementId, &Spread<'_>),
+    ) -> Option<Side> {
+        let order = match no_smaller(end_a.radius, end_b.radius) {
+            true => [Side::A, Side::B],
+            false => [Side::B, Side::A],
+        };
+        order.into_iter().find(|&side| {
+            let id = if side == Side::A { a } else { b };
+            self.is_group(id) || self.forest.can_split(id)
+        })
+    }
+
+    /// Judges a pair of a punctual light with a group: held for the coarse solution, refined below it.
+    pub(super) fn judge_group_light(
+        &self,
+        (light, group): (ElementId, ElementId),
+        side: Side,
+        candidates: &[u32],
+        narrowed: &mut Vec<u32>,
+    ) -> Judgement {
+        let index = self.forest.light(light).expect("a light has an index");
+        let present = !self.view.end_box(group).is_empty();
+        let Some(lamp) = self.view.light(index).filter(|_| present) else {
+            return culled(CullReason::Absent);
+        };
+        if let Stage::Fine(_) = self.stage {
+            narrowed.extend_from_slice(candidates);
+            return passing(Verdict::Refine(side), 0);
+        }
+        let of_group = self.forest.group(group).expect("an end is a group");
+        let pose = of_group.body.and_then(|body| self.view.poses()[body.0 as usize]);
+        let leaves = self.forest.groups().leaves_of(of_group).iter();
+        let arrives = |leaf: &crate::element::GroupLeaf| {
+            let (p, n) = match &pose {
+                Some(pose) => (pose.point(leaf.centre), pose.direction(leaf.normal)),
+                None => (leaf.centre, leaf.normal),
+            };
+            leaf.area_m2 * light_at(lamp, p, n)
+        };
+        // What is in the way is left out: weights need no shadows of lights.
+        carrying(Verdict::Hold, leaves.map(arrives).sum(), 1.0, Margin::Firm, 0)
+    }
+}
+
+/// What two ends exchange without occlusion.
+fn exchange_of(a: &Spread<'_>, b: &Spread<'_>) -> GroupExchange {
+    let apart = a.centre.distance(b.centre).max(f64::MIN_POSITIVE);
+    let size = (a.radius / apart, b.radius / apart);
+    let projected = (a.projected_m2(b), b.projected_m2(a));
+    let shows = |end: &Spread<'_>, projected: f64, other: f64| {
+        (projected + TURNED * other.min(1.0) * end.area_m2).min(end.area_m2)
+    };
+    GroupExchange {
+        area_m2: projected.0 * projected.1 / (std::f64::consts::PI * apart * apart),
+        size,
+        shows_m2: (shows(a, projected.0, size.1), shows(b, projected.1, size.0)),
+    }
+}
+
+fn carrying(verdict: Verdict, area_m2: f64, v: f64, margin: Margin, segments: u32) -> Judgement {
+    let carried = Carried {
+        exchange_area_m2: area_m2 as f32,
+        visibility: in_steps(v),
+        gradients: Gradients::default(),
+    };
+    Judgement { verdict, carried, margin, segments }
+}

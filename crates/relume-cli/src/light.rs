@@ -1,6 +1,5 @@
 //! Scenes in which nothing shines, or little of what is looked at: nothing is solved for a black picture.
 
-use glam::DVec3;
 use relume::scene::Scene;
 use relume_picture::picture::Sketch;
 
@@ -20,55 +19,52 @@ const LIT_MIN: f64 = 0.5;
 /// Instants of a clip at which that is looked at.
 const INSTANTS: usize = 3;
 
-/// A clip of which pictures are to be made: with light, that of a default sky too where nothing was said of light and
-/// what emits lights little of what is seen, and where that does not get in a lamp where the view is from.
-pub(crate) fn for_pictures(clip: Clip, view: &ViewFlags) -> Result<Clip, Failure> {
+/// A clip of which pictures are to be made, with its views if they are known: with light, that of a default sky too where
+/// nothing was said of light and what emits lights little of what is seen, and where that does not get in a lamp where the
+/// view is from.
+pub(crate) fn for_pictures(
+    clip: Clip,
+    flags: &ViewFlags,
+) -> Result<(Clip, Option<Viewing>), Failure> {
     if clip.light_is_chosen() {
-        return required(&clip.scene).map(|()| clip);
+        return required(&clip.scene).map(|()| (clip, None));
     }
-    let Some(why) = unlit(&clip, view)? else { return Ok(clip) };
-    let under_sky = clip.under_sky()?;
-    // A sky lights no closed room.
-    match share_lit(&under_sky, view)? {
-        Some(lit) if lit < LIT_MIN => Ok(clip.with_lamp(eye(&under_sky, view)?)),
-        _ => {
-            clip.say(&outside::said_of_default(&clip.scene.name, &why));
-            Ok(under_sky)
+    let why = if clip.scene.emits() {
+        let views = Viewing::new(&clip.scene, flags)?;
+        match share_lit(&clip, &views) {
+            Some(lit) if lit < LIT_MIN => Unlit::Dim(lit),
+            // Where a view sees no surface it is no matter of light.
+            _ => return Ok((clip, Some(views))),
         }
+    } else {
+        Unlit::Dark
+    };
+    let under_sky = clip.under_sky()?;
+    let views = Viewing::new(&under_sky.scene, flags)?;
+    // A sky lights no closed room.
+    if share_lit(&under_sky, &views).is_some_and(|lit| lit < LIT_MIN) {
+        let first = clip.frames.first().copied().unwrap_or_default();
+        let view = views.at(&under_sky.scene, first, clip.fps())?;
+        return Ok((clip.with_lamp(view.world_from_camera.translation), Some(views)));
     }
-}
-
-/// Where a clip is looked at from in its first frame, metres.
-fn eye(clip: &Clip, flags: &ViewFlags) -> Result<DVec3, Failure> {
-    let views = Viewing::new(&clip.scene, flags)?;
-    let first = clip.frames.first().copied().unwrap_or_default();
-    Ok(views.at(&clip.scene, first, clip.fps())?.world_from_camera.translation)
-}
-
-/// Whether a clip needs the light of a default sky, and why.
-fn unlit(clip: &Clip, flags: &ViewFlags) -> Result<Option<Unlit>, Failure> {
-    if !clip.scene.emits() {
-        return Ok(Some(Unlit::Dark));
-    }
-    let lit = share_lit(clip, flags)?;
-    if let (Some(lit), true) = (lit, clip.is_verbose()) {
-        let percent = 100.0 * lit;
-        clip.say(&format!("note: what emits light reaches {percent:.0} % of what the view shows"));
-    }
-    // Where a view sees no surface it is no matter of light.
-    Ok(lit.filter(|&lit| lit < LIT_MIN).map(Unlit::Dim))
+    clip.say(&outside::said_of_default(&clip.scene.name, &why));
+    Ok((under_sky, Some(views)))
 }
 
 /// The largest share of what is seen of surfaces that is lit at some of a clip's instants; `None` where none is seen.
-fn share_lit(clip: &Clip, flags: &ViewFlags) -> Result<Option<f64>, Failure> {
-    let views = Viewing::new(&clip.scene, flags)?;
+fn share_lit(clip: &Clip, views: &Viewing) -> Option<f64> {
     let mut most = None;
     for frame in instants(&clip.frames) {
-        let view = views.at(&clip.scene, frame, clip.fps())?;
+        // Where a camera is absent its frames fail by themselves, after those before them.
+        let Ok(view) = views.at(&clip.scene, frame, clip.fps()) else { continue };
         let lit = Sketch::new(&clip.scene, clip.time_of(frame)).lit(&view);
         most = [most, lit].into_iter().flatten().reduce(f64::max);
     }
-    Ok(most)
+    if let (Some(lit), true) = (most, clip.is_verbose()) {
+        let percent = 100.0 * lit;
+        clip.say(&format!("note: light reaches {percent:.0} % of what the view shows"));
+    }
+    most
 }
 
 /// Some of the frames, the first among them.

@@ -17,7 +17,7 @@ use crate::interrupt;
 use crate::output::{self, counted};
 use crate::viewing::Viewing;
 
-/// The first frame has this long before a rough picture is drawn beside it.
+/// The first frame has this long, from the start of the run, before a rough picture is drawn beside it.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(5);
 
 /// A rough picture that is drawn where the first frame takes long, and goes when that is finished.

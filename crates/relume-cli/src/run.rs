@@ -112,7 +112,7 @@ impl Job {
                 "give the directory of the earlier run with -o, or its report with --report",
             ));
         }
-        let clip = match &self.picture {
+        let (clip, views) = match &self.picture {
             Some((_, flags)) => {
                 let at_least = flags.view.frames_at_least();
                 let read =
@@ -121,14 +121,16 @@ impl Job {
             }
             None => {
                 let read = Clip::of_file(&self.scene, &self.solve.clip, self.tolerance)?;
-                light::required(&read.scene).map(|()| read)?
+                light::required(&read.scene).map(|()| (read, None))?
             }
         };
         clip.warn();
         clip.warn_of(self.solve.update);
         let clip = clip.without_dark_sides();
-        let views = self.picture.as_ref().map(|(_, flags)| Viewing::new(&clip.scene, &flags.view));
-        let views = views.transpose()?;
+        let views = match (views, &self.picture) {
+            (None, Some((_, flags))) => Some(Viewing::new(&clip.scene, &flags.view)?),
+            (views, _) => views,
+        };
         if let Some((_, flags)) = &self.picture {
             // Not only after the first frame.
             ask_for_picture(flags)?;
@@ -174,7 +176,7 @@ impl Job {
             energy: None,
             suspects: Vec::new(),
         };
-        let mut meanwhile = run.meanwhile(&pending)?;
+        let mut meanwhile = run.meanwhile(&pending, PATIENCE.saturating_sub(started.elapsed()))?;
         let outcome = run.frames((wanted, &pending), &mut meanwhile);
         run.progress.clear();
         // Also where a frame failed: what was finished stays.
@@ -433,7 +435,11 @@ impl Run<'_> {
     }
 
     /// A rough picture for as long as none is finished.
-    fn meanwhile(&self, pending: &[u32]) -> Result<Option<(Meanwhile, PathBuf)>, Failure> {
+    fn meanwhile(
+        &self,
+        pending: &[u32],
+        patience: Duration,
+    ) -> Result<Option<(Meanwhile, PathBuf)>, Failure> {
         let first = pending.first().filter(|_| self.finished().report.frames.is_empty());
         let (Some(&frame), Some(dir)) = (first, &self.job.dir) else { return Ok(None) };
         let Some((view, _, flags)) = self.view(frame)? else { return Ok(None) };
@@ -448,7 +454,7 @@ impl Run<'_> {
         };
         let path = preview::path(dir);
         let picture =
-            Meanwhile::new(of, (view, preview::settings(flags)), (path.clone(), PATIENCE), say);
+            Meanwhile::new(of, (view, preview::settings(flags)), (path.clone(), patience), say);
         Ok(Some((picture, path)))
     }
 

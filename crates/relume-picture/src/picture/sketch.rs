@@ -90,9 +90,10 @@ impl Sketch {
         let (mut lit, mut all) = (0_u32, 0_u32);
         for pixel in pixels(METERED) {
             if let Some(seen) = self.seen(caster, &projector, pixel + 0.5) {
-                let brightness = preview.brightness[preview.point_at(seen.patch, seen.at)];
+                let point = preview.point_at(seen.patch, seen.at);
+                let is_lit = preview.is_lit && preview.brightness[point] > LIT;
                 all += 1;
-                lit += u32::from(preview.is_lit && brightness > LIT);
+                lit += u32::from(is_lit || preview.emits(point));
             }
         }
         (all > 0).then(|| f64::from(lit) / f64::from(all))
@@ -306,7 +307,7 @@ mod tests {
     fn an_open_floor_has_the_radiance_of_the_sky_times_its_reflectance() {
         let sky = Some(Sky::Uniform([1.0; 3]));
         let scene = floor().with_outside(Outside { sky, ..Outside::default() }).unwrap();
-        let view = View::look_at(DVec3::new(0.0, 3.0, 0.5), DVec3::ZERO, 0.5);
+        let view = View::look_at(DVec3::new(0.0, 3.0, 0.5), DVec3::ZERO, 0.3);
         let sketch = Sketch::new(&scene, 0.0);
         let encoder = SrgbEncoder::new();
         let image = sketch.draw(&view, &settings());
@@ -327,7 +328,7 @@ mod tests {
     #[test]
     fn what_a_lamp_does_not_reach_is_not_lit() {
         let sketch = Sketch::new(&floor(), 0.0);
-        let floor_only = View::look_at(DVec3::new(0.0, 3.0, 0.5), DVec3::ZERO, 0.5);
+        let floor_only = View::look_at(DVec3::new(0.0, 3.0, 0.5), DVec3::ZERO, 0.3);
         assert_eq!(sketch.lit(&floor_only), Some(0.0));
         assert_eq!(sketch.draw(&floor_only, &settings()).pixel(16, 12), [0; 3]);
         let lamp_only = View::look_at(DVec3::new(0.0, -2.0, 0.5), DVec3::new(0.0, -5.0, 0.0), 0.3);

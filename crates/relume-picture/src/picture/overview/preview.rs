@@ -109,7 +109,7 @@ impl Preview {
     }
 
     /// Whether a point is on a lamp.
-    pub(super) fn emits(&self, point: usize) -> bool {
+    pub(in super::super) fn emits(&self, point: usize) -> bool {
         self.points[point].emits
     }
 

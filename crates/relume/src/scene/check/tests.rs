@@ -136,13 +136,12 @@ fn sheets_that_stand_in_a_closed_room_are_no_gaps() {
             side.reverse();
             b.polygon(room, "walls", if without > 0 { sheet } else { m }, &side);
         }
-        // From corner to corner of the room, with a free side on top, and another that stands on it.
-        let half = |x: f64, z: f64, y: f64| DVec3::new(x, y, z);
-        let diagonal = [half(0., 0., 0.), half(1., 1., 0.), half(1., 1., 0.5), half(0., 0., 0.5)];
+        // From corner to corner of the room, with free sides on floor and ceiling, and another that stands on it.
+        let at = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+        let diagonal = [at(0., 0., 0.), at(1., 1., 0.), at(1., 1., 1.), at(0., 0., 1.)];
         b.polygon(room, "partition", sheet, &diagonal);
-        let across =
-            [half(0.5, 0.5, 0.), half(0.5, 1., 0.), half(0.5, 1., 0.5), half(0.5, 0.5, 0.5)];
-        b.polygon(room, "partition", sheet, &across);
+        let shelf = [at(0., 0., 0.), at(0., 0., 1.), at(0.3, 0.6, 1.), at(0.3, 0.6, 0.)];
+        b.polygon(room, "partition", sheet, &shelf);
         found(&check(&b.build().unwrap()), "open-enclosure")
     };
     assert_eq!(found_with(0), []);

@@ -43,6 +43,13 @@ pub struct GroupLink {
     pub coupling: f32,
 }
 
+/// The facets of a group that is in no other, with the link ends at or below it: link, and which end.
+#[derive(Clone, Debug)]
+struct Root {
+    facets: Range<u32>,
+    ends: Vec<(u32, u8)>,
+}
+
 /// All of them.
 #[derive(Clone, Debug, Default)]
 pub struct GroupLinks {
@@ -52,8 +59,8 @@ pub struct GroupLinks {
     places: Vec<u32>,
     links: Vec<GroupLink>,
     factors: Vec<f32>,
-    /// Facets of the groups that are in no other, with the link ends at or below them.
-    roots: Vec<(Range<u32>, Vec<(u32, u8)>)>,
+    /// By the first of their facets.
+    roots: Vec<Root>,
     /// Ends that are elements, by their ids.
     elements: Vec<(u32, u32, u8)>,
     /// What arrives where every surface sends 1.
@@ -80,16 +87,16 @@ impl GroupLinks {
         (links, factors): (Vec<GroupLink>, Vec<f32>),
         moment: f32,
     ) -> GroupLinks {
-        let mut roots: Vec<(Range<u32>, Vec<(u32, u8)>)> =
-            roots.into_iter().map(|facets| (facets, Vec::new())).collect();
-        roots.sort_by_key(|(facets, _)| facets.start);
+        let mut roots: Vec<Root> =
+            roots.into_iter().map(|facets| Root { facets, ends: Vec::new() }).collect();
+        roots.sort_by_key(|root| root.facets.start);
         let mut elements = Vec::new();
         for (k, link) in (0_u32..).zip(&links) {
             for (side, end) in (0_u8..).zip(&link.ends) {
                 match end {
                     GroupEnd::Group { facets, .. } => {
-                        let after = roots.partition_point(|(root, _)| root.start <= facets.start);
-                        roots[after - 1].1.push((k, side));
+                        let after = roots.partition_point(|root| root.facets.start <= facets.start);
+                        roots[after - 1].ends.push((k, side));
                     }
                     GroupEnd::Element { id, .. } => elements.push((*id, k, side)),
                 }
@@ -118,7 +125,7 @@ impl GroupLinks {
             .par_iter()
             .map(|link| [0, 1].map(|side| self.leaving_w(&link.ends[side], sent, moment)))
             .collect();
-        let at_root = |(facets, ends): &(Range<u32>, Vec<(u32, u8)>)| {
+        let at_root = |Root { facets, ends }: &Root| {
             let mut out = vec![[0.0_f32; 3]; facets.len()];
             for &(k, side) in ends {
                 let link = &self.links[k as usize];
@@ -136,8 +143,9 @@ impl GroupLinks {
         };
         let parts: Vec<Vec<[f32; 3]>> = self.roots.par_iter().map(at_root).collect();
         let mut facets = vec![[0.0; 3]; self.facets.len()];
-        for ((range, _), part) in self.roots.iter().zip(&parts) {
-            facets[range.start as usize..range.end as usize].copy_from_slice(part);
+        for (root, part) in self.roots.iter().zip(&parts) {
+            let range = root.facets.start as usize..root.facets.end as usize;
+            facets[range].copy_from_slice(part);
         }
         Arriving { facets, elements: self.at_elements(&leaving) }
     }
@@ -213,7 +221,7 @@ impl GroupLinks {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> u64 {
-        let ends: usize = self.roots.iter().map(|(_, ends)| ends.capacity() * 8).sum();
+        let ends: usize = self.roots.iter().map(|root| root.ends.capacity() * 8).sum();
         (self.links.capacity() * size_of::<GroupLink>()
             + self.factors.capacity() * 4
             + self.facets.capacity() * 8
@@ -244,7 +252,7 @@ mod tests {
             GroupLink { ends: [last, small(3)], coupling: 0.2 },
         ];
         let factors = vec![1.0, 0.5, 0.0, 0.25, 0.0, 2.0, 0.75];
-        GroupLinks::new(facets, vec![0..4], (list, factors), MOMENT)
+        GroupLinks::new(facets, vec![0..3, 3..4], (list, factors), MOMENT)
     }
 
     /// K A_i f_i A_j f_j of every two ends.

@@ -73,13 +73,9 @@ const FAR: f64 = 1.0 / 32.0;
 /// Form factor to a part of a leaf below which it is taken to send what the leaf's line says.
 const LITTLE: f64 = 0.01;
 
-/// Share of what a sensor sees above which leaves that are large against their distance are not taken at their word: it
-/// is in a gap, and what leaves them is followed on, in this many ways from each part that it sees.
+/// Share of what a point sees above which leaves that are large against their distance are not taken at their word: it
+/// is in a gap, and what leaves them is followed on.
 const IN_A_GAP: f64 = 0.5;
-const WAYS: usize = 4;
-
-/// Share of what a point sees up to which such leaves are taken at their word after all.
-const ASIDE: f64 = 0.1;
 
 /// Share of the light below which nobody follows on what leaves a leaf, and how often at most.
 const FOLLOWED: (f64, usize) = (1e-3, 24);
@@ -91,7 +87,6 @@ const BY_LINES: f64 = 0.02;
 const SPLITS: u32 = 6;
 
 /// A sensor looking at a solved scene.
-#[derive(Clone, Copy)]
 struct Look<'a> {
     session: &'a Session,
     solved: &'a Solved,
@@ -162,7 +157,7 @@ impl<'a> Look<'a> {
         let (large, little): (Vec<_>, Vec<_>) =
             parts.iter().enumerate().partition(|(_, part)| part.factor > LITTLE);
         for (k, part) in large {
-            add(&mut sum, part, self.sent_by(part, k, is_in_a_gap));
+            add(&mut sum, part, self.sent_by(part, k));
         }
         let all = |e: [f64; 3]| e.iter().sum::<f64>();
         let mut little: Vec<(f64, [f64; 3], (usize, &Part))> = little
@@ -178,7 +173,7 @@ impl<'a> Look<'a> {
         let mut left: f64 = little.iter().map(|part| part.0).sum();
         for (brings, line, (k, part)) in little {
             let is_much = is_in_a_gap && left > BY_LINES * (all(sum) + left);
-            add(&mut sum, part, if is_much { self.sent_by(part, k, true) } else { line });
+            add(&mut sum, part, if is_much { self.sent_by(part, k) } else { line });
             left -= brings;
         }
         sum
@@ -382,52 +377,45 @@ impl<'a> Look<'a> {
     }
 
     /// What leaves a part of a leaf that is large against its distance, W/m2: the leaf knows its radiosity as a line only, and
-    /// beside it may be the shadow of what the sensor is close to. What arrives there is gathered there, and in a gap what
-    /// leaves other leaves close to it is followed on, on some ways that the number `k` of the part chooses.
-    fn sent_by(&self, part: &Part, k: usize, is_in_a_gap: bool) -> [f64; 3] {
-        let (look, mut b, rho, near) = self.look_from(part);
-        if !is_in_a_gap {
-            let lines = sum_of(near.iter().map(|n| n.sent));
-            return [0, 1, 2].map(|c| b[c] + rho[c] * lines[c]);
-        }
-        for way in 0..WAYS {
-            let followed = look.follow(&near, rho, (WAYS * k + way, 0));
-            (0..3).for_each(|c| b[c] += followed[c] / WAYS as f64);
+    /// beside it may be the shadow of what the sensor is close to. What arrives there is gathered there.
+    ///
+    /// In a gap most of what is seen there is as close again, and so on: one part of it is followed, chosen by its form
+    /// factor and the number `k` of the first part, so that many of them together show all ways that light takes.
+    fn sent_by(&self, part: &Part, k: usize) -> [f64; 3] {
+        let scene = &self.session.scene;
+        let (mut b, mut share, mut part) = ([0.0; 3], [1.0; 3], *part);
+        for step in 0.. {
+            let patch = self.forest.patch(part.leaf).expect("an element has a patch");
+            let sensor =
+                Sensor { at: part.at, normal: self.solved.view.occluder(patch).plane.normal };
+            let patch = &scene.patches[patch.0 as usize];
+            let now = &self.solved.world;
+            let (m, rho) = (now.exitance(scene, patch), now.reflectance(scene, patch));
+            let look = Look::new((self.session, self.solved), &sensor, false);
+            let Gathered { sum, near, .. } = look.gather();
+            for c in 0..3 {
+                b[c] += share[c] * m[c];
+                share[c] *= rho[c];
+                b[c] += share[c] * sum[c];
+            }
+            let seen: f64 = near.iter().map(|n| n.factor).sum();
+            let left = seen * share.iter().fold(0.0, |most: f64, s| most.max(*s));
+            if seen > IN_A_GAP && left <= FOLLOWED.0 {
+                return b;
+            }
+            let next = (seen > IN_A_GAP && step < FOLLOWED.1)
+                .then(|| look.choose(&near, [spread(k, 2 * step), spread(k, 2 * step + 1)]));
+            match next.flatten() {
+                Some(next) => (share, part) = (share.map(|s| s * seen), next),
+                None => {
+                    for n in &near {
+                        (0..3).for_each(|c| b[c] += share[c] * n.sent[c]);
+                    }
+                    return b;
+                }
+            }
         }
         b
-    }
-
-    /// A part looking itself: what leaves it without what comes from leaves close to it, its reflectance, and those.
-    fn look_from(&self, part: &Part) -> (Look<'a>, [f64; 3], [f64; 3], Vec<Near>) {
-        let scene = &self.session.scene;
-        let patch = self.forest.patch(part.leaf).expect("an element has a patch");
-        let normal = self.solved.view.occluder(patch).plane.normal;
-        let patch = &scene.patches[patch.0 as usize];
-        let now = &self.solved.world;
-        let (m, rho) = (now.exitance(scene, patch), now.reflectance(scene, patch));
-        let sensor = Sensor { at: part.at, normal };
-        let look = Look::new((self.session, self.solved), &sensor, false);
-        let Gathered { sum, near, .. } = look.gather();
-        (look, [0, 1, 2].map(|c| m[c] + rho[c] * sum[c]), rho, near)
-    }
-
-    /// A share of what comes from leaves close by. What they see is as close again, and so on: one part of them is followed, chosen
-    /// by its form factor, by the number of the way and that of the step, so that many ways together show all that light takes.
-    fn follow(&self, near: &[Near], share: [f64; 3], (way, step): (usize, usize)) -> [f64; 3] {
-        let seen: f64 = near.iter().map(|n| n.factor).sum();
-        if seen > ASIDE && seen * share.iter().fold(0.0, |most: f64, s| most.max(*s)) <= FOLLOWED.0
-        {
-            return [0.0; 3];
-        }
-        let next = (seen > ASIDE && step < FOLLOWED.1)
-            .then(|| self.choose(near, [spread(way, 2 * step), spread(way, 2 * step + 1)]));
-        let Some(part) = next.flatten() else {
-            let lines = sum_of(near.iter().map(|n| n.sent));
-            return [0, 1, 2].map(|c| share[c] * lines[c]);
-        };
-        let (look, b, rho, near) = self.look_from(&part);
-        let rest = look.follow(&near, [0, 1, 2].map(|c| share[c] * seen * rho[c]), (way, step + 1));
-        [0, 1, 2].map(|c| share[c] * seen * b[c] + rest[c])
     }
 
     /// One part of some leaves close by, each as likely as its form factor is large if both numbers, from 0 to 1, are equally
@@ -470,10 +458,6 @@ impl<'a> Look<'a> {
         };
         (0..n).map(part).fold((0.0, DVec3::ZERO), |sum, part| (sum.0 + part.0, sum.1 + part.1))
     }
-}
-
-fn sum_of(values: impl Iterator<Item = [f64; 3]>) -> [f64; 3] {
-    values.fold([0.0; 3], |sum, v| [0, 1, 2].map(|c| sum[c] + v[c]))
 }
 
 /// The first of some numbers up to which all sum to a share of the whole.

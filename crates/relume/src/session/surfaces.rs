@@ -9,6 +9,9 @@ use crate::pair::{self, Edit, PairTree};
 use crate::scene::{PatchId, Scene, World};
 use crate::solver::{GroupLinks, Link, Links, LinksBuilder, Lit, Place, Surfaces};
 
+/// Elements of which a smaller share is exposed are covered.
+const COVERED: f64 = 1e-4;
+
 /// A forest with its materials at one instant.
 pub(super) struct LitForest<'a> {
     forest: &'a Forest,
@@ -98,6 +101,11 @@ impl Surfaces for LitForest<'_> {
 
     fn area_m2(&self, id: u32) -> f64 {
         self.forest.exposed_m2(ElementId(id))
+    }
+
+    fn is_covered(&self, id: u32) -> bool {
+        let id = ElementId(id);
+        self.forest.exposed_m2(id) < COVERED * self.forest.area_m2(id)
     }
 
     fn place(&self, id: u32) -> Place {

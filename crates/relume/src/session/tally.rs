@@ -94,7 +94,9 @@ pub(crate) fn balance_of(
             let a = surfaces.area_m2(id);
             let off = f64::from(*next.next().expect("the same leaves")) - 1.0;
             rows.rms += a * off * off;
-            rows.max = rows.max.max(off.abs());
+            if !surfaces.is_covered(id) {
+                rows.max = rows.max.max(off.abs());
+            }
             area += a;
             let b = radiosity.radiosity(id);
             for c in 0..3 {

@@ -87,6 +87,10 @@ pub trait Surfaces: Sync {
     }
     /// Area, m2.
     fn area_m2(&self, id: u32) -> f64;
+    /// Whether light cannot reach an element at all, because something rests on it.
+    fn is_covered(&self, _id: u32) -> bool {
+        false
+    }
     /// Where an element lies.
     fn place(&self, id: u32) -> Place;
     /// What a facet is made of.

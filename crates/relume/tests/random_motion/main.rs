@@ -53,32 +53,32 @@ fn check_recipes(flavour: Flavour, draws: Range<u64>, draw: impl Fn(u64) -> Reci
 
 #[test]
 fn bodies_that_go_anywhere() {
-    check(Flavour::Free, 0..16);
+    check(Flavour::Free, 0..12);
 }
 
 #[test]
 fn bodies_that_touch_and_cut_each_other() {
-    check(Flavour::Contact, 0..16);
+    check(Flavour::Contact, 0..12);
 }
 
 #[test]
 fn bodies_that_come_and_go_and_jump_away() {
-    check(Flavour::Jumps, 0..16);
+    check(Flavour::Jumps, 0..12);
 }
 
 #[test]
 fn lights_that_move() {
-    check(Flavour::Lights, 0..16);
+    check(Flavour::Lights, 0..12);
 }
 
 #[test]
 fn bodies_that_ride_on_others() {
-    check(Flavour::Families, 0..16);
+    check(Flavour::Families, 0..12);
 }
 
 #[test]
 fn lamps_that_change() {
-    check(Flavour::Glows, 0..16);
+    check(Flavour::Glows, 0..12);
 }
 
 #[test]

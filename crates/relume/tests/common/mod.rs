@@ -261,5 +261,5 @@ pub(crate) fn data(name: &str) -> PathBuf {
 
 /// A scene of `tests/data`.
 pub(crate) fn shipped(name: &str) -> Scene {
-    import(&data(name), &ImportOptions::default()).unwrap()
+    import(data(name), &ImportOptions::default()).unwrap()
 }

@@ -29,7 +29,7 @@ fn file() -> Gltf {
 
 fn edited(gltf: &Gltf, edits: Edits) -> Result<Scene, SceneError> {
     let folder = tempfile::tempdir().unwrap();
-    import(&gltf.write(folder.path(), "scene"), &ImportOptions { edits, ..Default::default() })
+    import(gltf.write(folder.path(), "scene"), &ImportOptions { edits, ..Default::default() })
 }
 
 fn hiding(names: &[&str]) -> Edits {

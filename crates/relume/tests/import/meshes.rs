@@ -250,7 +250,7 @@ fn what_is_wrong_with_them_is_said() {
     let limited = ImportOptions { max_memory_bytes: Some(100), ..ImportOptions::default() };
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.stl"), stl_text()).unwrap();
-    let error = import(&folder.path().join("a.stl"), &limited).unwrap_err();
+    let error = import(folder.path().join("a.stl"), &limited).unwrap_err();
     assert!(matches!(error, SceneError::TooLarge { .. }), "{error}");
 }
 

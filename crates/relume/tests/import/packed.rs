@@ -124,7 +124,7 @@ fn damage_anywhere_in_a_stream_never_panics() {
 fn compressed_meshes_keep_the_limit_of_memory() {
     let limited = |file: &str, bytes: u64| {
         let options = ImportOptions { max_memory_bytes: Some(bytes), ..ImportOptions::default() };
-        import(&data("packed").join(file), &options)
+        import(data("packed").join(file), &options)
     };
     for file in FILES {
         assert!(limited(file, 1 << 20).is_ok(), "{file}");

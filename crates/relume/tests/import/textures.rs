@@ -447,7 +447,7 @@ fn edits_of_a_textured_material_hold_for_all_its_patches() {
     };
     let folder = tempfile::tempdir().unwrap();
     let options = ImportOptions { edits, ..ImportOptions::default() };
-    let scene = import(&g.write(folder.path(), "scene"), &options).unwrap();
+    let scene = import(g.write(folder.path(), "scene"), &options).unwrap();
     assert!(scene.patches.len() > 1);
     for patch in &scene.patches {
         assert_eq!(scene.reflectance(patch), [0.25; 3]);

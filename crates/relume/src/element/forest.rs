@@ -110,7 +110,7 @@ type Plot<'a> = (&'a Scene, &'a Cuts, &'a Layout);
 const SLACK: usize = 32;
 
 /// Elements of which a smaller share is exposed count as covered wholly.
-const EXPOSED_LEAST: f64 = 1.0 / 8.0;
+const EXPOSED_LEAST: f64 = 1.0 / 16.0;
 
 /// Levels that a path has room for.
 const LEVELS_MAX: u32 = 15;

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Interpolation, Light, Material, Scene, Track};
+use super::{Interpolation, Light, Material, Track};
 
 /// How an emission changes over time: `scale` times the values of all tracks, channel by channel, and never below 0
 /// (a cubic spline may swing there).
@@ -75,12 +75,6 @@ impl Material {
         self.glow.as_ref().map_or(self.exitance, Glow::most)
     }
 
-    /// Whether its exitance differs between two times, seconds.
-    pub fn is_relit(&self, times_s: [f64; 2]) -> bool {
-        let [from, to] = times_s.map(|t| self.exitance_at(t));
-        from != to
-    }
-
     /// Whether it emits at any time.
     pub fn emits(&self) -> bool {
         self.most_exitance().iter().any(|&m| m > 0.0)
@@ -93,23 +87,9 @@ impl Light {
         self.glow.as_ref().map_or(self.intensity, |glow| glow.at(time_s))
     }
 
-    /// Whether its intensity differs between two times, seconds.
-    pub fn is_relit(&self, times_s: [f64; 2]) -> bool {
-        let [from, to] = times_s.map(|t| self.intensity_at(t));
-        from != to
-    }
-
     /// The most that its intensity is at any time; a bound.
     pub fn most_intensity(&self) -> [f64; 3] {
         self.glow.as_ref().map_or(self.intensity, Glow::most)
-    }
-}
-
-impl Scene {
-    /// Whether any emission differs between two times, seconds.
-    pub fn is_relit(&self, times_s: [f64; 2]) -> bool {
-        self.materials.iter().any(|m| m.is_relit(times_s))
-            || self.lights.iter().any(|l| l.is_relit(times_s))
     }
 }
 

@@ -1,5 +1,6 @@
 //! The `relume` command: a thin layer over the engine, the pictures and the exports.
 
+mod accuracy;
 mod args;
 mod bench;
 mod check;

@@ -6,6 +6,7 @@ use std::path::Path;
 use relume::scene::{BodyId, Scene};
 use relume::session::{Sensor, Session};
 
+use crate::accuracy::Estimates;
 use crate::args::ProbeArgs;
 use crate::clip::{Clip, TOLERANCE, now, step_failure};
 use crate::failure::Failure;
@@ -40,7 +41,9 @@ pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
     }
     let progress = Progress::new(clip.frames.len(), 0, args.clip.quiet);
     progress.watch(session.watch(), size.pairs());
-    let outcome = frames(&clip, &mut session, &riders, args, &progress, &mut sink);
+    let mut estimates = Estimates::new(args.accuracy);
+    let outcome =
+        frames((&clip, &mut session), &riders, (args, &mut estimates), &progress, &mut sink);
     progress.clear();
     let done = outcome.map_err(interrupt::keeping_rows)?;
     sink.finish()?;
@@ -52,11 +55,12 @@ pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
     }
     if !args.clip.quiet {
         output::complain(&format!(
-            "{} at {}, {:.1} s{}",
+            "{} at {}, {:.1} s{}{}",
             counted(riders.len(), "sensor"),
             counted(clip.frames.len(), "frame"),
             started.elapsed().as_secs_f64(),
-            args.output.as_ref().map_or_else(String::new, |p| format!(", in {}", p.display()))
+            args.output.as_ref().map_or_else(String::new, |p| format!(", in {}", p.display())),
+            estimates.line(clip.tolerance)
         ));
     }
     Ok(())
@@ -171,10 +175,9 @@ fn inside(clip: &Clip, riders: &[Rider<'_>], path: &Path) -> Result<Vec<String>,
 
 /// Solves frame after frame and adds their rows; how many were finished.
 fn frames(
-    clip: &Clip,
-    session: &mut Session,
+    (clip, session): (&Clip, &mut Session),
     riders: &[Rider<'_>],
-    args: &ProbeArgs,
+    (args, estimates): (&ProbeArgs, &mut Estimates),
     progress: &Progress,
     sink: &mut Sink,
 ) -> Result<usize, Failure> {
@@ -192,6 +195,8 @@ fn frames(
         let here: Vec<(&Rider<'_>, Sensor)> =
             riders.iter().filter_map(|r| Some((r, r.at(&clip.scene, time_s)?))).collect();
         let found = irradiances(session, &here, args, frame)?;
+        let sensors: Vec<Sensor> = here.iter().map(|(_, sensor)| *sensor).collect();
+        estimates.of(session, frame, Some(&sensors));
         for ((rider, sensor), e) in here.iter().zip(found) {
             let mut row = vec![frame.to_string(), rider.entry.name.clone()];
             let place = sensor.at.to_array().into_iter().chain(sensor.normal.to_array());

@@ -15,6 +15,7 @@ use relume::session::{Energy, Options, Session, SessionError, Snapshot};
 use relume_picture::export::{probe, write_atomically, write_glb};
 use relume_picture::picture::{self, Exposure};
 
+use crate::accuracy::Estimates;
 use crate::args::{
     DemoArgs, ExposureFlag, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags, UpdateFlag,
 };
@@ -175,6 +176,7 @@ impl Job {
             links: 0,
             energy: None,
             suspects: Vec::new(),
+            estimates: Estimates::new(self.solve.accuracy),
         };
         let mut meanwhile = run.meanwhile(&pending, PATIENCE.saturating_sub(started.elapsed()))?;
         let outcome = run.frames((wanted, &pending), &mut meanwhile);
@@ -340,6 +342,7 @@ impl Job {
                 false => balance(energy, &run.suspects),
             };
         }
+        line += &run.estimates.line(run.session.options().tolerance);
         output::print(&(line + "\n"))
     }
 }
@@ -427,6 +430,7 @@ struct Run<'a> {
     energy: Option<Energy>,
     /// Surfaces that receive more than they can.
     suspects: Vec<String>,
+    estimates: Estimates,
 }
 
 impl Run<'_> {
@@ -493,13 +497,14 @@ impl Run<'_> {
 
     fn frame(&mut self, frame: u32) -> Result<(), Failure> {
         self.progress.start(frame, self.links, self.session.memory_bytes());
-        let entry = self
+        let mut entry = self
             .session
             .step(frame, frames::time_of(frame, self.job.solve.clip.fps))
             .map_err(|error| self.session_failure(error))?;
         self.links = entry.links;
         self.energy = entry.energy;
         self.suspects = entry.suspects.clone();
+        entry.accuracy = self.estimates.of(&self.session, frame, None);
         if let Some(path) = self.job.picture_path(frame) {
             self.draw(frame, &path)?;
         }

@@ -1,8 +1,6 @@
 //! `relume bench` as a user meets it: the tables are there and the file holds what they are made of.
 
-mod common;
-
-use common::{interrupted, json, relume, text};
+use crate::common::{interrupted, json, relume, text};
 
 /// The room's coarse links take hundredths of a second a frame.
 const COARSE: [&str; 4] = ["--tolerance", "0.3", "--threads", "2"];

@@ -2,12 +2,10 @@
 //!
 //! Runs the binary itself. Scenes are the demonstrations, written into a temporary directory.
 
-mod common;
-
 use std::fs;
 use std::path::Path;
 
-use common::{json, relume, room, text};
+use crate::common::{json, relume, room, text};
 use glam::{DQuat, DVec3};
 use relume::scene::SceneBuilder;
 use relume_picture::export::write_glb;

@@ -1,12 +1,10 @@
 //! `relume factors` as a user meets it: known values, tables, formats, closures, messages.
 
-mod common;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{json, relume, text};
+use crate::common::{json, relume, text};
 use glam::{DQuat, DVec3};
 use relume::scene::{Interpolation, Scene, SceneBuilder, Track};
 use relume_picture::export::write_glb;

@@ -1,10 +1,8 @@
 //! The first commands that somebody types at a file of others: light where there is none, views, sizes.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{json, relume, text};
+use crate::common::{json, relume, text};
 use glam::{DQuat, DVec3};
 use relume::scene::SceneBuilder;
 use relume_picture::export::write_glb;

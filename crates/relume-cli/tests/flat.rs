@@ -1,11 +1,9 @@
 //! `relume flat`: reports, comparison with cold builds, figures, messages.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{json, relume, text};
+use crate::common::{json, relume, text};
 use tempfile::TempDir;
 
 fn scene(name: &str) -> PathBuf {

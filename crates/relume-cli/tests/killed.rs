@@ -3,11 +3,9 @@
 //! A few in every test run. All of them, with the figures of the README printed:
 //!
 //! ```text
-//! cargo test --release -p relume-cli --test killed -- --ignored --nocapture
+//! cargo test --release -p relume-cli --test tests killed:: -- --ignored --nocapture
 //! ```
 #![cfg(unix)]
-
-mod common;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -15,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{json, relume, room, text};
+use crate::common::{json, relume, room, text};
 
 /// SplitMix64.
 struct Random(u64);

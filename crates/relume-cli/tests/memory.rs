@@ -2,13 +2,11 @@
 //! code of its own, and takes nothing that is finished.
 #![cfg(target_os = "linux")]
 
-mod common;
-
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{Ran, json, relume, room, text};
+use crate::common::{Ran, json, relume, room, text};
 use glam::{DQuat, DVec3};
 use relume::scene::{NodeId, SceneBuilder};
 use relume_picture::export::write_glb;

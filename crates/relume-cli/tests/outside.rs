@@ -1,10 +1,8 @@
 //! Light from outside on the command line: what it is given as, what is said of it, and what it does to a run.
 
-mod common;
-
 use std::fs;
 
-use common::{json, relume, room, text};
+use crate::common::{json, relume, room, text};
 
 const QUICK: [&str; 4] = ["--size", "64x48", "--tolerance", "0.3"];
 

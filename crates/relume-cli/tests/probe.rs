@@ -1,11 +1,9 @@
 //! `relume probe` as a user meets it: tables, sensors that ride, messages with line numbers.
 
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{relume, room, text};
+use crate::common::{relume, room, text};
 
 /// A scene or reference that the engine's tests hold.
 fn shipped(name: &str) -> PathBuf {

@@ -1,10 +1,8 @@
 //! `relume replay` as a user meets it.
 
-mod common;
-
 use std::fs;
 
-use common::{relume, room, text};
+use crate::common::{relume, room, text};
 
 const COARSE: [&str; 4] = ["--tolerance", "0.3", "--threads", "2"];
 

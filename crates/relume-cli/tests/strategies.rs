@@ -1,10 +1,8 @@
 //! Update strategies as a user meets them: `--update`, `--error`, `--events`.
 
-mod common;
-
 use std::fs;
 
-use common::{json, relume, room, text};
+use crate::common::{json, relume, room, text};
 
 #[test]
 fn exact_strategies_give_the_same_links() {

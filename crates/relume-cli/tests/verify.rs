@@ -1,8 +1,6 @@
 //! `relume verify` as a user meets it.
 
-mod common;
-
-use common::{interrupted, json, relume, room, text};
+use crate::common::{interrupted, json, relume, room, text};
 
 /// The room's coarse links take hundredths of a second a frame.
 const COARSE: [&str; 4] = ["--tolerance", "0.3", "--threads", "2"];

@@ -1,8 +1,6 @@
 //! What automatic views show of rooms and objects.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use glam::DVec3;
 use relume::scene::{BodyId, Scene};
 use relume_picture::picture::{Exposure, Overview, Settings, Shading, Tone, View, render};

@@ -1,10 +1,8 @@
-//! Pictures to be looked at: `cargo test -p relume-picture --test gallery -- --ignored --nocapture`.
-
-mod common;
+//! Pictures to be looked at: `cargo test -p relume-picture --test tests gallery:: -- --ignored --nocapture`.
 
 use std::time::Instant;
 
-use common::*;
+use crate::common::*;
 use relume_picture::picture::{Exposure, Settings, Shading, View, render};
 
 #[test]

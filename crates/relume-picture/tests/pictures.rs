@@ -1,8 +1,6 @@
 //! Pictures of snapshots made by hand.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use glam::{DQuat, DVec2, DVec3};
 use relume::scene::{BodyId, Held, Projection};
 use relume_picture::picture::{

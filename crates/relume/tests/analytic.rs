@@ -4,11 +4,12 @@
 // Reference values may use the platform's functions.
 #![allow(clippy::disallowed_methods)]
 
-mod common;
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use common::{Quad, Random, at_tolerance, facing_up, flipped, form_factor, plate_scene, solved, v};
+use crate::common;
+use crate::common::{
+    Quad, Random, at_tolerance, facing_up, flipped, form_factor, plate_scene, solved, v,
+};
 use glam::{DQuat, DVec3};
 use relume::scene::{Scene, SceneBuilder};
 use relume::session::{Options, Session};

@@ -1,10 +1,8 @@
 //! Commands: any log and its inverses lead back, and the state after any log is that of a cold build.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{Random, at_tolerance, form_factor_oracle, shipped, v};
+use crate::common::{Random, at_tolerance, form_factor_oracle, shipped, v};
 use glam::{DQuat, DVec3};
 use relume::{
     BodyId, Command, CommandError, Frame, LightId, LightKind, Log, MaterialId, NewBody, Options,

@@ -1,10 +1,8 @@
 //! Comparing sessions: what agrees is said to agree, and each difference is named in words.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{at_tolerance, form_factor_oracle, lit_room, v};
+use crate::common::{at_tolerance, form_factor_oracle, lit_room, v};
 use glam::DQuat;
 use relume::scene::{Scene, SceneBuilder};
 use relume::session::{

@@ -1,8 +1,6 @@
 //! What stands on surfaces, pierces them or lies close above them: against the judge's path tracer.
 
-mod common;
-
-use common::{at_tolerance, facing_up, flipped, judged, v};
+use crate::common::{at_tolerance, facing_up, flipped, judged, v};
 use glam::{DQuat, DVec3};
 use relume::scene::{MaterialId, Scene, SceneBuilder};
 use relume::session::{Sensor, Session};

@@ -1,11 +1,9 @@
 //! Scenes without the inner sides of closed shells in which it is dark: what is left is lit as before, and
 //! equals the same scene of single-sided polygons bit for bit.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{at_tolerance, sliding, still, turn, v};
+use crate::common::{at_tolerance, sliding, still, turn, v};
 use glam::DVec3;
 use relume::scene::{MaterialId, Scene, SceneBuilder};
 use relume::session::{Sensor, Session};

@@ -1,11 +1,10 @@
 //! The state is a pure function of the instant: the same bits for any number of threads, in any
 //! order of frames, from any first frame; and it does change when something moves.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{at_tolerance, form_factor_oracle, lit_room};
+use crate::common;
+use crate::common::{at_tolerance, form_factor_oracle, lit_room};
 use relume::scene::Scene;
 use relume::session::{FrameReport, Options, Session, Snapshot};
 

@@ -1,11 +1,10 @@
 //! Form factors between the patches of a room with two bodies, as sums over links, against exact
 //! the judge's. Occlusion decides here; a wrong list of possible occluders shows in no mean, but here.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{at_tolerance, judged, shipped, sliding, turn, v};
+use crate::common;
+use crate::common::{at_tolerance, judged, shipped, sliding, turn, v};
 use glam::{DQuat, DVec3};
 use relume::scene::{Scene, SceneBuilder};
 use relume::session::{Grouping, Options, Session};

@@ -2,11 +2,10 @@
 //! reflectance, B = M / (1 - rho) everywhere, at every frame, whatever moves. And the balance of
 //! energy. Figures are printed (`--nocapture`).
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{at_tolerance, form_factor_oracle, leaf_area, sliding, solved, turn, v};
+use crate::common;
+use crate::common::{at_tolerance, form_factor_oracle, leaf_area, sliding, solved, turn, v};
 use glam::{DQuat, DVec3};
 use relume::scene::{Scene, SceneBuilder};
 use relume::session::{Energy, FrameReport, Options, Session, Snapshot};

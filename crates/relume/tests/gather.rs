@@ -3,9 +3,7 @@
 // Reference values may use the platform's functions: nothing that the engine decides rests on them.
 #![allow(clippy::disallowed_methods)]
 
-mod common;
-
-use common::{at_tolerance, facing_up, flipped, solved, still, v};
+use crate::common::{at_tolerance, facing_up, flipped, solved, still, v};
 use glam::DVec3;
 use relume::scene::{Scene, SceneBuilder};
 use relume::session::{Sensor, Session};

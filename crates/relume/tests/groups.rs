@@ -1,11 +1,10 @@
 //! Groups of patches as ends of links: canonical in motion, uniform in a furnace, and as exact as links of patches.
 //! Figures are printed (`--nocapture`).
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{Random, at_tolerance, leaf_area, shipped, sliding, still, turn, v};
+use crate::common;
+use crate::common::{Random, at_tolerance, leaf_area, shipped, sliding, still, turn, v};
 use glam::{DQuat, DVec3};
 use relume::scene::outside::{Outside, Sky, Sun, SunPlace};
 use relume::scene::{LightKind, MaterialId, NodeId, PatchId, Scene, SceneBuilder};

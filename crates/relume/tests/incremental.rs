@@ -1,11 +1,9 @@
 //! Incremental equals from scratch: after any motion the links are those of a cold build, bit for
 //! bit, the elements are the same, and the radiosities agree within the residuals' bound.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{at_tolerance, form_factor_oracle, lit_room, shipped};
+use crate::common::{at_tolerance, form_factor_oracle, lit_room, shipped};
 use relume::scene::Scene;
 use relume::session::{FrameReport, Options, Session, Update};
 

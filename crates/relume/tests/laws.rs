@@ -1,9 +1,8 @@
 //! The invariants of elements and pairs on scenes of many kinds, for every oracle and tolerance.
 
-mod common;
-
-use common::audit::{Audit, audit};
-use common::{
+use crate::common;
+use crate::common::audit::{Audit, audit};
+use crate::common::{
     Random, at_tolerance, facing_up, form_factor_oracle, leaf_area, lit_room, plate_scene, shipped,
     solved, v,
 };

@@ -4,12 +4,13 @@
 // Reference values may use the platform's functions.
 #![allow(clippy::disallowed_methods)]
 
-mod common;
-
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use common::{Quad, area_of, at_tolerance, facing_up, leaf_area, patches_of, rms, solved, v};
+use crate::common;
+use crate::common::{
+    Quad, area_of, at_tolerance, facing_up, leaf_area, patches_of, rms, solved, v,
+};
 use glam::{DQuat, DVec3};
 use relume::scene::{LightKind, Scene, SceneBuilder};
 use relume::session::{Options, Session};

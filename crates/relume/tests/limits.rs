@@ -1,10 +1,9 @@
 //! Options out of range and too little memory: a clear message, and a session that goes on.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{at_tolerance, form_factor_oracle, lit_room, v};
+use crate::common;
+use crate::common::{at_tolerance, form_factor_oracle, lit_room, v};
 use glam::{DQuat, DVec3};
 use relume::scene::{Scene, SceneBuilder};
 use relume::session::{Options, Session, SessionError};

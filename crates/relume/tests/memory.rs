@@ -2,11 +2,10 @@
 //!
 //! Scenes are large enough that what every scene needs once does not count.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{at_tolerance, form_factor_oracle, lit_room, sliding, still, turn, v};
+use crate::common;
+use crate::common::{at_tolerance, form_factor_oracle, lit_room, sliding, still, turn, v};
 use glam::{DQuat, DVec3};
 use relume::scene::{MaterialId, NodeId, Scene, SceneBuilder};
 use relume::session::{Options, Session};

@@ -1,8 +1,7 @@
 //! Exchange areas with occlusion against the judge's brute-force Monte Carlo integral.
 
-mod common;
-
-use common::{Quad, Random, at_tolerance, exchange_area, facing_up, flipped, solved, v};
+use crate::common;
+use crate::common::{Quad, Random, at_tolerance, exchange_area, facing_up, flipped, solved, v};
 use glam::{DQuat, DVec3};
 use relume::scene::SceneBuilder;
 use relume_judge::monte_carlo::{self, Block};

@@ -3,11 +3,10 @@
 
 #![allow(clippy::disallowed_methods)]
 
-mod common;
-
 use std::sync::Arc;
 
-use common::v;
+use crate::common;
+use crate::common::v;
 use glam::{DQuat, DVec3};
 use relume::scene::{LightKind, Scene, SceneBuilder};
 use relume::session::{Factors, Grouping, PartFactors, Session};

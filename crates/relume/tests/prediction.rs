@@ -1,12 +1,13 @@
 //! The strategies of prediction: certificates miss nothing and spare work; extrapolation loses what it
 //! says, and nothing once all is at rest.
 
-mod common;
-
 use std::path::Path;
 use std::sync::Arc;
 
-use common::{at_tolerance, facing_up, flipped, form_factor_oracle, lit_room, sliding, still, v};
+use crate::common;
+use crate::common::{
+    at_tolerance, facing_up, flipped, form_factor_oracle, lit_room, sliding, still, v,
+};
 use glam::{DQuat, DVec3};
 use relume::scene::{ImportOptions, Interpolation, Scene, SceneBuilder, Track, import};
 use relume::session::{

@@ -2,11 +2,10 @@
 //! independent renderer): irradiance at sensors of an animated room, patch means of a static one.
 //! Figures are printed (`--nocapture`).
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{at_tolerance, data, leaf_at, leaves_at, rms, shipped, solved, v};
+use crate::common;
+use crate::common::{at_tolerance, data, leaf_at, leaves_at, rms, shipped, solved, v};
 use glam::DVec3;
 use rayon::prelude::*;
 use relume::session::{Session, Snapshot};

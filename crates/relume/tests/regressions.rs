@@ -1,12 +1,11 @@
 //! Every find of the random motions and of users, reduced to the smallest scene; numbered.
 
-mod common;
-
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-use common::pairs::{first_differences, pairs_of};
-use common::{at_tolerance, facing_up, flipped, form_factor_oracle, still, turn, v};
+use crate::common;
+use crate::common::pairs::{first_differences, pairs_of};
+use crate::common::{at_tolerance, facing_up, flipped, form_factor_oracle, still, turn, v};
 use glam::{DQuat, DVec3};
 use relume::scene::{Interpolation, LightKind, NodeId, RotationTrack, SceneBuilder, Track};
 use relume::session::{Options, Session};

@@ -2,12 +2,11 @@
 // Reference values may use the platform's functions: nothing that the engine decides rests on them.
 #![allow(clippy::disallowed_methods)]
 
-mod common;
-
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use common::{at_tolerance, still, v};
+use crate::common;
+use crate::common::{at_tolerance, still, v};
 use glam::DVec3;
 use rayon::prelude::*;
 use relume::scene::outside::{Day, Environment, Outside, SUN_DIAMETER_DEG, Sky, Sun, SunPlace};

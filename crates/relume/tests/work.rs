@@ -2,13 +2,13 @@
 //!
 //! Brute force: two cold builds, before and after, compared pair by pair.
 
-mod common;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use common::pairs::{Difference, Is, Name, difference, first_differences, pairs_of};
-use common::{at_tolerance, facing_up, flipped, form_factor_oracle, lit_room, sliding, still, v};
+use crate::common::pairs::{Difference, Is, Name, difference, first_differences, pairs_of};
+use crate::common::{
+    at_tolerance, facing_up, flipped, form_factor_oracle, lit_room, sliding, still, v,
+};
 use glam::{DQuat, DVec3};
 use relume::element::ElementId;
 use relume::pair::PairId;

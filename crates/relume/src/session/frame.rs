@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::geometry::Pose;
 
-use super::{Event, FrameReport, Sensor, Session, Snapshot};
+use super::{Accuracy, Event, FrameReport, Sensor, Session, Snapshot};
 
 /// The solution of a world, until the session goes on.
 #[derive(Clone, Copy)]
@@ -63,6 +63,11 @@ impl<'a> Frame<'a> {
     /// that is neither far from a sensor nor hidden, more where something is partly in the way.
     pub fn irradiances_at(&self, sensors: &[Sensor]) -> Vec<[f64; 3]> {
         self.session.irradiances_at(sensors)
+    }
+
+    /// Errors of the solution, estimated at so many points with exact visibility; each costs some fifty sensors.
+    pub fn accuracy(&self, points: usize) -> Accuracy {
+        self.session.accuracy(points)
     }
 
     /// The link events of this frame, if [`super::Options::events`] asks for them.

@@ -54,7 +54,7 @@ impl Session {
     #[doc(hidden)]
     pub fn irradiances_at(&self, sensors: &[Sensor]) -> Vec<[f64; 3]> {
         let solved = self.solved.as_ref().expect("a step comes before a query");
-        let one = |sensor: &Sensor| Look::new((self, solved), sensor, true).irradiance();
+        let one = |sensor: &Sensor| Look::new((self, solved), sensor, Purpose::Sensor).irradiance();
         sensors.par_chunks(SENSORS_AT_ONCE).flat_map_iter(|some| some.iter().map(one)).collect()
     }
 }
@@ -86,8 +86,19 @@ const BY_LINES: f64 = 0.02;
 /// Halvings of a leaf that falls into too many pieces; then its middle decides.
 const SPLITS: u32 = 6;
 
+/// What a look is for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Purpose {
+    /// A sensor itself: all that leaves surfaces close by is gathered anew where they are looked at.
+    Sensor,
+    /// A point that a sensor sees: leaves are taken at their word.
+    Beyond,
+    /// A point of which each source is listed: leaves are taken at their word.
+    Listing,
+}
+
 /// A sensor looking at a solved scene.
-struct Look<'a> {
+pub(super) struct Look<'a> {
     session: &'a Session,
     solved: &'a Solved,
     forest: &'a Forest,
@@ -96,8 +107,7 @@ struct Look<'a> {
     /// Where the sensor's front begins.
     tangent: Plane,
     slack_m: f64,
-    /// Whether it is the sensor itself: all that leaves surfaces close by is gathered anew where they are looked at.
-    is_first: bool,
+    purpose: Purpose,
 }
 
 /// What a point gathers.
@@ -109,6 +119,18 @@ struct Gathered {
     parts: Vec<Part>,
     /// Such leaves as wholes; of other points.
     near: Vec<Near>,
+    /// What is far enough, where sources are listed.
+    far: Vec<Source>,
+}
+
+/// An element that light comes from.
+#[derive(Clone, Copy)]
+pub(super) struct Source {
+    pub(super) element: ElementId,
+    /// Form factor from the point to what is seen of it.
+    pub(super) factor: f64,
+    /// The middle of what is seen, where that is not all of it.
+    pub(super) at: Option<DVec3>,
 }
 
 /// A part of a leaf, as large as it is far.
@@ -124,15 +146,17 @@ struct Part {
 struct Near {
     leaf: ElementId,
     factor: f64,
+    /// The middle of what is seen of it.
+    at: DVec3,
     /// What its line says that it sends, W/m2.
     sent: [f64; 3],
 }
 
 impl<'a> Look<'a> {
-    fn new(
+    pub(super) fn new(
         (session, solved): (&'a Session, &'a Solved),
         sensor: &Sensor,
-        is_first: bool,
+        purpose: Purpose,
     ) -> Look<'a> {
         let slack_m = SENSOR_ROUNDING * solved.view.fixed_box(Forest::ROOT).diagonal();
         Look {
@@ -143,12 +167,22 @@ impl<'a> Look<'a> {
             normal: sensor.normal,
             tangent: Plane::through(sensor.at, sensor.normal),
             slack_m,
-            is_first,
+            purpose,
         }
     }
 
+    /// What arrives at the point if leaves are taken at their word, W/m2, and from where: a look for [`Purpose::Listing`].
+    pub(super) fn by_source(&self) -> ([f64; 3], Vec<Source>) {
+        let Gathered { mut sum, near, mut far, .. } = self.gather();
+        for n in &near {
+            (0..3).for_each(|c| sum[c] += n.sent[c]);
+            far.push(Source { element: n.leaf, factor: n.factor, at: Some(n.at) });
+        }
+        (sum, far)
+    }
+
     /// What arrives at the sensor, W/m2.
-    fn irradiance(&self) -> [f64; 3] {
+    pub(super) fn irradiance(&self) -> [f64; 3] {
         let Gathered { mut sum, parts, .. } = self.gather();
         let add = |sum: &mut [f64; 3], part: &Part, b: [f64; 3]| {
             (0..3).for_each(|c| sum[c] += part.factor * b[c]);
@@ -286,27 +320,29 @@ impl<'a> Look<'a> {
             return;
         }
         let is_near = e.radius > e.bounds.distance(&Aabb::of([self.point]));
-        if self.is_first && is_near {
+        if self.purpose == Purpose::Sensor && is_near {
             return self.add_parts(id, &seen, (&in_the_way, SPLITS), &mut out.parts);
         }
-        let (factor, b) = if in_the_way.is_empty() && !is_near {
-            (
-                form_factor_from_point(self.point, self.normal, &seen),
-                self.solved.radiosity.radiosity(id.0),
-            )
+        let (factor, b, at) = if in_the_way.is_empty() && !is_near {
+            let factor = form_factor_from_point(self.point, self.normal, &seen);
+            (factor, self.solved.radiosity.radiosity(id.0), None)
         } else {
             // The part in view may be much brighter or darker than the rest.
             let (factor, moment) = self.factor_past(&seen, &in_the_way, SPLITS);
-            (factor, self.radiosity_at(&e, id, moment / factor.max(f64::MIN_POSITIVE)))
+            let at = moment / factor.max(f64::MIN_POSITIVE);
+            (factor, self.radiosity_at(&e, id, at), Some(at))
         };
         if factor <= 0.0 {
             return;
         }
         let sent = b.map(|b| factor * f64::from(b));
-        if is_near {
-            out.near.push(Near { leaf: id, factor, sent });
-        } else {
-            (0..3).for_each(|c| out.sum[c] += sent[c]);
+        if let (true, Some(at)) = (is_near, at) {
+            out.near.push(Near { leaf: id, factor, at, sent });
+            return;
+        }
+        (0..3).for_each(|c| out.sum[c] += sent[c]);
+        if self.purpose == Purpose::Listing {
+            out.far.push(Source { element: id, factor, at });
         }
     }
 
@@ -340,7 +376,7 @@ impl<'a> Look<'a> {
     }
 
     /// Radiosity of an element at a point of it, from its line, never negative.
-    fn radiosity_at(&self, e: &WorldElement, id: ElementId, at: DVec3) -> [f32; 3] {
+    pub(super) fn radiosity_at(&self, e: &WorldElement, id: ElementId, at: DVec3) -> [f32; 3] {
         let place = place_of(self.forest, id);
         let b = self.solved.radiosity.linear(id.0, &place, SQUARE_MOMENT);
         // Its mean is that of what is exposed of it.
@@ -391,7 +427,7 @@ impl<'a> Look<'a> {
             let patch = &scene.patches[patch.0 as usize];
             let now = &self.solved.world;
             let (m, rho) = (now.exitance(scene, patch), now.reflectance(scene, patch));
-            let look = Look::new((self.session, self.solved), &sensor, false);
+            let look = Look::new((self.session, self.solved), &sensor, Purpose::Beyond);
             let Gathered { sum, near, .. } = look.gather();
             for c in 0..3 {
                 b[c] += share[c] * m[c];
@@ -461,7 +497,7 @@ impl<'a> Look<'a> {
 }
 
 /// The first of some numbers up to which all sum to a share of the whole.
-fn at_share(values: impl Iterator<Item = f64> + Clone, share: f64) -> Option<usize> {
+pub(super) fn at_share(values: impl Iterator<Item = f64> + Clone, share: f64) -> Option<usize> {
     let mut left = share * values.clone().sum::<f64>();
     let last = values.clone().count().checked_sub(1)?;
     let found = values.into_iter().position(|value| {
@@ -473,7 +509,7 @@ fn at_share(values: impl Iterator<Item = f64> + Clone, share: f64) -> Option<usi
 
 /// Number `k` of a sequence that fills (0, 1) evenly, another for each dimension: multiples of the roots of primes, less whole
 /// numbers (Richtmyer 1951).
-fn spread(k: usize, dimension: usize) -> f64 {
+pub(super) fn spread(k: usize, dimension: usize) -> f64 {
     const PRIMES: [f64; 26] = [
         2., 3., 5., 7., 11., 13., 17., 19., 23., 29., 31., 37., 41., 43., 47., 53., 59., 61., 67.,
         71., 73., 79., 83., 89., 97., 101.,

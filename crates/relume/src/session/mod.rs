@@ -12,6 +12,7 @@ use crate::scene::{BodyId, Held, Patch, Scene, World};
 use crate::solver::{GroupLinks, Links, Radiosity};
 use crate::transport::Simd;
 
+mod accuracy;
 mod advance;
 mod ahead;
 mod bends;
@@ -40,6 +41,7 @@ mod surfaces;
 mod tally;
 mod watch;
 
+pub use accuracy::Accuracy;
 pub use command::{Command, CommandError, Removed};
 pub use compare::{Difference, RadiosityGap, Which, compare, radiosity_gap};
 pub use estimate::Estimate;

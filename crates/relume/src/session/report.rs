@@ -4,6 +4,8 @@ use serde::Serialize;
 
 use crate::pair::Work;
 
+use super::Accuracy;
+
 /// One entry of `frames` in a report of schema `relume-report/1`.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct FrameReport {
@@ -72,6 +74,9 @@ pub struct FrameReport {
     /// Where the flux goes, summed over the three channels, where it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy: Option<Energy>,
+    /// Errors of the solution, where they were estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<Accuracy>,
     /// Where the balance is off, the surfaces that receive most light over rows that sum to more than 1.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub suspects: Vec<String>,

@@ -6,8 +6,8 @@ use glam::{DQuat, DVec3};
 use relume::session::Sensor;
 use relume_judge::Random;
 
-use crate::case::{Case, chance, log_between, v, whole};
-use crate::near::room;
+use crate::outside::case::{Case, chance, log_between, v, whole};
+use crate::outside::near::room;
 
 /// An egg-crate louvre of blades that cross, under a lamp or in the dark.
 pub(crate) fn louvre(r: &mut Random, case: &mut Case) {

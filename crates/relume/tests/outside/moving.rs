@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use glam::{DQuat, DVec3};
 use relume_judge::Random;
 
-use crate::case::{Case, Mover, chance, log_between, v, whole};
-use crate::near::room;
+use crate::outside::case::{Case, Mover, chance, log_between, v, whole};
+use crate::outside::near::room;
 
 /// Double-sided, piercing, flush and coincident bodies in motion under a lamp.
 pub(crate) fn motion(r: &mut Random, case: &mut Case) {

@@ -7,8 +7,10 @@ use glam::{DQuat, DVec3};
 use relume::session::Sensor;
 use relume_judge::{Random, exact, rows};
 
-use crate::case::{Case, Contact, Known, Mover, chance, cuboid_sides, log_between, v, whole};
-use crate::{many, thin};
+use crate::outside::case::{
+    Case, Contact, Known, Mover, chance, cuboid_sides, log_between, v, whole,
+};
+use crate::outside::{many, thin};
 
 /// The size of some room, m.
 pub(crate) fn room(r: &mut Random) -> DVec3 {

@@ -9,8 +9,8 @@ use relume::session::{Closure, Energy, Grouping, Options, Sensor, Session};
 use relume_judge::path::{self, Site};
 use relume_judge::rows;
 
-use crate::case::{Case, Mover, v};
-use crate::verdict::{Table, overlap_is_said};
+use crate::outside::case::{Case, Mover, v};
+use crate::outside::verdict::{Table, overlap_is_said};
 
 /// A closed room of 4 x 3 x 2.5 m, `r-x0` to `r-z1`.
 fn room() -> Case {

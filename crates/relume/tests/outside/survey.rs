@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use crate::case::Case;
-use crate::verdict::{STEP, Verdict, judge};
-use crate::{KINDS, kind};
+use crate::outside::case::Case;
+use crate::outside::verdict::{STEP, Verdict, judge};
+use crate::outside::{KINDS, kind};
 
 /// One line about a scene.
 fn line(name: &str, seed: u64, case: &Case, verdict: &Verdict) -> String {

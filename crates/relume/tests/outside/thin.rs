@@ -6,8 +6,8 @@ use glam::{DQuat, DVec3};
 use relume::session::Sensor;
 use relume_judge::{Random, exact};
 
-use crate::case::{Case, Known, chance, log_between, v, whole};
-use crate::near::{box_above, room};
+use crate::outside::case::{Case, Known, chance, log_between, v, whole};
+use crate::outside::near::{box_above, room};
 
 /// A strip over a floor with nothing between: standing, leaning, facing it or lying the other way.
 pub(crate) fn strip(r: &mut Random, case: &mut Case) {

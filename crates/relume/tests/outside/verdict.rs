@@ -9,7 +9,7 @@ use relume::session::{Factors, FrameReport, Grouping, Options, Sensor, Session};
 use relume_judge::path::{self, Estimate, Site};
 use relume_judge::rows;
 
-use crate::case::Case;
+use crate::outside::case::Case;
 
 /// The balance of energy that is kept, of what is emitted.
 const BALANCE: f64 = 0.01;
@@ -252,7 +252,7 @@ fn rays(tolerance: f64) -> u32 {
 
 /// The covered part of the floor and the bottom see each other, or nothing; neither sees the environment.
 fn contact_holds(
-    contact: &crate::case::Contact,
+    contact: &crate::outside::case::Contact,
     table: &Table,
     allowed: f64,
     verdict: &mut Verdict,

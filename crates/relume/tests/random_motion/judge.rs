@@ -9,7 +9,7 @@ use relume::session::{FrameReport, Session, Snapshot};
 use crate::common::audit::{Audit, audit};
 use crate::common::leaf_area;
 use crate::common::pairs::first_differences;
-use crate::recipe::Recipe;
+use crate::random_motion::recipe::Recipe;
 
 /// What was seen, so that a run which checks nothing is noticed.
 #[derive(Clone, Copy, Debug, Default)]

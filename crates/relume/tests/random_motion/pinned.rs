@@ -1,7 +1,7 @@
 //! Hashes of what the engine computes, pinned: a change that means to change no result changes none.
 //!
 //! `data/pinned.txt` holds one line a frame: links by the engine's own hash, and radiosities. A commit that changes
-//! results on purpose writes the file anew (`RELUME_PIN=1 cargo test --test random_motion pinned`) and says why.
+//! results on purpose writes the file anew (`RELUME_PIN=1 cargo test --test tests random_motion::pinned`) and says why.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use relume::scene::Scene;
 use relume::session::{Options, Session};
 
 use crate::common::{at_tolerance, data, form_factor_oracle, shipped};
-use crate::recipe::{Flavour, Recipe};
+use crate::random_motion::recipe::{Flavour, Recipe};
 
 /// A scene as it is solved.
 struct Pin {

@@ -15,7 +15,7 @@ use relume_judge::path::{self, Estimate};
 use relume_judge::{Polygon, Random, World, seen};
 
 use crate::common::{self, at_tolerance, form_factor_oracle, judged, v};
-use crate::grid;
+use crate::validation::grid;
 
 /// A room of 1 m with a lamp set in its ceiling and 64 boxes of 4 to 9 cm in a jittered grid, each turned
 /// at random; everything has reflectance 0.5. No two boxes touch.

@@ -8,7 +8,7 @@ use relume::scene::{LightKind, MaterialId, Scene, SceneBuilder};
 use relume_judge::{exact, seen};
 
 use crate::common::{self, at_tolerance, facing_up, leaf_area, solved, v};
-use crate::line;
+use crate::validation::line;
 
 /// What reflects in 5.6 and 5.7, and how much.
 struct Reflector {

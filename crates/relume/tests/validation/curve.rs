@@ -11,7 +11,7 @@ use relume_judge::path::{self, Estimate, Site};
 use relume_judge::{Random, World};
 
 use crate::common::{self, at_tolerance, form_factor_oracle, judged};
-use crate::grid;
+use crate::validation::grid;
 
 /// A scene with its references.
 struct Case {
@@ -129,7 +129,12 @@ fn the_curve() {
     let cases = [
         static_room(1000),
         Case::new("lit_room", common::lit_room(), eight, 1000),
-        Case::new("64 boxes", crate::boxes::room_of_boxes(), crate::boxes::sides, 700),
+        Case::new(
+            "64 boxes",
+            crate::validation::boxes::room_of_boxes(),
+            crate::validation::boxes::sides,
+            700,
+        ),
     ];
     for case in &cases {
         case.describe();

@@ -10,7 +10,7 @@ use relume::session::Session;
 use relume_judge::{exact, seen};
 
 use crate::common::{self, Quad, at_tolerance, facing_up, flipped, form_factor, plate_scene, v};
-use crate::line;
+use crate::validation::line;
 
 type Polygons = Vec<Vec<DVec3>>;
 

@@ -4,8 +4,8 @@ use relume::scene::{PatchId, Scene};
 use relume::session::Session;
 use relume_judge::path::{Estimate, Site};
 
-use crate::cells::Cells;
 use crate::common::{judged, rms};
+use crate::validation::cells::Cells;
 
 /// How many cells there are along each side of a patch of a named surface.
 pub(crate) type Sides = fn(&str) -> usize;

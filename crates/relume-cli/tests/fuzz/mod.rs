@@ -1,7 +1,7 @@
 //! Damaged files of every format that is read, made from valid ones by their structure: whatever the command is
 //! given, it ends in time and within bounds, in words and with an exit code of its own, and writes numbers.
 //!
-//! Everything follows from a seed. `RELUME_FUZZ_RUNS=100000 cargo test --release -p relume-cli --test fuzz -- --ignored
+//! Everything follows from a seed. `RELUME_FUZZ_RUNS=100000 cargo test --release -p relume-cli --test tests fuzz:: -- --ignored
 //! --nocapture` runs as many as are asked for (`RELUME_FUZZ_SEED` begins elsewhere) and keeps what it finds in
 //! `RELUME_FUZZ_KEEP`, or in `target/tmp/fuzz`. Must not know how anything is read.
 
@@ -17,9 +17,9 @@ mod seeds;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use child::{Find, Limits};
-use random::Random;
-use seeds::{Format, Seed};
+use self::child::{Find, Limits};
+use self::random::Random;
+use self::seeds::{Format, Seed};
 
 /// What is tried with a file.
 fn commands(format: Format, random: &mut Random) -> Vec<Vec<String>> {

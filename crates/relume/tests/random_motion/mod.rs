@@ -3,8 +3,6 @@
 //! Every draw follows from a number. What fails is reduced and printed as a recipe, to be written
 //! down among the named regressions in `regressions.rs`.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod judge;
 mod pinned;
 mod recipe;
@@ -12,10 +10,10 @@ mod recipe;
 use std::ops::Range;
 use std::sync::Arc;
 
-use common::Random;
-use common::audit::{Audit, audit};
-use judge::{Seen, agree, follow, reduced};
-use recipe::{Flavour, Recipe};
+use self::judge::{Seen, agree, follow, reduced};
+use self::recipe::{Flavour, Recipe};
+use crate::common::Random;
+use crate::common::audit::{Audit, audit};
 use relume::session::Session;
 
 /// Steps of each draw.

@@ -7,9 +7,6 @@
 #[path = "../../benches/common/cells.rs"]
 #[allow(dead_code)] // the benches use the rest
 mod cells;
-#[path = "../common/mod.rs"]
-mod common;
-
 use std::fs;
 use std::path::Path;
 

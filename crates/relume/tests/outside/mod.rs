@@ -3,7 +3,7 @@
 //!
 //! A few of each kind run here. Five hundred of each, with how many passed, the worst of them and the slowest:
 //!
-//!     cargo test --release -p relume --test outside five_hundred -- --ignored --nocapture
+//!     cargo test --release -p relume --test tests five_hundred -- --ignored --nocapture
 //!
 //! with, if wanted, `RELUME_KINDS=slab,strip`, `RELUME_SEEDS=0..100`, `RELUME_TOLERANCE=0.02`, `RELUME_LIMIT_S=60`
 //! (a scene that takes longer is ended) and `RELUME_JOBS=2` in the environment. One alone, with all that was measured:
@@ -20,7 +20,7 @@ mod survey;
 mod thin;
 mod verdict;
 
-use case::Case;
+use self::case::Case;
 use relume_judge::Random;
 
 /// A kind of scene: its name, the draw, and tolerances that seeds take in turn.

@@ -17,7 +17,7 @@ mod textures;
 
 use std::path::{Path, PathBuf};
 
-use gltf::Gltf;
+use self::gltf::Gltf;
 use relume::scene::{ImportOptions, Note, Scene, SceneError, import};
 
 fn read(path: &Path) -> Result<Scene, SceneError> {

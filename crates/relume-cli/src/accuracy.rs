@@ -1,0 +1,75 @@
+//! How good a run's frames are, estimated and said.
+
+use relume::session::{Accuracy, Sensor, Session};
+
+/// The estimates of a run, if any are wanted, and the worst of them.
+#[derive(Debug)]
+pub(crate) struct Estimates {
+    points: Option<usize>,
+    worst: Option<(u32, Accuracy)>,
+}
+
+impl Estimates {
+    pub(crate) fn new(points: Option<u32>) -> Estimates {
+        Estimates { points: points.map(|n| n as usize), worst: None }
+    }
+
+    /// Estimates the error of the frame just solved: at an even share of the sensors, or else at points spread over what is lit.
+    pub(crate) fn of(
+        &mut self,
+        session: &Session,
+        frame: u32,
+        sensors: Option<&[Sensor]>,
+    ) -> Option<Accuracy> {
+        let points = self.points?;
+        let found = match sensors {
+            None => session.accuracy(points),
+            Some(sensors) => session.accuracy_at(&some(sensors, points)),
+        };
+        if self.worst.is_none_or(|(_, worst)| found.rms > worst.rms) {
+            self.worst = Some((frame, found));
+        }
+        Some(found)
+    }
+
+    /// A line about the worst frame; empty if no error was estimated, or nothing is lit.
+    pub(crate) fn line(&self, tolerance: f64) -> String {
+        let Some((frame, found)) = self.worst.filter(|(_, found)| found.points > 0) else {
+            return String::new();
+        };
+        let Accuracy { points, rms, resolved, largest, largest_at: [x, y, z], mesh_rms } = found;
+        let percent = |error: f64| match error < resolved {
+            true => format!("less than {:.2} %", 100.0 * resolved),
+            false => format!("about {:.2} %", 100.0 * error),
+        };
+        let mut line = format!(
+            "\nframe {frame}: irradiance is off by {} (RMS at {points} points, most near {x:.3},{y:.3},{z:.3}: {:+.1} %)",
+            percent(rms),
+            100.0 * largest
+        );
+        if let Some(mesh) = mesh_rms {
+            line += &format!("; the mesh by {}", percent(mesh));
+        }
+        if rms > tolerance && rms > resolved {
+            line += &format!(
+                "\nnote: that is more than the tolerance of {tolerance}: try --tolerance {}",
+                finer(tolerance, rms)
+            );
+        }
+        line
+    }
+}
+
+/// An even share of some sensors, at most so many.
+fn some(sensors: &[Sensor], most: usize) -> Vec<Sensor> {
+    let count = sensors.len().min(most);
+    (0..count).map(|k| sensors[k * sensors.len() / count]).collect()
+}
+
+/// A tolerance at which the error may come down to `tolerance`: errors fall about as the root of it, and no faster than a
+/// fifth at once is worth trying.
+fn finer(tolerance: f64, rms: f64) -> f64 {
+    let wanted = tolerance * (tolerance / rms).powi(2).clamp(0.2, 0.5);
+    let unit = 10_f64.powf(wanted.log10().floor());
+    unit * (wanted / unit).floor().max(1.0)
+}

@@ -1,0 +1,18 @@
+//! The integration tests of the command, one binary: each runs `relume` as a user would.
+
+mod bench;
+mod command_line;
+mod common;
+mod factors;
+mod first_minutes;
+mod flat;
+mod fuzz;
+mod killed;
+mod memory;
+mod outside;
+mod pictures;
+mod probe;
+mod readme;
+mod replay;
+mod strategies;
+mod verify;

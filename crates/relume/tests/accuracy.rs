@@ -1,0 +1,89 @@
+//! What a solution says of its own errors, beside the judge's path tracer.
+
+use crate::common::{at_tolerance, facing_up, flipped, judged, lit_room, v};
+use glam::{DQuat, DVec3};
+use relume::scene::{MaterialId, Scene, SceneBuilder};
+use relume::session::{Sensor, Session};
+use relume_judge::path::{self, Site};
+use relume_judge::{Random, World};
+
+use std::sync::Arc;
+
+/// Two rooms of 4 x 3 m, 2.5 m high, with a wall between them that leaves 0.4 m open; the lamp is in the first.
+fn behind_a_slit() -> Scene {
+    let mut b = SceneBuilder::new("slit");
+    let grey = b.material("grey", [0.6; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.0; 3], [100.0; 3]);
+    let node = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.cuboid_inward(node, "room", grey, DVec3::ZERO, v(8.0, 3.0, 2.5));
+    b.cuboid(node, "wall", grey, v(3.95, 0.0, 0.0), v(4.05, 2.6, 2.5));
+    b.polygon(node, "lamp", glow, &flipped(facing_up([1.0, 1.8], [1.0, 1.8], 2.4)));
+    b.build().unwrap()
+}
+
+/// A room with a row of narrow blocks along it, 0.3 m apart, lit from one end.
+fn between_blocks() -> Scene {
+    let mut b = SceneBuilder::new("blocks");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.0; 3], [60.0; 3]);
+    let node = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.cuboid_inward(node, "room", grey, DVec3::ZERO, v(5.0, 4.0, 3.0));
+    let add = |b: &mut SceneBuilder, k: u32, grey: MaterialId| {
+        let x = 0.8 + 0.7 * f64::from(k);
+        b.cuboid(node, &format!("block {k}"), grey, v(x, 1.0, 0.01), v(x + 0.4, 3.0, 2.0));
+    };
+    (0..5).for_each(|k| add(&mut b, k, grey));
+    b.polygon(node, "lamp", glow, &flipped(facing_up([0.5, 4.5], [0.2, 0.7], 2.9)));
+    b.build().unwrap()
+}
+
+/// Places on the surfaces of a scene, drawn evenly by patch, a little off them.
+fn places(scene: &Scene, count: usize, random: &mut Random) -> Vec<Sensor> {
+    let polygons = judged::polygons(scene, 0.0);
+    let lit: Vec<_> = polygons.iter().filter(|p| p.exitance == [0.0; 3]).collect();
+    (0..count)
+        .map(|k| {
+            let corners = &lit[k * lit.len() / count].corners;
+            let [a, b, d] = [corners[0], corners[1], corners[corners.len() - 1]];
+            let (s, t) = (random.unit(), random.unit());
+            let normal = (b - a).cross(d - a).normalize();
+            Sensor { at: a + (b - a) * s + (d - a) * t * 0.999 + normal * 1e-6, normal }
+        })
+        .collect()
+}
+
+#[test]
+fn a_solution_knows_its_own_error() {
+    let scenes = [(lit_room(), 0.9), (behind_a_slit(), 0.5), (between_blocks(), 0.5)];
+    for (scene, tolerance) in scenes {
+        let scene = Arc::new(scene);
+        let sensors = places(&scene, 48, &mut Random::of_part(5, 0));
+        let mut session = Session::new(Arc::clone(&scene), at_tolerance(tolerance)).unwrap();
+        session.step(0, 0.0).unwrap();
+        let said = session.accuracy_at(&sensors);
+        let everywhere = session.accuracy(32);
+        let found = session.irradiances_at(&sensors);
+        let world = World::new(judged::polygons(&scene, 0.0));
+        let sites: Vec<Site> = sensors.iter().map(|s| Site::point(s.at, s.normal)).collect();
+        let truth = path::irradiance(&world, &sites, 800, 1);
+        let all = |e: [f64; 3]| e.iter().sum::<f64>();
+        let mut squares = Vec::new();
+        for (e, truth) in found.iter().zip(&truth).filter(|(_, t)| all(t.irradiance) > 1e-9) {
+            let right = all(truth.irradiance);
+            let noise: f64 =
+                truth.standard_error.iter().map(|s| s * s).sum::<f64>() / (right * right);
+            squares.push((all(*e) / right - 1.0).powi(2) - 3.0 * noise);
+        }
+        let rms = (squares.iter().sum::<f64>() / squares.len() as f64).max(0.0).sqrt();
+        println!(
+            "{} at {tolerance}: RMS {:.2} %, said {:.2} % (largest {:+.1} %); everywhere {:.2} %, meshes {:.2} %",
+            scene.name,
+            100.0 * rms,
+            100.0 * said.rms,
+            100.0 * said.largest,
+            100.0 * everywhere.rms,
+            100.0 * everywhere.mesh_rms.unwrap()
+        );
+        assert!(said.rms < 1.6 * rms && rms < 1.6 * said.rms, "{}", scene.name);
+    }
+}

@@ -287,10 +287,11 @@ fn what_makes_no_sense_is_refused_and_changes_nothing() {
         assert!(refused.contains(says), "{refused}");
         assert_eq!(session.world(), before);
     }
-    let back = session.apply(Command::Remove(BodyId(3))).unwrap();
     let (corners, triangles) = cube(0.1, false);
-    let new = NewBody::new("y").with_mesh("y", MaterialId(0), &corners, &triangles);
-    session.apply(Command::Insert(new)).unwrap();
+    let new = |name| NewBody::new(name).with_mesh(name, MaterialId(0), &corners, &triangles);
+    session.apply(Command::Insert(new("x"))).unwrap();
+    let back = session.apply(Command::Remove(BodyId(4))).unwrap();
+    session.apply(Command::Insert(new("y"))).unwrap();
     let refused = session.apply(back).unwrap_err().to_string();
     assert!(refused.contains("reverse order"), "{refused}");
 }
@@ -451,4 +452,65 @@ fn the_floor_under_a_crate_that_is_taken_away_is_lit() {
     session.apply(Command::SetPresence(body, None)).unwrap();
     session.apply(Command::SetPose(body, None)).unwrap();
     assert!((floor(&mut session, 3.0) / beside - 1.0).abs() < 1e-3);
+}
+
+/// A room with many boxes, a small one among them; its fifth body.
+fn hall(boxes: u32) -> Scene {
+    let mut b = SceneBuilder::new("hall");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.1; 3], [9.0, 8.0, 7.0]);
+    let walls = b.body("walls");
+    let (corners, triangles) = cube(1.0, true);
+    b.mesh(walls, "walls", grey, &corners, &triangles);
+    let mut r = Random(5);
+    for k in 0..boxes {
+        let half = if k == 3 { 0.02 } else { 0.04 + 0.04 * r.unit() };
+        let at = [k % 4, k / 4 % 4, k / 16].map(|n| 0.42 * f64::from(n) - 0.63 + 0.1 * r.unit());
+        let (corners, triangles) = cube(half, false);
+        let corners: Vec<[f64; 3]> =
+            corners.iter().map(|c| [0, 1, 2].map(|axis| c[axis] + at[axis])).collect();
+        let body = b.body(&format!("box {k}"));
+        b.mesh(body, "box", if k == 7 { glow } else { grey }, &corners, &triangles);
+    }
+    b.build().unwrap()
+}
+
+/// Solves, and says what it cost: pairs looked at, and seconds.
+fn cost(session: &mut Session, what: &str) -> u64 {
+    let report = session.solve().unwrap().report().clone();
+    let (pairs, seconds) = (report.examined + report.coarse_examined, report.seconds.total);
+    println!("{what}: {pairs} pairs looked at, {seconds:.2} s, {} links", report.links);
+    pairs
+}
+
+/// Costs of a cold build; of moving, inserting and removing a small body; of taking a box up and putting it down again.
+fn costs_of_edits(scene: &Scene, tolerance: f64) -> [u64; 8] {
+    let mut session = Session::new(scene.clone(), at_tolerance(tolerance)).unwrap();
+    let all = cost(&mut session, "cold");
+    let move_to = |session: &mut Session, x: f64, what: &str| {
+        let pose = Pose::translation([x, 0.02, -0.01]);
+        session.apply(Command::set_pose(BodyId(4), pose)).unwrap();
+        cost(session, what)
+    };
+    let first = move_to(&mut session, 0.03, "take hold of it");
+    let again = move_to(&mut session, 0.06, "move it");
+    let (corners, triangles) = cube(0.02, false);
+    let shifted: Vec<[f64; 3]> = corners.iter().map(|c| [c[0] + 0.05, c[1], c[2]]).collect();
+    let new = NewBody::new("new").with_mesh("new", MaterialId(0), &shifted, &triangles);
+    let back = session.apply(Command::Insert(new)).unwrap();
+    let inserted = cost(&mut session, "insert one");
+    session.apply(back).unwrap();
+    let removed = cost(&mut session, "remove it");
+    let back = session.apply(Command::Remove(BodyId(4))).unwrap();
+    let made = cost(&mut session, "remove the other");
+    session.apply(back).unwrap();
+    let returned = cost(&mut session, "put it back");
+    session.apply(Command::SetPose(BodyId(4), None)).unwrap();
+    [all, first, again, inserted, removed, made, returned, cost(&mut session, "let it go")]
+}
+
+#[test]
+#[ignore = "a minute: a million links"]
+fn what_edits_cost_among_a_million_links() {
+    costs_of_edits(&hall(60), 0.02);
 }

@@ -3,6 +3,7 @@
 mod common;
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use common::{Random, at_tolerance, form_factor_oracle, shipped, v};
 use glam::{DQuat, DVec3};
@@ -400,11 +401,14 @@ fn ten_thousand_commands_leave_no_trace() {
                 _ => draw(&mut r, session.scene()),
             };
             inverses.extend(session.apply(command).ok());
-            if step % 5 == 0 {
+            if step % 50 == 10 {
+                check(&mut session, &format!("step {step}"));
+            } else if step % 5 == 0 {
                 session.solve().unwrap();
             }
         }
         inverses.into_iter().rev().for_each(|back| drop(session.apply(back).unwrap()));
+        check(&mut session, "back");
         assert_eq!(session.solve().unwrap().hash(), hash);
         bytes.push(session.memory_bytes());
     }
@@ -462,6 +466,7 @@ fn hall(boxes: u32) -> Scene {
     let walls = b.body("walls");
     let (corners, triangles) = cube(1.0, true);
     b.mesh(walls, "walls", grey, &corners, &triangles);
+    b.material("red", [0.7, 0.2, 0.1], [0.0; 3]);
     let mut r = Random(5);
     for k in 0..boxes {
         let half = if k == 3 { 0.02 } else { 0.04 + 0.04 * r.unit() };
@@ -477,15 +482,17 @@ fn hall(boxes: u32) -> Scene {
 
 /// Solves, and says what it cost: pairs looked at, and seconds.
 fn cost(session: &mut Session, what: &str) -> u64 {
+    let start = Instant::now();
     let report = session.solve().unwrap().report().clone();
-    let (pairs, seconds) = (report.examined + report.coarse_examined, report.seconds.total);
-    println!("{what}: {pairs} pairs looked at, {seconds:.2} s, {} links", report.links);
+    let (pairs, all) = (report.examined + report.coarse_examined, start.elapsed().as_secs_f64());
+    let (links, of_pairs) = (report.links, report.seconds.evaluate);
+    println!("{what}: {pairs} pairs looked at, {of_pairs:.2} s; {all:.2} s in all, {links} links");
     pairs
 }
 
 /// Costs of a cold build; of moving, inserting and removing a small body; of taking a box up and putting it down again.
-fn costs_of_edits(scene: &Scene, tolerance: f64) -> [u64; 8] {
-    let mut session = Session::new(scene.clone(), at_tolerance(tolerance)).unwrap();
+fn costs_of_edits(scene: &Scene, options: Options) -> [u64; 8] {
+    let mut session = Session::new(scene.clone(), options).unwrap();
     let all = cost(&mut session, "cold");
     let move_to = |session: &mut Session, x: f64, what: &str| {
         let pose = Pose::translation([x, 0.02, -0.01]);
@@ -512,5 +519,96 @@ fn costs_of_edits(scene: &Scene, tolerance: f64) -> [u64; 8] {
 #[test]
 #[ignore = "a minute: a million links"]
 fn what_edits_cost_among_a_million_links() {
-    costs_of_edits(&hall(60), 0.02);
+    costs_of_edits(&hall(60), Options { groups: false, ..at_tolerance(0.02) });
+}
+
+#[test]
+fn a_body_that_comes_or_goes_costs_as_one_that_moves() {
+    let [cold, hold, moved, inserted, removed, taken, back, release] =
+        costs_of_edits(&hall(8), at_tolerance(0.1));
+    assert!(4 * moved < cold, "{moved} of {cold} pairs");
+    for cost in [hold, inserted, removed, taken, back, release] {
+        assert!(cost <= 2 * moved, "{cost}, and {moved} for a move");
+    }
+}
+
+#[test]
+fn a_body_of_many_patches_is_taken_up_where_it_rests() {
+    let mut b = SceneBuilder::new("shop");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.1; 3], [9.0, 8.0, 7.0]);
+    let bodies = ["walls", "lamp", "ball", "other"].map(|name| b.body(name));
+    let (corners, triangles) = cube(1.0, true);
+    b.mesh(bodies[0], "walls", grey, &corners, &triangles);
+    let (corners, triangles) = cube(0.1, false);
+    b.mesh(bodies[1], "lamp", glow, &corners, &triangles);
+    for (body, x) in [(bodies[2], -0.4), (bodies[3], 0.5)] {
+        let (points, faces) = ball(v(x, 0.2, -0.8), 0.2);
+        b.mesh(body, "ball", grey, &points, &faces);
+    }
+    let scene = b.build().unwrap();
+    let mut session = Session::new(scene, at_tolerance(0.3)).unwrap();
+    let first = session.solve().unwrap();
+    let (all, hash) = (first.report().examined, first.hash());
+    assert!(first.report().link_kinds.is_some(), "there are groups");
+    let undo = Command::set_pose(bodies[2], Pose::translation([0.02, 0.01, 0.0]));
+    let undo = session.apply(undo).unwrap();
+    check(&mut session, "taken up");
+    let taken = session.frame().unwrap().report().examined;
+    let (points, faces) = ball(v(0.0, -0.5, 0.3), 0.1);
+    let new = NewBody::new("new").with_mesh("new", MaterialId(0), &points, &faces);
+    let out = session.apply(Command::Insert(new)).unwrap();
+    check(&mut session, "another one comes");
+    session.apply(out).unwrap();
+    session.apply(undo).unwrap();
+    check(&mut session, "and leaves, and the first is put down");
+    assert_eq!(session.solve().unwrap().hash(), hash);
+    assert!(2 * taken < all, "{taken} of {all} pairs");
+}
+
+/// A ball of 12 by 8 quadrilaterals, each of two triangles.
+fn ball(at: DVec3, radius: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let (around, up) = (12, 8);
+    let point = |i: u32, k: u32| {
+        let turn = 2.0 * std::f64::consts::PI * f64::from(i % around) / f64::from(around);
+        let rise = std::f64::consts::PI * (f64::from(k) / f64::from(up) - 0.5);
+        let out = libm::cos(rise);
+        let d = v(out * libm::cos(turn), out * libm::sin(turn), libm::sin(rise));
+        (at + radius * d).to_array()
+    };
+    let quads = (0..around).flat_map(|i| (0..up).map(move |k| (i, k)));
+    let mut out = (Vec::new(), Vec::new());
+    for (i, k) in quads {
+        let first = out.0.len() as u32;
+        out.0.extend([point(i, k), point(i + 1, k), point(i + 1, k + 1), point(i, k + 1)]);
+        out.1.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    }
+    out
+}
+
+#[test]
+fn edits_come_to_the_same_on_any_number_of_threads() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut session = Session::new(hall(5), at_tolerance(0.2)).unwrap();
+            let mut r = Random(9);
+            let mut hashes = vec![session.solve().unwrap().hash()];
+            let mut inverses = Vec::new();
+            for command in [insertion(&mut r), Command::Remove(BodyId(2)), insertion(&mut r)] {
+                inverses.push(session.apply(command).unwrap());
+                hashes.push(session.solve().unwrap().hash());
+            }
+            for inverse in inverses.into_iter().rev() {
+                session.apply(inverse).unwrap();
+                hashes.push(session.solve().unwrap().hash());
+            }
+            hashes
+        })
+    };
+    let one = run(1);
+    assert_eq!(one[0], one[6]);
+    assert_eq!(one[1], one[5]);
+    assert_eq!(one[2], one[4]);
+    assert_eq!((run(2), run(8)), (one.clone(), one));
 }

@@ -48,7 +48,7 @@ pub(super) struct Layout {
     sorts: Vec<Sort>,
     /// By body: whether its patches are planted by sorts.
     sorted: Vec<bool>,
-    /// By body: whether it is planted together with all others that never move.
+    /// By body: whether it is planted together with all others that never move and have few small patches.
     staged: Vec<bool>,
     /// By body: whether it may hold groups: of an inserted one it depends on that body alone.
     grouped: Vec<bool>,
@@ -71,10 +71,11 @@ impl Layout {
         };
         let rests =
             |body: &BodyId| !scene.is_distant(*body) && !scene.moves(*body) && !is_displaced(*body);
-        let resting: usize = bodies().filter(rests).map(small).sum();
-        let sorted =
-            |body: BodyId| !rests(&body) && !scene.is_distant(body) && small(body) >= PATCHES_MIN;
-        let staged = |body: BodyId| rests(&body) && resting >= PATCHES_MIN;
+        // A body of many small patches stands for itself, whether it rests or not: taking it by hand groups nothing anew.
+        let sorted = |body: BodyId| !scene.is_distant(body) && small(body) >= PATCHES_MIN;
+        let shares = |body: &BodyId| rests(body) && !sorted(*body);
+        let resting: usize = bodies().filter(shares).map(small).sum();
+        let staged = |body: BodyId| shares(&body) && resting >= PATCHES_MIN;
         let (sorted, staged): (Vec<bool>, Vec<bool>) =
             bodies().map(|body| (sorted(body), staged(body))).unzip();
         let own = |body: BodyId| sorted[body.0 as usize] || staged[body.0 as usize];

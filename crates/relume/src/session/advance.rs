@@ -2,8 +2,6 @@
 //!
 //! Without a state to start from, the same edits build it: a cold build is the update of nothing.
 
-use std::collections::BTreeMap;
-
 use glam::DVec3;
 
 use crate::element::{ElementId, Forest, Kind, WorldView};
@@ -43,7 +41,6 @@ impl Session {
         let held = std::mem::replace(&mut solved.held, self.held.clone());
         let relit = cold || now.any_relit(&before);
         let touched = std::mem::take(&mut solved.touched);
-        solved.former = BTreeMap::new();
         let mut since =
             (!cold).then(|| Since::new(&self.bed.scene, &solved.forest, &old, &solved.view));
         report.seconds.moving = clock.lap();
@@ -241,7 +238,6 @@ impl Session {
             sound_mean_w_m2: 0.0,
             sound_world: next.world.clone(),
             events: Vec::new(),
-            former: BTreeMap::new(),
             touched: Vec::new(),
             report: FrameReport::default(),
         }

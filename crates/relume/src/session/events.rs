@@ -29,10 +29,7 @@ pub struct Event {
 
 /// The events of the last step, with names.
 pub(super) fn named(scene: &Scene, solved: &Solved) -> Vec<Event> {
-    let whole = |facet| match solved.former.get(&facet) {
-        Some(name) => name.clone(),
-        None => name_of(scene, &solved.forest, ElementKey { facet, path: 1 }),
-    };
+    let whole = |facet| name_of(scene, &solved.forest, ElementKey { facet, path: 1 });
     with_names(&solved.events, &whole)
 }
 

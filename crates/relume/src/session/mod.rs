@@ -1,6 +1,6 @@
 //! The session owns all mutable state and runs the phases of a frame; snapshots come out.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -183,8 +183,6 @@ struct Solved {
     /// The world it was in.
     sound_world: World,
     events: Vec<LinkEvent>,
-    /// Names of facets in events that are there no more.
-    former: BTreeMap<u32, ElementName>,
     /// Facets of which another part is covered than when they were solved, ascending.
     touched: Vec<ElementId>,
     report: FrameReport,

@@ -8,11 +8,11 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::element::{ElementId, Forest, WorldView, old_coarse_numbers};
-use crate::pair::LinkEvent;
+use crate::geometry::Pose;
+use crate::pair::PairId;
 use crate::scene::{BodyId, Held, Patch, Scene};
 
 use super::groups::group_links;
-use super::names::name_of;
 use super::{Session, Solved, Update, seed_of, tally};
 
 /// A solved state whose scene has been edited since.
@@ -51,7 +51,11 @@ impl Session {
         let old = std::mem::replace(&mut self.bed.scene, Arc::new(scene));
         let (Edit::In(body) | Edit::Out(body)) = edit;
         if !old.is_inserted(body) && !self.bed.scene.is_inserted(body) {
-            // One that the scene was made with stays in it, absent.
+            // One that the scene was made with stays in it, absent; that it comes or goes was not foreseen.
+            self.solved = self.solved.take().filter(Solved::is_settled);
+            if let Some(solved) = &mut self.solved {
+                solved.tree.forget_certificates();
+            }
             return;
         }
         self.is_planted = false;
@@ -145,31 +149,16 @@ impl Session {
     }
 
     /// Forgets the bodies that have left, which are absent by now.
-    pub(super) fn forget_remains(&mut self, mut last: Solved, scene: Arc<Scene>) -> Solved {
+    pub(super) fn forget_remains(&mut self, last: Solved, scene: Arc<Scene>) -> Solved {
         let (mut seed, coarse_ids) = seed_of(&scene, &self.options, &self.displaced);
         let emits = |p: &Patch| scene.patch_emits(p) || self.emits_by_hand(&scene, p);
         seed.set_glows(scene.patches.iter().map(emits).collect());
         let bed = Bed { scene, seed, coarse_ids };
         let count = bed.scene.bodies.len();
         let body = |body: BodyId| ((body.0 as usize) < count).then_some(body);
-        for LinkEvent { ends: (a, b), .. } in &last.events {
-            for name in [a.facet, b.facet] {
-                let patch = last.forest.patch(last.forest.named(name));
-                let owner = patch.map(|patch| self.bed.scene.patches[patch.0 as usize].body);
-                if owner.is_some_and(|owner| body(owner).is_none()) {
-                    let whole = crate::element::ElementKey { facet: name, path: 1 };
-                    let name_of = || name_of(&self.bed.scene, &last.forest, whole);
-                    last.former.entry(name).or_insert_with(name_of);
-                }
-            }
-        }
         let mut last = replanted(last, (&self.bed, &bed), &body).expect("the same but for bodies");
         debug_assert!(last.touched.is_empty(), "what has left covers nothing");
-        last.groups = group_links(&last.forest, &last.view, &last.tree);
         last.compact();
-        let mut report = std::mem::take(&mut last.report);
-        tally::fill(&mut report, &last);
-        last.report = report;
         self.bed = bed;
         last
     }
@@ -177,7 +166,7 @@ impl Session {
     /// Bodies that no clip moves, and that a hand has moved, hidden or removed.
     fn displaced_now(&self) -> BTreeSet<BodyId> {
         let Held { poses, presence, .. } = &self.held;
-        let moved = poses.iter().filter(|(_, pose)| **pose != crate::geometry::Pose::IDENTITY);
+        let moved = poses.iter().filter(|(_, pose)| **pose != Pose::IDENTITY);
         let hidden = presence.iter().filter(|(_, there)| !**there);
         let bodies = moved.map(|(&body, _)| body).chain(hidden.map(|(&body, _)| body));
         let scene = &self.bed.scene;
@@ -232,13 +221,17 @@ fn replanted(
         *world = world.of_bodies(&from);
     }
     last.view = WorldView::new(&new.scene, &last.forest, &last.world);
+    last.groups = group_links(&last.forest, &last.view, &last.tree);
+    let mut report = std::mem::take(&mut last.report);
+    tally::fill(&mut report, &last);
+    last.report = report;
     Some(last)
 }
 
 /// Links with an end on some facets, to be made anew.
-pub(super) fn links_on(solved: &Solved, facets: &[ElementId]) -> Vec<crate::pair::PairId> {
+pub(super) fn links_on(solved: &Solved, facets: &[ElementId]) -> Vec<PairId> {
     let is_on = |id| facets.binary_search(&solved.forest.fixed(id)).is_ok();
-    let touches = |&id: &crate::pair::PairId| {
+    let touches = |&id: &PairId| {
         let (a, b) = solved.tree.ends(id);
         is_on(a) || is_on(b)
     };

@@ -67,8 +67,8 @@ impl Forest {
             && glows(self, own) == glows(other, id)
     }
 
-    /// Whether a node is of what the scene was made with.
-    fn is_made(&self, id: ElementId) -> bool {
+    /// Whether a node is of what the scene was made with, not of a body that was inserted.
+    pub fn is_made(&self, id: ElementId) -> bool {
         let name = self.fixed.names.get(self.fixed(id).0 as usize);
         name.is_none_or(|&name| name < FIRST_NAME)
     }

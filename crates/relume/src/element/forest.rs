@@ -183,7 +183,7 @@ struct Fixed {
     names: Vec<u32>,
 }
 
-/// Where elements went when the forest was put together: those that stayed keep their order.
+/// Where elements went when the forest was put together, or followed its scene: those that stayed keep their order.
 #[derive(Clone, Debug)]
 pub struct Renumbering {
     new_of: Vec<u32>,
@@ -191,6 +191,11 @@ pub struct Renumbering {
 }
 
 impl Renumbering {
+    /// From new ids by old one, and old ones by new one; old ids that are gone lead beyond all others.
+    pub fn new(new_of: Vec<u32>, old_of: Vec<u32>) -> Renumbering {
+        Renumbering { new_of, old_of }
+    }
+
     /// New id of an element that is still there.
     #[inline]
     pub fn new_of(&self, old: u32) -> u32 {
@@ -210,7 +215,7 @@ impl Renumbering {
     /// That of the ids below a bound of the old ones and one of the new.
     pub fn below(&self, [old, new]: [u32; 2]) -> Renumbering {
         let (new_of, old_of) = (&self.new_of[..old as usize], &self.old_of[..new as usize]);
-        Renumbering { new_of: new_of.to_vec(), old_of: old_of.to_vec() }
+        Renumbering::new(new_of.to_vec(), old_of.to_vec())
     }
 }
 

@@ -376,7 +376,9 @@ impl PairTree {
         let mut known = BTreeMap::new();
         for id in old.clone().map(PairId) {
             let node = self.nodes[id.0 as usize];
-            known.insert(self.ends(id), (node, self.due(id), self.history(id)));
+            let same = known.insert(self.ends(id), (node, self.due(id), self.history(id)));
+            // Ends that are gone cannot be told apart.
+            same.iter().for_each(|(node, ..)| self.count_out(node));
             self.set_history(id, History::default());
             self.nodes[id.0 as usize].set_state(State::Vacant);
         }
@@ -392,10 +394,13 @@ impl PairTree {
                 None => self.set_state(id, State::Culled(CullReason::Absent)),
             }
         }
-        for (node, ..) in known.into_values() {
-            debug_assert_eq!(node.state(), State::Culled(CullReason::Absent));
-            self.count(node.state(), -1);
-        }
+        known.into_values().for_each(|(node, ..)| self.count_out(&node));
+    }
+
+    /// Counts an absent pair no more.
+    fn count_out(&mut self, node: &Node) {
+        debug_assert_eq!(node.state(), State::Culled(CullReason::Absent));
+        self.count(node.state(), -1);
     }
 
     /// Puts all pairs together so that no room is vacant: parents before children, level by level.
@@ -648,8 +653,14 @@ mod tests {
             assert_eq!(tree.children(pairs[0]), below.0..below.0 + 1);
             assert!(pairs[1..].iter().all(|&pair| tree.state(pair) == absent));
         }
+        // Elements 2 and 3 go at once.
+        let [new_of, old_of] = [vec![0, 1, u32::MAX, u32::MAX, 4, 2], vec![0, 1, 5]];
+        tree.renumber(&Renumbering::new(new_of, old_of));
+        tree.regroup(1..2);
         tree.compact();
-        assert_eq!((tree.len(), tree.links().count()), (5, 1));
+        let found = tree.counts();
+        assert_eq!([found.active, found.refined, found.culled], [1, 2, 0]);
+        assert_eq!((tree.len(), tree.links().count()), (3, 1));
     }
 
     #[test]

@@ -45,7 +45,7 @@ impl Forest {
         let beyond = old.kept_len..self.nodes.len() as u32;
         new_of.extend(beyond.clone().map(|id| id - old.kept_len + new.kept_len));
         old_of.extend(beyond);
-        Some(Renumbering { new_of, old_of })
+        Some(Renumbering::new(new_of, old_of))
     }
 
     /// Whether a node of the kept part is what one of another forest is.

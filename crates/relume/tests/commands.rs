@@ -376,6 +376,17 @@ fn a_solve_is_called_off_and_the_next_one_is_not() {
     let hash = session.solve().unwrap().hash();
     assert_eq!(hash, cold(&session).solve().unwrap().hash());
     assert_eq!(session.frame().map(|frame| frame.hash()), Some(hash));
+    let mut r = Random(3);
+    for _ in 0..2 {
+        session.apply(insertion(&mut r)).unwrap();
+    }
+    session.solve().unwrap();
+    for command in [Command::Remove(BodyId(4)), insertion(&mut r), Command::Remove(BodyId(2))] {
+        session.apply(command).unwrap();
+    }
+    session.watch().cancel();
+    assert!(session.solve().is_err());
+    check(&mut session, "called off while bodies come and go");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Commands: any log and its inverses lead back, and the state after any log is that of a cold build.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use crate::common::{Random, at_tolerance, form_factor_oracle, shipped, v};
 use glam::{DQuat, DVec3};
@@ -285,10 +286,11 @@ fn what_makes_no_sense_is_refused_and_changes_nothing() {
         assert!(refused.contains(says), "{refused}");
         assert_eq!(session.world(), before);
     }
-    let back = session.apply(Command::Remove(BodyId(3))).unwrap();
     let (corners, triangles) = cube(0.1, false);
-    let new = NewBody::new("y").with_mesh("y", MaterialId(0), &corners, &triangles);
-    session.apply(Command::Insert(new)).unwrap();
+    let new = |name| NewBody::new(name).with_mesh(name, MaterialId(0), &corners, &triangles);
+    session.apply(Command::Insert(new("x"))).unwrap();
+    let back = session.apply(Command::Remove(BodyId(4))).unwrap();
+    session.apply(Command::Insert(new("y"))).unwrap();
     let refused = session.apply(back).unwrap_err().to_string();
     assert!(refused.contains("reverse order"), "{refused}");
 }
@@ -372,6 +374,17 @@ fn a_solve_is_called_off_and_the_next_one_is_not() {
     let hash = session.solve().unwrap().hash();
     assert_eq!(hash, cold(&session).solve().unwrap().hash());
     assert_eq!(session.frame().map(|frame| frame.hash()), Some(hash));
+    let mut r = Random(3);
+    for _ in 0..2 {
+        session.apply(insertion(&mut r)).unwrap();
+    }
+    session.solve().unwrap();
+    for command in [Command::Remove(BodyId(4)), insertion(&mut r), Command::Remove(BodyId(2))] {
+        session.apply(command).unwrap();
+    }
+    session.watch().cancel();
+    assert!(session.solve().is_err());
+    check(&mut session, "called off while bodies come and go");
 }
 
 #[test]
@@ -397,11 +410,14 @@ fn ten_thousand_commands_leave_no_trace() {
                 _ => draw(&mut r, session.scene()),
             };
             inverses.extend(session.apply(command).ok());
-            if step % 5 == 0 {
+            if step % 50 == 10 {
+                check(&mut session, &format!("step {step}"));
+            } else if step % 5 == 0 {
                 session.solve().unwrap();
             }
         }
         inverses.into_iter().rev().for_each(|back| drop(session.apply(back).unwrap()));
+        check(&mut session, "back");
         assert_eq!(session.solve().unwrap().hash(), hash);
         bytes.push(session.memory_bytes());
     }
@@ -449,4 +465,159 @@ fn the_floor_under_a_crate_that_is_taken_away_is_lit() {
     session.apply(Command::SetPresence(body, None)).unwrap();
     session.apply(Command::SetPose(body, None)).unwrap();
     assert!((floor(&mut session, 3.0) / beside - 1.0).abs() < 1e-3);
+}
+
+/// A room with many boxes, a small one among them; its fifth body.
+fn hall(boxes: u32) -> Scene {
+    let mut b = SceneBuilder::new("hall");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.1; 3], [9.0, 8.0, 7.0]);
+    let walls = b.body("walls");
+    let (corners, triangles) = cube(1.0, true);
+    b.mesh(walls, "walls", grey, &corners, &triangles);
+    b.material("red", [0.7, 0.2, 0.1], [0.0; 3]);
+    let mut r = Random(5);
+    for k in 0..boxes {
+        let half = if k == 3 { 0.02 } else { 0.04 + 0.04 * r.unit() };
+        let at = [k % 4, k / 4 % 4, k / 16].map(|n| 0.42 * f64::from(n) - 0.63 + 0.1 * r.unit());
+        let (corners, triangles) = cube(half, false);
+        let corners: Vec<[f64; 3]> =
+            corners.iter().map(|c| [0, 1, 2].map(|axis| c[axis] + at[axis])).collect();
+        let body = b.body(&format!("box {k}"));
+        b.mesh(body, "box", if k == 7 { glow } else { grey }, &corners, &triangles);
+    }
+    b.build().unwrap()
+}
+
+/// Solves, and says what it cost: pairs looked at, and seconds.
+fn cost(session: &mut Session, what: &str) -> u64 {
+    let start = Instant::now();
+    let report = session.solve().unwrap().report().clone();
+    let (pairs, all) = (report.examined + report.coarse_examined, start.elapsed().as_secs_f64());
+    let (links, of_pairs) = (report.links, report.seconds.evaluate);
+    println!("{what}: {pairs} pairs looked at, {of_pairs:.2} s; {all:.2} s in all, {links} links");
+    pairs
+}
+
+/// Costs of a cold build; of moving, inserting and removing a small body; of taking a box up and putting it down again.
+fn costs_of_edits(scene: &Scene, options: Options) -> [u64; 8] {
+    let mut session = Session::new(scene.clone(), options).unwrap();
+    let all = cost(&mut session, "cold");
+    let move_to = |session: &mut Session, x: f64, what: &str| {
+        let pose = Pose::translation([x, 0.02, -0.01]);
+        session.apply(Command::set_pose(BodyId(4), pose)).unwrap();
+        cost(session, what)
+    };
+    let first = move_to(&mut session, 0.03, "take hold of it");
+    let again = move_to(&mut session, 0.06, "move it");
+    let (corners, triangles) = cube(0.02, false);
+    let shifted: Vec<[f64; 3]> = corners.iter().map(|c| [c[0] + 0.05, c[1], c[2]]).collect();
+    let new = NewBody::new("new").with_mesh("new", MaterialId(0), &shifted, &triangles);
+    let back = session.apply(Command::Insert(new)).unwrap();
+    let inserted = cost(&mut session, "insert one");
+    session.apply(back).unwrap();
+    let removed = cost(&mut session, "remove it");
+    let back = session.apply(Command::Remove(BodyId(4))).unwrap();
+    let made = cost(&mut session, "remove the other");
+    session.apply(back).unwrap();
+    let returned = cost(&mut session, "put it back");
+    session.apply(Command::SetPose(BodyId(4), None)).unwrap();
+    [all, first, again, inserted, removed, made, returned, cost(&mut session, "let it go")]
+}
+
+#[test]
+#[ignore = "a minute: a million links"]
+fn what_edits_cost_among_a_million_links() {
+    costs_of_edits(&hall(60), Options { groups: false, ..at_tolerance(0.02) });
+}
+
+#[test]
+fn a_body_that_comes_or_goes_costs_as_one_that_moves() {
+    let [cold, hold, moved, inserted, removed, taken, back, release] =
+        costs_of_edits(&hall(8), at_tolerance(0.1));
+    assert!(4 * moved < cold, "{moved} of {cold} pairs");
+    for cost in [hold, inserted, removed, taken, back, release] {
+        assert!(cost <= 2 * moved, "{cost}, and {moved} for a move");
+    }
+}
+
+#[test]
+fn a_body_of_many_patches_is_taken_up_where_it_rests() {
+    let mut b = SceneBuilder::new("shop");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.1; 3], [9.0, 8.0, 7.0]);
+    let bodies = ["walls", "lamp", "ball", "other"].map(|name| b.body(name));
+    let (corners, triangles) = cube(1.0, true);
+    b.mesh(bodies[0], "walls", grey, &corners, &triangles);
+    let (corners, triangles) = cube(0.1, false);
+    b.mesh(bodies[1], "lamp", glow, &corners, &triangles);
+    for (body, x) in [(bodies[2], -0.4), (bodies[3], 0.5)] {
+        let (points, faces) = ball(v(x, 0.2, -0.8), 0.2);
+        b.mesh(body, "ball", grey, &points, &faces);
+    }
+    let scene = b.build().unwrap();
+    let mut session = Session::new(scene, at_tolerance(0.3)).unwrap();
+    let first = session.solve().unwrap();
+    let (all, hash) = (first.report().examined, first.hash());
+    assert!(first.report().link_kinds.is_some(), "there are groups");
+    let undo = Command::set_pose(bodies[2], Pose::translation([0.02, 0.01, 0.0]));
+    let undo = session.apply(undo).unwrap();
+    check(&mut session, "taken up");
+    let taken = session.frame().unwrap().report().examined;
+    let (points, faces) = ball(v(0.0, -0.5, 0.3), 0.1);
+    let new = NewBody::new("new").with_mesh("new", MaterialId(0), &points, &faces);
+    let out = session.apply(Command::Insert(new)).unwrap();
+    check(&mut session, "another one comes");
+    session.apply(out).unwrap();
+    session.apply(undo).unwrap();
+    check(&mut session, "and leaves, and the first is put down");
+    assert_eq!(session.solve().unwrap().hash(), hash);
+    assert!(2 * taken < all, "{taken} of {all} pairs");
+}
+
+/// A ball of 12 by 8 quadrilaterals, each of two triangles.
+fn ball(at: DVec3, radius: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let (around, up) = (12, 8);
+    let point = |i: u32, k: u32| {
+        let turn = 2.0 * std::f64::consts::PI * f64::from(i % around) / f64::from(around);
+        let rise = std::f64::consts::PI * (f64::from(k) / f64::from(up) - 0.5);
+        let out = libm::cos(rise);
+        let d = v(out * libm::cos(turn), out * libm::sin(turn), libm::sin(rise));
+        (at + radius * d).to_array()
+    };
+    let quads = (0..around).flat_map(|i| (0..up).map(move |k| (i, k)));
+    let mut out = (Vec::new(), Vec::new());
+    for (i, k) in quads {
+        let first = out.0.len() as u32;
+        out.0.extend([point(i, k), point(i + 1, k), point(i + 1, k + 1), point(i, k + 1)]);
+        out.1.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    }
+    out
+}
+
+#[test]
+fn edits_come_to_the_same_on_any_number_of_threads() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut session = Session::new(hall(5), at_tolerance(0.2)).unwrap();
+            let mut r = Random(9);
+            let mut hashes = vec![session.solve().unwrap().hash()];
+            let mut inverses = Vec::new();
+            for command in [insertion(&mut r), Command::Remove(BodyId(2)), insertion(&mut r)] {
+                inverses.push(session.apply(command).unwrap());
+                hashes.push(session.solve().unwrap().hash());
+            }
+            for inverse in inverses.into_iter().rev() {
+                session.apply(inverse).unwrap();
+                hashes.push(session.solve().unwrap().hash());
+            }
+            hashes
+        })
+    };
+    let one = run(1);
+    assert_eq!(one[0], one[6]);
+    assert_eq!(one[1], one[5]);
+    assert_eq!(one[2], one[4]);
+    assert_eq!((run(2), run(8)), (one.clone(), one));
 }

@@ -13,6 +13,10 @@ use super::split::{Chart, Extent, Place, Shape};
 use crate::geometry::{Aabb, cut_along, polygon_area, split_convex};
 use crate::scene::{BodyId, Covered, Enclosure, Lines, PatchId, Scene, Solid, Solids};
 
+mod replant;
+
+pub use replant::old_coarse_numbers;
+
 /// Index of a node in a [`Forest`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ElementId(pub u32);
@@ -35,7 +39,7 @@ pub enum Kind {
 /// The name of an element that does not depend on history: its facet and the path below it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ElementKey {
-    /// Id of the quadtree's root, which is fixed.
+    /// Name of the quadtree's root: its id in the forest of the scene as it was made, or one that it has since it was inserted.
     pub facet: u32,
     /// A one bit, then two bits a level.
     pub path: u32,
@@ -171,9 +175,15 @@ struct Fixed {
     near_facets: usize,
     /// Clusters that may be ends of links.
     groups: Groups,
+    /// How many children of the root are of what the scene was made with: they come first.
+    made_children: u32,
+    /// Area of what the scene was made with, m2.
+    made_m2: f32,
+    /// Names by id, where bodies were inserted; else names are ids.
+    names: Vec<u32>,
 }
 
-/// Where elements went when the forest was put together: those that stayed keep their order.
+/// Where elements went when the forest was put together, or followed its scene: those that stayed keep their order.
 #[derive(Clone, Debug)]
 pub struct Renumbering {
     new_of: Vec<u32>,
@@ -181,6 +191,11 @@ pub struct Renumbering {
 }
 
 impl Renumbering {
+    /// From new ids by old one, and old ones by new one; old ids that are gone lead beyond all others.
+    pub fn new(new_of: Vec<u32>, old_of: Vec<u32>) -> Renumbering {
+        Renumbering { new_of, old_of }
+    }
+
     /// New id of an element that is still there.
     #[inline]
     pub fn new_of(&self, old: u32) -> u32 {
@@ -190,6 +205,17 @@ impl Renumbering {
     /// Old ids, by new one.
     pub fn old_of(&self) -> &[u32] {
         &self.old_of
+    }
+
+    /// How many old ids there are.
+    pub fn old_len(&self) -> usize {
+        self.new_of.len()
+    }
+
+    /// That of the ids below a bound of the old ones and one of the new.
+    pub fn below(&self, [old, new]: [u32; 2]) -> Renumbering {
+        let (new_of, old_of) = (&self.new_of[..old as usize], &self.old_of[..new as usize]);
+        Renumbering::new(new_of.to_vec(), old_of.to_vec())
     }
 }
 
@@ -253,19 +279,24 @@ impl Forest {
         forest.push_fixed(Kind::Cluster, NONE, 1);
         let planted = |distant: bool| -> Vec<u32> {
             let bodies = (0..).zip(&scene.bodies);
-            let wanted = bodies.filter(|(_, b)| !b.patches.is_empty() && b.distant == distant);
-            wanted.map(|(k, _)| k).collect()
+            let is_wanted = |(k, b): &(u32, &crate::scene::Body)| {
+                !b.patches.is_empty() && b.distant == distant && !scene.is_inserted(BodyId(*k))
+            };
+            bodies.filter(is_wanted).map(|(k, _)| k).collect()
         };
-        // What is there, the lights, and what is far away.
+        // What is there, the lights, what is far away, and each body that was inserted.
         let (near, far) = (planted(false), planted(true));
+        let inserted = scene.inserted_bodies();
         let lights = scene.lights.len() as u32;
         let first_light = 1 + u32::from(!near.is_empty());
         let after_lights = first_light + lights;
-        let children = after_lights + u32::from(!far.is_empty()) - 1;
+        let made_children = after_lights + u32::from(!far.is_empty()) - 1;
+        let children = made_children + inserted.len() as u32;
         forest.push_fixed(Kind::Light, 0, children);
         forest.nodes[0].fan = Fan::other(1);
+        forest.fixed_mut().made_children = made_children;
         forest.fixed_mut().child_counts[0] =
-            u16::try_from(children).expect("fewer than 65,536 lights");
+            u16::try_from(children).expect("fewer than 65,536 lights and inserted bodies");
         for (light, id) in (first_light..after_lights).enumerate() {
             forest.fixed_mut().subjects[id as usize] = light as u32;
             let twins = &mut forest.twins[id as usize];
@@ -275,6 +306,13 @@ impl Forest {
         if !near.is_empty() {
             forest.plant_bodies((scene, &cuts, layout), &near, 1);
         }
+        let mut beds = Vec::new();
+        for (at, body) in (made_children + 1..).zip(inserted) {
+            let first = forest.nodes.len() as u32;
+            forest.plant_body((scene, &cuts, layout), body.0, at);
+            let names = scene.names_of(body).expect("it was inserted").clone();
+            beds.push(Bed { root: at, below: first..forest.nodes.len() as u32, names });
+        }
         if !far.is_empty() {
             let first = forest.nodes.len();
             forest.plant_bodies((scene, &cuts, layout), &far, after_lights);
@@ -282,6 +320,9 @@ impl Forest {
             distant[after_lights as usize] = true;
             distant[first..].fill(true);
             forest.fixed_mut().distant = distant;
+        }
+        if !beds.is_empty() {
+            forest.fixed_mut().names = names_in(forest.nodes.len() as u32, &beds);
         }
         forest.fixed_mut().facets.sort_unstable();
         let near_facets = forest.facets().partition_point(|facet| !forest.is_distant(*facet));
@@ -481,6 +522,8 @@ impl Forest {
                 sums[parent.0 as usize][1] += exposed;
             }
         }
+        let made = (1..=self.fixed.made_children).rev();
+        self.fixed_mut().made_m2 = made.map(|id| sums[id as usize][0]).sum::<f64>() as f32;
         for (id, [area, exposed]) in (0..).zip(sums) {
             self.nodes[id as usize].area_m2 = area as f32;
             if exposed < area {
@@ -510,6 +553,11 @@ impl Forest {
     /// Ids below this are never reaped.
     pub fn kept_len(&self) -> u32 {
         self.kept_len
+    }
+
+    /// Area of what the scene was made with, m2: it stays when bodies come and go. Exact up to single precision.
+    pub fn made_m2(&self) -> f64 {
+        f64::from(self.fixed.made_m2)
     }
 
     /// How many elements there are.
@@ -551,6 +599,7 @@ impl Forest {
             + f.body_roots.capacity()
             + f.facets.capacity();
         let kinds = f.kinds.capacity() * size_of::<Kind>() + f.child_counts.capacity() * 2;
+        let ids = ids + f.names.capacity();
         (f.charts.capacity() * size_of::<Chart>() + ids * 4 + kinds) as u64
             + f.groups.memory_bytes()
     }
@@ -724,7 +773,20 @@ impl Forest {
         let twins = self.twins(id);
         // Beyond the fixed part twins are an even number of ids from its end.
         let second = if id.0 < self.fixed_len { 0 } else { (id.0 - self.fixed_len) & 1 };
-        ElementKey { facet: twins.facet, path: twins.path + second }
+        let facet = self.fixed.names.get(twins.facet as usize).copied().unwrap_or(twins.facet);
+        ElementKey { facet, path: twins.path + second }
+    }
+
+    /// The facet, light or group of a name.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn named(&self, name: u32) -> ElementId {
+        let names = &self.fixed.names;
+        match names.is_empty() {
+            true => ElementId(name),
+            false => ElementId(names.iter().position(|&n| n == name).expect("a name") as u32),
+        }
     }
 
     /// Corners of an element in its patch's frame.
@@ -802,11 +864,12 @@ impl Forest {
         differs
     }
 
-    /// Whether this is another forest of the same scene though other bodies are displaced: as much of patches is covered, and
-    /// there are no groups.
+    /// Whether this is another forest of the same scene though other bodies are displaced: as much of patches is covered, the
+    /// same patches glow, and there are no groups.
     pub fn is_as_displaced(&self, other: &Forest) -> bool {
-        let no_groups = self.fixed.groups.is_empty() && other.fixed.groups.is_empty();
-        no_groups && self.fixed.covered == other.fixed.covered
+        let (own, others) = (&self.fixed, &other.fixed);
+        let no_groups = own.groups.is_empty() && others.groups.is_empty();
+        no_groups && own.covered == others.covered && own.glows == others.glows
     }
 
     /// Area of the patches that are connected with a patch by common corners, itself among them, m2.
@@ -876,6 +939,7 @@ impl Forest {
         }
         assert!(self.kind(id) == Kind::Element && self.can_split(id), "{id:?} cannot be split");
         let (key, place, chart) = (self.key(id), self.nodes[id.0 as usize].place, *self.chart(id));
+        let facet = self.twins(id).facet;
         let coarse = self.coarse(id).map_or(NONE, |number| number as u32);
         let (places, count) = place.children(chart.len, chart.shape(&place).cut());
         let first = self.room_for(count);
@@ -893,7 +957,7 @@ impl Forest {
         for k in (0..count as u32).step_by(2) {
             let twins = self.twins_of(first + k);
             let path = key.path << 2 | k;
-            self.twins[twins] = Twins { parent: id.0, facet: key.facet, path, coarse, users: 0 };
+            self.twins[twins] = Twins { parent: id.0, facet, path, coarse, users: 0 };
         }
         *self.users(first) = 1;
         self.nodes[id.0 as usize].fan = Fan::new(first, count);
@@ -1050,7 +1114,7 @@ const CROSSED_TIMES: u32 = 2;
 
 impl Cuts {
     fn new(scene: &Scene) -> Cuts {
-        Cuts { lines: scene.discontinuities(), least_m2: CUT_LEAST * scene.area_m2() }
+        Cuts { lines: scene.discontinuities(), least_m2: CUT_LEAST * scene.made_area_m2() }
     }
 
     fn of(&self, patch: u32) -> PatchCuts<'_> {
@@ -1075,6 +1139,28 @@ impl PatchCuts<'_> {
         cut_along(corners, &self.lines.crossing, CROSSED_SHARE, self.slack_m)
             .filter(|(one, two)| is_part(one) && is_part(two))
     }
+}
+
+/// Where an inserted body was planted.
+struct Bed {
+    root: u32,
+    /// All nodes below its root.
+    below: Range<u32>,
+    names: Range<u32>,
+}
+
+/// Names of so many nodes of the fixed part: of what the scene was made with the ids that they would have without the
+/// inserted bodies, which have their own.
+fn names_in(len: u32, beds: &[Bed]) -> Vec<u32> {
+    let mut out = vec![NONE; len as usize];
+    for Bed { root, below, names } in beds {
+        assert!(below.len() < names.len(), "an inserted body has more parts than names");
+        out[*root as usize] = names.start;
+        below.clone().zip(names.start + 1..).for_each(|(id, name)| out[id as usize] = name);
+    }
+    let made = out.iter_mut().filter(|name| **name == NONE);
+    (0..).zip(made).for_each(|(id, name)| *name = id);
+    out
 }
 
 impl Node {

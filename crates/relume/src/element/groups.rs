@@ -48,14 +48,16 @@ pub(super) struct Layout {
     sorts: Vec<Sort>,
     /// By body: whether its patches are planted by sorts.
     sorted: Vec<bool>,
-    /// By body: whether it is planted together with all others that never move.
+    /// By body: whether it is planted together with all others that never move and have few small patches.
     staged: Vec<bool>,
+    /// By body: whether it may hold groups: of an inserted one it depends on that body alone.
+    grouped: Vec<bool>,
 }
 
 impl Layout {
     /// How they are where some bodies that never move in the clip are displaced. Cost: proportional to the patches.
     pub(super) fn of(scene: &Scene, is_displaced: &dyn Fn(BodyId) -> bool) -> Layout {
-        let small_m2 = SMALL_SHARE * scene.area_m2();
+        let small_m2 = SMALL_SHARE * scene.made_area_m2();
         let sort_of = |patch: &crate::scene::Patch| match patch.area_m2() > small_m2 {
             true => Sort::Large,
             false if scene.patch_emits(patch) => Sort::Shines,
@@ -69,15 +71,18 @@ impl Layout {
         };
         let rests =
             |body: &BodyId| !scene.is_distant(*body) && !scene.moves(*body) && !is_displaced(*body);
-        let resting: usize = bodies().filter(rests).map(small).sum();
-        let sorted =
-            |body: BodyId| !rests(&body) && !scene.is_distant(body) && small(body) >= PATCHES_MIN;
-        let staged = |body: BodyId| rests(&body) && resting >= PATCHES_MIN;
-        let layout = Layout {
-            sorted: bodies().map(sorted).collect(),
-            staged: bodies().map(staged).collect(),
-            sorts,
-        };
+        // A body of many small patches stands for itself, whether it rests or not: taking it by hand groups nothing anew.
+        let sorted = |body: BodyId| !scene.is_distant(body) && small(body) >= PATCHES_MIN;
+        let shares = |body: &BodyId| rests(body) && !sorted(*body);
+        let resting: usize = bodies().filter(shares).map(small).sum();
+        let staged = |body: BodyId| shares(&body) && resting >= PATCHES_MIN;
+        let (sorted, staged): (Vec<bool>, Vec<bool>) =
+            bodies().map(|body| (sorted(body), staged(body))).unzip();
+        let own = |body: BodyId| sorted[body.0 as usize] || staged[body.0 as usize];
+        let any_made = bodies().any(|body| !scene.is_inserted(body) && own(body));
+        let may = |body| if scene.is_inserted(body) { own(body) } else { any_made };
+        let grouped = bodies().map(may).collect();
+        let layout = Layout { sorts, sorted, staged, grouped };
         if layout.has_groups() { layout } else { Layout::default() }
     }
 
@@ -89,6 +94,10 @@ impl Layout {
     /// Whether there may be any groups.
     pub(super) fn has_groups(&self) -> bool {
         self.sorted.contains(&true) || self.staged.contains(&true)
+    }
+
+    pub(super) fn is_grouped(&self, body: BodyId) -> bool {
+        self.grouped.get(body.0 as usize).is_some_and(|&grouped| grouped)
     }
 
     pub(super) fn is_sorted(&self, body: u32) -> bool {
@@ -165,9 +174,9 @@ impl Groups {
         let numbers = vec![NONE; len];
         let spans = vec![0..0; len];
         let mut out = Groups { numbers, spans, ..Groups::default() };
-        let area_max = AREA_SHARE * scene.area_m2();
+        let area_max = AREA_SHARE * scene.made_area_m2();
         let across_max =
-            scene.bounds(0.0).map_or(0.0, |(low, high)| ACROSS_SHARE * low.distance(high));
+            scene.made_bounds().map_or(0.0, |(low, high)| ACROSS_SHARE * low.distance(high));
         let mut stack = vec![Forest::ROOT];
         while let Some(id) = stack.pop() {
             let rigid = forest.cluster_body(id).is_some() || forest.is_of_stage(id);
@@ -175,6 +184,9 @@ impl Groups {
                 if forest.kind(id) == Kind::Cluster {
                     stack.extend(forest.children(id).rev().map(ElementId));
                 }
+                continue;
+            }
+            if forest.cluster_body(id).is_some_and(|body| !layout.is_grouped(body)) {
                 continue;
             }
             let fits = forest.area_m2(id) <= area_max

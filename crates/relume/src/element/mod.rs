@@ -10,7 +10,7 @@ mod groups;
 mod split;
 mod world;
 
-pub use forest::{Counts, ElementId, ElementKey, Forest, Kind, Renumbering};
+pub use forest::{Counts, ElementId, ElementKey, Forest, Kind, Renumbering, old_coarse_numbers};
 pub use groups::{Group, GroupLeaf, Groups, grouped_patches};
 pub use split::{Extent, Shape, bilinear, bilinear_area};
 pub use world::{OccluderPolygon, WorldElement, WorldLight, WorldPatch, WorldView};

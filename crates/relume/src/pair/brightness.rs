@@ -70,6 +70,12 @@ impl Brightness {
         )
     }
 
+    /// Follows coarse elements to other numbers: for each the one that it had; what is new has any brightness.
+    pub fn renumber(&mut self, old_of: &[Option<usize>]) {
+        let of = |old: &Option<usize>| old.map_or(Light::UNIFORM, |old| self.coarse[old]);
+        self.coarse = old_of.iter().map(of).collect();
+    }
+
     /// Area at which an element weighs 1 in the error norm, m2.
     pub fn reference_area_m2(&self) -> f64 {
         self.reference_area_m2

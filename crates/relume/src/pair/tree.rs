@@ -1,5 +1,8 @@
 //! The tree of unordered element pairs.
 
+use std::collections::BTreeMap;
+use std::ops::Range;
+
 use glam::DVec2;
 
 use crate::element::{ElementId, Renumbering};
@@ -348,14 +351,56 @@ impl PairTree {
         self.nodes.len() - self.len()
     }
 
-    /// Follows elements to their new ids.
+    /// Follows elements to their new ids. Pairs of those that are gone are of no use then: see [`PairTree::regroup`].
     pub fn renumber(&mut self, to: &Renumbering) {
         for node in &mut self.nodes {
             if node.state() != State::Vacant {
-                let end = |packed: u32| packed & !ID_MASK | to.new_of(packed & ID_MASK);
+                let end = |packed: u32| packed & !ID_MASK | to.new_of(packed & ID_MASK) & ID_MASK;
                 (node.a, node.b) = (end(node.a), end(node.b));
             }
         }
+    }
+
+    /// Follows the root, paired with itself, to its present children: pairs of what it has more are absent, as pairs of
+    /// what it has no more must have been.
+    pub fn regroup(&mut self, children: Range<u32>) {
+        let old = self.children(PairTree::ROOT);
+        if self.state(PairTree::ROOT) != State::RefinedSelf {
+            return;
+        }
+        let with = |one: u32| (one..children.end).map(move |two| (ElementId(one), ElementId(two)));
+        let wanted: Vec<_> = children.clone().flat_map(with).collect();
+        if old.clone().map(|id| self.ends(PairId(id))).eq(wanted.iter().copied()) {
+            return;
+        }
+        let mut known = BTreeMap::new();
+        for id in old.clone().map(PairId) {
+            let node = self.nodes[id.0 as usize];
+            let same = known.insert(self.ends(id), (node, self.due(id), self.history(id)));
+            // Ends that are gone cannot be told apart.
+            same.iter().for_each(|(node, ..)| self.count_out(node));
+            self.set_history(id, History::default());
+            self.nodes[id.0 as usize].set_state(State::Vacant);
+        }
+        self.make_vacant(old);
+        let first = self.refine(PairTree::ROOT, State::RefinedSelf, wanted.iter().copied()).start;
+        for (id, ends) in (first..).map(PairId).zip(&wanted) {
+            match known.remove(ends) {
+                Some((node, due, history)) => {
+                    self.nodes[id.0 as usize] = node;
+                    self.set_due(id, due);
+                    self.set_history(id, history);
+                }
+                None => self.set_state(id, State::Culled(CullReason::Absent)),
+            }
+        }
+        known.into_values().for_each(|(node, ..)| self.count_out(&node));
+    }
+
+    /// Counts an absent pair no more.
+    fn count_out(&mut self, node: &Node) {
+        debug_assert_eq!(node.state(), State::Culled(CullReason::Absent));
+        self.count(node.state(), -1);
     }
 
     /// Puts all pairs together so that no room is vacant: parents before children, level by level.
@@ -418,6 +463,11 @@ impl PairTree {
         let node = &self.nodes[id.0 as usize];
         let (a, b) = self.ends(id);
         (node.state() == State::Active).then(|| Link { a, b, carried: node.carried() })
+    }
+
+    /// Ids of all links, ascending.
+    pub fn link_ids(&self) -> impl Iterator<Item = PairId> + '_ {
+        (0..self.nodes.len() as u32).map(PairId).filter(|&id| self.state(id) == State::Active)
     }
 
     /// All links, in no order of meaning.
@@ -552,12 +602,17 @@ impl PairTree {
             self.set_state(PairId(child), State::Vacant);
             self.set_history(PairId(child), History::default());
         }
-        let count = children.len();
+        self.make_vacant(children);
+        self.set_state(parent, State::New);
+    }
+
+    /// Keeps the room of siblings for others.
+    fn make_vacant(&mut self, siblings: Range<u32>) {
+        let count = siblings.len();
         if self.vacant.len() <= count {
             self.vacant.resize(count + 1, Vec::new());
         }
-        self.vacant[count].push(children.start);
-        self.set_state(parent, State::New);
+        self.vacant[count].push(siblings.start);
     }
 }
 
@@ -573,6 +628,39 @@ mod tests {
             let node = Node::new(a, b, state);
             assert_eq!((node.state(), node.a & ID_MASK, node.b & ID_MASK), (state, a.0, b.0));
         }
+    }
+
+    #[test]
+    fn the_root_follows_its_children() {
+        let mut tree = PairTree::new(ElementId(0));
+        let both = [(1, 1), (1, 2), (2, 2)].map(|(a, b)| (ElementId(a), ElementId(b)));
+        let absent = State::Culled(CullReason::Absent);
+        for id in tree.refine(PairTree::ROOT, State::RefinedSelf, both.into_iter()) {
+            tree.set_state(PairId(id), absent);
+        }
+        let first = PairId(tree.children(PairTree::ROOT).start);
+        tree.set_state(first, State::New);
+        let below = [(ElementId(5), ElementId(5))];
+        let below = tree.refine(first, State::RefinedSelf, below.into_iter());
+        let below = PairId(below.start);
+        tree.set_state(below, State::Active);
+        for (end, counts) in [(4, [1, 2, 5]), (2, [1, 2, 0]), (3, [1, 2, 2])] {
+            tree.regroup(1..end);
+            let found = tree.counts();
+            assert_eq!([found.active, found.refined, found.culled], counts);
+            let pairs: Vec<PairId> = tree.children(PairTree::ROOT).map(PairId).collect();
+            assert_eq!(pairs.len() as u32, (end - 1) * end / 2);
+            assert_eq!(tree.children(pairs[0]), below.0..below.0 + 1);
+            assert!(pairs[1..].iter().all(|&pair| tree.state(pair) == absent));
+        }
+        // Elements 2 and 3 go at once.
+        let [new_of, old_of] = [vec![0, 1, u32::MAX, u32::MAX, 4, 2], vec![0, 1, 5]];
+        tree.renumber(&Renumbering::new(new_of, old_of));
+        tree.regroup(1..2);
+        tree.compact();
+        let found = tree.counts();
+        assert_eq!([found.active, found.refined, found.culled], [1, 2, 0]);
+        assert_eq!((tree.len(), tree.links().count()), (3, 1));
     }
 
     #[test]

@@ -80,6 +80,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
         motion,
         outside: None,
         notes,
+        edited: super::Edited::default(),
     })
 }
 

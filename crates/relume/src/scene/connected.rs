@@ -5,13 +5,13 @@ use super::{BodyId, PatchId, Scene};
 
 impl Scene {
     /// Area of the patches that are connected with each patch by common corners, itself among them, m2. Bodies that never move
-    /// are connected with each other, a body that moves only within itself. Exact up to rounding; both sides of a double-sided
+    /// are connected with each other, a body that moves or was inserted only within itself. Exact up to rounding; both sides of a double-sided
     /// polygon count.
     pub fn connected_areas_m2(&self) -> Vec<f64> {
         let mut out = vec![0.0; self.patches.len()];
         let bodies = (0..self.bodies.len() as u32).map(BodyId);
         let (moving, at_rest): (Vec<BodyId>, Vec<BodyId>) =
-            bodies.partition(|&body| self.moves(body));
+            bodies.partition(|&body| self.moves(body) || self.is_inserted(body));
         self.connect(&at_rest, &mut out);
         moving.into_iter().for_each(|body| self.connect(&[body], &mut out));
         out

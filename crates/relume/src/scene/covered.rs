@@ -86,8 +86,13 @@ struct Lamps {
 }
 
 impl Lamps {
-    fn of(scene: &Scene) -> Lamps {
-        let emits = |id: &u32| scene.patch_emits(&scene.patches[*id as usize]);
+    /// As some bodies may hold them: those of the scene as it was made, and their own.
+    fn of(scene: &Scene, bodies: &[BodyId]) -> Lamps {
+        let counts = |body| !scene.is_inserted(body) || bodies.contains(&body);
+        let emits = |id: &u32| {
+            let patch = &scene.patches[*id as usize];
+            scene.patch_emits(patch) && counts(patch.body)
+        };
         let patch = |id: u32| {
             let patch = &scene.patches[id as usize];
             (PatchId(id), way(scene, patch.body, &Aabb::of(patch.corners_in_body())))
@@ -167,7 +172,7 @@ impl Group {
         }
         let reach = |p: &Placed| p.bounds.lo.abs().max(p.bounds.hi.abs()).max_element();
         let slack_m = IN_PLANE * placed.iter().map(reach).fold(0.0, f64::max);
-        let lamps = Lamps::of(scene);
+        let lamps = Lamps::of(scene, bodies);
         hulls.retain(|hull: &Hull| !lamps.may_shine_in(scene, (&placed, hull), slack_m));
         Group { placed, hulls, slack_m }
     }

@@ -22,13 +22,14 @@ pub struct Lines {
 
 impl Scene {
     /// For each patch, where others meet its plane within it. Bodies that never move meet each other, a body that moves
-    /// only itself: lines of contact that move are not found. Outer edges of the patch are left out. In the patch's frame,
+    /// or was inserted only itself: lines of contact that move are not found. Outer edges of the patch are left out. In the patch's frame,
     /// metres; exact to a millionth of the largest coordinate. Cost: pairs of patches whose boxes meet along x.
     pub fn discontinuities(&self) -> Vec<Lines> {
         let mut out = vec![Lines::default(); self.patches.len()];
         let bodies = (0..self.bodies.len() as u32).map(BodyId);
+        let alone = |body: &BodyId| self.moves(*body) || self.is_inserted(*body);
         let (moving, at_rest): (Vec<BodyId>, Vec<BodyId>) =
-            bodies.filter(|&body| !self.is_distant(body)).partition(|&body| self.moves(body));
+            bodies.filter(|&body| !self.is_distant(body)).partition(alone);
         self.meet(&at_rest, &mut out);
         moving.into_iter().for_each(|body| self.meet(&[body], &mut out));
         out

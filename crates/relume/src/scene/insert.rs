@@ -32,7 +32,18 @@ struct NewMesh {
 
 /// A body that was taken out of a scene, to be put back.
 #[derive(Clone, Debug)]
-pub struct TakenBody {
+pub struct TakenBody(Taken);
+
+#[derive(Clone, Debug)]
+enum Taken {
+    /// One that the scene was made with: it stays in it, absent.
+    Made,
+    /// One that was inserted.
+    Inserted(Box<Inserted>),
+}
+
+#[derive(Clone, Debug)]
+struct Inserted {
     body: Body,
     /// Twins counted from the body's first patch.
     patches: Vec<Patch>,
@@ -95,8 +106,8 @@ impl NewBody {
 impl Scene {
     /// The body of this name.
     pub fn body_named(&self, name: &str) -> Option<BodyId> {
-        let at = self.bodies.iter().position(|body| body.name == name && !body.patches.is_empty());
-        at.map(|k| BodyId(k as u32))
+        let mut ids = (0..self.bodies.len() as u32).map(BodyId);
+        ids.find(|&id| self.bodies[id.0 as usize].name == name && self.has_body(id))
     }
 
     /// The same scene with one body more, at the origin of the world, and the id of that body.
@@ -141,6 +152,7 @@ impl Scene {
             twin: patch.twin.map(|twin| PatchId(first + twin.0)),
             ..patch
         }));
+        scene.edited.insert(id, corners(&scene.patches[first as usize..]));
         scene.bodies.push(Body {
             name,
             node: NodeId(scene.motion.nodes.len() as u32 - 1),
@@ -150,9 +162,14 @@ impl Scene {
         Ok((scene, id))
     }
 
-    /// The same scene without a body, and that body. Its id stays free, unless it was the last one.
+    /// The same scene without a body, and that body. One that the scene was made with stays in it, absent; the id of one that
+    /// was inserted stays reserved, unless it was the last one.
     pub fn without_body(&self, id: BodyId) -> (Scene, TakenBody) {
         let mut scene = self.clone();
+        if !self.is_inserted(id) {
+            scene.edited.set_removed(id, true);
+            return (scene, TakenBody(Taken::Made));
+        }
         let range = self.bodies[id.0 as usize].patches.clone();
         let mut patches: Vec<Patch> =
             scene.patches.drain(range.start as usize..range.end as usize).collect();
@@ -161,8 +178,10 @@ impl Scene {
         }
         scene.renumber(id, range.start, -(patches.len() as i64));
         scene.bodies[id.0 as usize].patches = range.start..range.start;
-        let mut taken = TakenBody { body: self.bodies[id.0 as usize].clone(), patches, ends: None };
+        let body = self.bodies[id.0 as usize].clone();
+        let mut taken = Inserted { body, patches, ends: None };
         if id.0 as usize + 1 == scene.bodies.len() {
+            scene.edited.forget(id);
             scene.bodies.pop();
             let of_others = scene.surfaces.iter().rposition(|surface| surface.body != id);
             let first = of_others.map_or(0, |last| last + 1);
@@ -173,20 +192,28 @@ impl Scene {
             };
             taken.ends = Some(Ends { first: first as u32, surfaces, node });
         }
-        (scene, taken)
+        (scene, TakenBody(Taken::Inserted(Box::new(taken))))
     }
 
     /// Whether a body can be put back under an id: nothing is there.
     pub fn has_room_for(&self, id: BodyId, taken: &TakenBody) -> bool {
+        let last = match &taken.0 {
+            Taken::Made => return self.is_removed(id),
+            Taken::Inserted(inserted) => inserted.ends.is_some(),
+        };
         match self.bodies.get(id.0 as usize) {
-            Some(body) => body.patches.is_empty() && taken.ends.is_none(),
-            None => id.0 as usize == self.bodies.len() && taken.ends.is_some(),
+            Some(body) => body.patches.is_empty() && !last && self.is_inserted(id),
+            None => id.0 as usize == self.bodies.len() && last,
         }
     }
 
     /// The same scene with a body put back, where [`Scene::has_room_for`] it.
     pub fn with_body_back(&self, id: BodyId, taken: &TakenBody) -> Scene {
         let mut scene = self.clone();
+        let Taken::Inserted(taken) = &taken.0 else {
+            scene.edited.set_removed(id, false);
+            return scene;
+        };
         let mut body = taken.body.clone();
         let first = match scene.bodies.get(id.0 as usize) {
             Some(room) => room.patches.start,
@@ -210,11 +237,44 @@ impl Scene {
                     body.node = NodeId(scene.motion.nodes.len() as u32);
                     scene.motion.nodes.push(node.clone());
                 }
+                scene.edited.insert(id, corners(&patches));
                 scene.bodies.push(body);
             }
         }
         scene.patches.splice(first as usize..first as usize, patches);
         scene
+    }
+
+    /// The same scene with inserted bodies of another one, taken out of it since, under new ids at the end: absent, with
+    /// the names that they had, each with one surface. Returns the ids, too.
+    pub(crate) fn with_remains(&self, of: &Scene, bodies: &[BodyId]) -> (Scene, Vec<BodyId>) {
+        let mut scene = self.clone();
+        let mut ids = Vec::new();
+        for &was in bodies {
+            let id = BodyId(scene.bodies.len() as u32);
+            let old = &of.bodies[was.0 as usize];
+            let (first, was_first) = (scene.patches.len() as u32, old.patches.start);
+            // Its node and surfaces may have left with it.
+            let surface = SurfaceId(scene.surfaces.len() as u32);
+            let own = of.patches_of(was).next().map(|(_, patch)| patch.surface);
+            let own = own.map(|own| of.surfaces[own.0 as usize].clone());
+            scene.surfaces.extend(own.map(|own| Surface { body: id, ..own }));
+            scene.patches.extend(of.patches_of(was).map(|(_, patch)| Patch {
+                body: id,
+                surface,
+                twin: patch.twin.map(|twin| PatchId(twin.0 - was_first + first)),
+                ..patch.clone()
+            }));
+            let node = NodeId(scene.motion.nodes.len() as u32);
+            scene.motion.nodes.push(of.motion.nodes[old.node.0 as usize].clone());
+            let patches = first..scene.patches.len() as u32;
+            scene.bodies.push(Body { patches, node, ..old.clone() });
+            let names = of.names_of(was).expect("it was inserted").clone();
+            scene.edited.insert_named(id, names);
+            scene.edited.set_removed(id, true);
+            ids.push(id);
+        }
+        (scene, ids)
     }
 
     /// Numbers of patches as they are once `more` of body `id` begin at `first`, where none is now.
@@ -227,4 +287,9 @@ impl Scene {
             patch.twin = patch.twin.map(|t| if t.0 >= first { PatchId(moved(t.0)) } else { t });
         }
     }
+}
+
+/// How many corners some patches have.
+fn corners(patches: &[Patch]) -> usize {
+    patches.iter().map(|patch| patch.corners.len()).sum()
 }

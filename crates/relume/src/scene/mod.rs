@@ -22,6 +22,7 @@ mod discontinuity;
 mod draft;
 mod drift;
 mod edit;
+mod edited;
 mod error;
 mod flatten;
 mod folder;
@@ -55,6 +56,7 @@ pub use covered::Covered;
 pub use discontinuity::Lines;
 pub use drift::Drift;
 pub use edit::Edits;
+pub(crate) use edited::{Edited, FIRST_NAME};
 pub use error::SceneError;
 pub use glow::Glow;
 pub use import::{ImportOptions, import};
@@ -120,6 +122,8 @@ pub struct Scene {
     pub outside: Option<Arc<outside::Outside>>,
     /// What was noticed while reading, for `info` and `check`.
     pub notes: Vec<Note>,
+    /// Bodies that came or went since.
+    pub(crate) edited: Edited,
 }
 
 /// Everything that moves rigidly together: an animated node with what hangs rigidly below it,
@@ -325,6 +329,11 @@ impl Scene {
         self.bounds_of(|body| self.pose(body, time_s))
     }
 
+    /// The same at time 0 of the bodies that the scene was made with, removed ones among them.
+    pub fn made_bounds(&self) -> Option<(DVec3, DVec3)> {
+        self.bounds_of(|body| self.pose(body, 0.0).filter(|_| !self.is_inserted(body)))
+    }
+
     /// The same of those that are present in a world.
     pub fn bounds_in(&self, now: &World) -> Option<(DVec3, DVec3)> {
         self.bounds_of(|body| now.pose(body))
@@ -352,10 +361,12 @@ impl Scene {
         dark
     }
 
-    /// The same scene without the bodies that stand for light from outside, which come last.
+    /// The same scene without the bodies that stand for light from outside, which come last, and without those that were
+    /// inserted after them.
     pub fn without_outside(&self) -> Scene {
         let mut near = Scene { outside: None, ..self.clone() };
-        near.bodies.retain(|body| !body.distant);
+        let made = near.bodies.iter().position(|body| body.distant).unwrap_or(near.bodies.len());
+        near.bodies.truncate(made);
         let (bodies, patches) =
             (near.bodies.len(), near.bodies.last().map_or(0, |body| body.patches.end));
         near.patches.truncate(patches as usize);
@@ -378,6 +389,13 @@ impl Scene {
     pub fn area_m2(&self) -> f64 {
         let near = self.patches.iter().filter(|p| !self.is_distant(p.body));
         near.map(Patch::area_m2).sum()
+    }
+
+    /// The same of the bodies that the scene was made with, removed ones among them, m2: the scale that sizes are measured
+    /// by, so that none of them changes when a body comes or goes.
+    pub fn made_area_m2(&self) -> f64 {
+        let is_made = |p: &&Patch| !self.is_distant(p.body) && !self.is_inserted(p.body);
+        self.patches.iter().filter(is_made).map(Patch::area_m2).sum()
     }
 }
 

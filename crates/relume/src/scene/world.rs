@@ -59,6 +59,9 @@ impl Scene {
         let pose = |k: u32| {
             let body = BodyId(k);
             let of_clip = || self.pose(body, time_s);
+            if self.is_removed(body) {
+                return None;
+            }
             match held.presence.get(&body) {
                 Some(false) => None,
                 // What the clip has taken away is where it would be.
@@ -132,6 +135,12 @@ impl World {
     #[inline]
     pub fn pose(&self, body: BodyId) -> Option<Pose> {
         self.poses[body.0 as usize]
+    }
+
+    /// The same world of other bodies: each is where one of this world's is, or absent.
+    pub(crate) fn of_bodies(&self, from: &[Option<BodyId>]) -> World {
+        let poses = from.iter().map(|body| body.and_then(|body| self.pose(body))).collect();
+        World { poses, ..self.clone() }
     }
 
     /// World poses of all bodies, by [`BodyId`].

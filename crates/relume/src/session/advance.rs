@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::element::{ElementId, Forest, Kind, WorldView};
 use crate::event::Ticks;
 use crate::pair::{
-    Changes, OutOfMemory, PairHash, PairId, PairTree, Placed, Record, Since, Stage, update,
+    Changes, Edit, OutOfMemory, PairHash, PairId, PairTree, Placed, Record, Since, Stage, update,
 };
 use crate::scene::{self, BodyId, LightId, LightKind, World};
 use crate::solver::{Dirty, GroupLinks, Links, Radiosity};
@@ -17,6 +17,7 @@ use super::budget;
 use super::coarse::{self, Coarse};
 use super::groups::group_links;
 use super::promise::Promise;
+use super::replant::links_on;
 use super::report::FrameReport;
 use super::surfaces::{LitForest, apply_edits, links_of};
 use super::{Clock, FOLLOWED_SHARE, Next, RESIDUAL_SHARE, Session, SessionError, Solved, tally};
@@ -33,20 +34,21 @@ impl Session {
         let cold = last.is_none();
         let mut solved = last.unwrap_or_else(|| self.blank(next));
         let now = &next.world;
-        let view = WorldView::new(&self.scene, &solved.forest, now);
+        let view = WorldView::new(&self.bed.scene, &solved.forest, now);
         let old = std::mem::replace(&mut solved.view, view);
         let before = std::mem::replace(&mut solved.world, now.clone());
         let from_s = std::mem::replace(&mut solved.time_s, next.time_s);
         let held = std::mem::replace(&mut solved.held, self.held.clone());
         let relit = cold || now.any_relit(&before);
+        let touched = std::mem::take(&mut solved.touched);
         let mut since =
-            (!cold).then(|| Since::new(&self.scene, &solved.forest, &old, &solved.view));
+            (!cold).then(|| Since::new(&self.bed.scene, &solved.forest, &old, &solved.view));
         report.seconds.moving = clock.lap();
         let ahead = match cold {
             true => Ahead::default(),
             false => Ahead::new(
                 self.options.update,
-                &Promise { scene: &self.scene, held: &self.held },
+                &Promise { scene: &self.bed.scene, held: &self.held },
                 (&mut solved.ticks, &mut solved.tree),
                 [from_s, next.time_s],
                 Void {
@@ -63,14 +65,19 @@ impl Session {
             let found = self.update(solved, (since, &ahead), level, (record, fresh));
             found.map_err(|OutOfMemory| self.stopped(solved, next.frame))
         };
-        if !self.coarse_ids.is_empty() {
+        if !self.bed.coarse_ids.is_empty() {
             changes = bring(&mut solved, since.as_ref(), Level::Coarse, &[])?;
-            self.follow_coarse(&mut solved, &changes, (since.as_mut(), relit));
+            self.follow_coarse(
+                &mut solved,
+                &changes,
+                (since.as_mut(), relit || !touched.is_empty()),
+            );
         }
         let fine = bring(&mut solved, since.as_ref(), Level::Fine, &changes.refined)?;
         changes.work.add_after_coarse(fine.work);
         changes.edits.extend(fine.edits);
         changes.events.extend(fine.events);
+        changes.edits.extend(links_on(&solved, &touched).into_iter().map(Edit::Set));
         solved.events = std::mem::take(&mut changes.events);
         let work = changes.work;
         report.seconds.evaluate = clock.lap();
@@ -85,13 +92,16 @@ impl Session {
             }
         }
         let relights = now.lights_differ(&before) || self.outside_differs(&solved, &old, &before);
+        if !touched.is_empty() {
+            dirty = Dirty::All;
+        }
         if relights {
             // Whoever gathers from a light, or from outside, gathers anew: neither knows who that is.
             dirty = Dirty::All;
         }
         report.seconds.judge = clock.lap();
 
-        let lit = LitForest::new(&self.scene, &solved.forest, now)
+        let lit = LitForest::new(&self.bed.scene, &solved.forest, now)
             .with_groups(&solved.groups)
             .present_in(&solved.view);
         if relights {
@@ -104,7 +114,8 @@ impl Session {
         let shines = |&light: &LightId| {
             now.light_pose(light).is_some() && now.intensity(light).iter().any(|&i| i > 0.0)
         };
-        let lamps = (0..self.scene.lights.len() as u32).map(LightId).any(|light| shines(&light));
+        let lamps =
+            (0..self.bed.scene.lights.len() as u32).map(LightId).any(|light| shines(&light));
         if lit.is_dark() && !lamps {
             // What is left of earlier light would fade for ever.
             solved.radiosity = coarse::start(now, &solved.forest, &lit);
@@ -115,7 +126,7 @@ impl Session {
                 return Err(SessionError::Unsettled {
                     frame: next.frame,
                     residual: solved.radiosity.residual,
-                    surfaces: tally::suspects(&self.scene, &solved),
+                    surfaces: tally::suspects(&self.bed.scene, &solved),
                 });
             }
         } else {
@@ -136,11 +147,11 @@ impl Session {
         report.count(&work);
         tally::fill(&mut report, &solved);
         if self.options.balance {
-            tally::fill_balance(&mut report, &self.scene, &solved);
+            tally::fill_balance(&mut report, &self.bed.scene, &solved);
             let share = report.energy.map_or(0.0, |energy| energy.unbalanced());
             let most = self.unbalanced_max();
             if solved.is_settled() && (share > most || share.is_nan()) {
-                let surfaces = tally::suspects(&self.scene, &solved);
+                let surfaces = tally::suspects(&self.bed.scene, &solved);
                 return Err(SessionError::Unbalanced { frame: next.frame, share, surfaces });
             }
         }
@@ -164,20 +175,20 @@ impl Session {
     /// A bound on the mean radiosity in a world and at any time of the clip: all that can be emitted, over what is
     /// absorbed at least.
     fn most_mean_w_m2(&self, now: &World) -> f64 {
-        let scene = &self.scene;
+        let scene = &self.bed.scene;
         let rho = scene.patches.iter().flat_map(|p| now.reflectance(scene, p)).fold(0.0, f64::max);
         let most = |one: [f64; 3], other: [f64; 3]| [0, 1, 2].map(|c| one[c].max(other[c]));
         let emitted_w = self.emitted_w(
             |p| most(scene.most_exitance(p), now.exitance(scene, p)),
             |k| most(scene.lights[k.0 as usize].most_intensity(), now.intensity(k)),
         );
-        emitted_w / self.scene.area_m2() / (1.0 - rho)
+        emitted_w / self.bed.scene.area_m2() / (1.0 - rho)
     }
 
     /// How many times as much the scene emits in a world as in another, present or not.
     fn brightened(&self, since: &World, now: &World) -> f64 {
         let emitted_w =
-            |w: &World| self.emitted_w(|p| w.exitance(&self.scene, p), |k| w.intensity(k));
+            |w: &World| self.emitted_w(|p| w.exitance(&self.bed.scene, p), |k| w.intensity(k));
         if now.any_relit(since) { emitted_w(now) / emitted_w(since) } else { 1.0 }
     }
 
@@ -187,7 +198,7 @@ impl Session {
         exitance: impl Fn(&scene::Patch) -> [f64; 3],
         intensity: impl Fn(LightId) -> [f64; 3],
     ) -> f64 {
-        let scene = &self.scene;
+        let scene = &self.bed.scene;
         let mean = |c: [f64; 3]| c.iter().sum::<f64>() / 3.0;
         let area_m2 = scene.area_m2();
         // Of what moves, patches are placed about its origin, which is the scene's middle.
@@ -215,8 +226,8 @@ impl Session {
             time_s: next.time_s,
             world: next.world.clone(),
             held: self.held.clone(),
-            forest: self.seed.clone(),
-            view: WorldView::new(&self.scene, &self.seed, &next.world),
+            forest: self.bed.seed.clone(),
+            view: WorldView::new(&self.bed.scene, &self.bed.seed, &next.world),
             ticks: Ticks::default(),
             tree: PairTree::new(Forest::ROOT),
             hash: PairHash::default(),
@@ -227,6 +238,7 @@ impl Session {
             sound_mean_w_m2: 0.0,
             sound_world: next.world.clone(),
             events: Vec::new(),
+            touched: Vec::new(),
             report: FrameReport::default(),
         }
     }
@@ -268,16 +280,16 @@ impl Session {
         changes: &Changes,
         (since, relit): (Option<&mut Since<'_>>, bool),
     ) {
-        let changed = solved.coarse.follow(&self.seed, changes);
+        let changed = solved.coarse.follow(&self.bed.seed, changes);
         if !changed && !relit {
             return;
         }
         let before = std::mem::take(&mut solved.coarse.brightness);
-        let lit = (&*self.scene, &solved.world);
-        solved.coarse.solve(lit, &self.seed, &self.coarse_ids);
+        let lit = (&*self.bed.scene, &solved.world);
+        solved.coarse.solve(lit, &self.bed.seed, &self.bed.coarse_ids);
         if let Some(since) = since {
             let (shifts, of_lights) = solved.coarse.brightness.shifts(&before);
-            since.dim(&self.seed, &self.coarse_ids, (shifts, of_lights));
+            since.dim(&self.bed.seed, &self.bed.coarse_ids, (shifts, of_lights));
         }
     }
 
@@ -301,7 +313,7 @@ impl Session {
             Some(receivers)
         };
         let split = solved.forest.take_changed();
-        let lit = LitForest::new(&self.scene, &solved.forest, &solved.world);
+        let lit = LitForest::new(&self.bed.scene, &solved.forest, &solved.world);
         let lit = lit.present_in(&solved.view);
         if cold {
             solved.radiosity = self.first_guess(solved, &lit);
@@ -345,7 +357,7 @@ impl Session {
         let forest = &solved.forest;
         let is_relit = |facet: &&ElementId| {
             let patch = forest.patch(**facet).expect("a facet has a patch");
-            let material = self.scene.patches[patch.0 as usize].material;
+            let material = self.bed.scene.patches[patch.0 as usize].material;
             solved.world.is_relit(before, material)
         };
         of.iter().filter(is_relit).map(|f| f.0).collect()
@@ -356,7 +368,7 @@ impl Session {
         let mut out = coarse::start(&solved.world, &solved.forest, lit);
         for id in 0..solved.forest.len() as u32 {
             if let Some(number) = solved.forest.coarse(ElementId(id)) {
-                out.set(id, solved.coarse.radiosity(self.coarse_ids[number]));
+                out.set(id, solved.coarse.radiosity(self.bed.coarse_ids[number]));
             }
         }
         out
@@ -365,10 +377,10 @@ impl Session {
     fn dynamic_links(&self, solved: &Solved, from: &World) -> u64 {
         let moved = |b: BodyId| from.pose(b) != solved.world.pose(b);
         let light_moved = |k: usize| {
-            let before = WorldView::light_in(&self.scene, from, LightId(k as u32));
+            let before = WorldView::light_in(&self.bed.scene, from, LightId(k as u32));
             before.as_ref() != solved.view.light(k)
         };
-        tally::dynamic_links(&self.scene, &solved.forest, &solved.tree, &moved, &light_moved)
+        tally::dynamic_links(&self.bed.scene, &solved.forest, &solved.tree, &moved, &light_moved)
     }
 
     /// Why an update did not go on.

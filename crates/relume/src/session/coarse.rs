@@ -2,7 +2,7 @@
 //! of them linked, a fixed number of sweeps from the emission. A pure function of the scene at one
 //! instant: links are summed in the order of the coarse elements, whatever their history.
 
-use crate::element::{ElementId, Forest, Kind};
+use crate::element::{ElementId, Forest, Kind, Renumbering};
 use crate::pair::{self, Brightness, Carried, Changes, Held, Light};
 use crate::scene::{LightId, PatchId, Scene, World};
 use crate::solver::{Dirty, Link, Links, Radiosity, Stop, Surfaces};
@@ -30,7 +30,7 @@ const LOST: f64 = 1e-4;
 /// Splits facets down to coarse elements, numbers them and keeps them for good; returns their ids
 /// by number.
 pub(super) fn number(scene: &Scene, forest: &mut Forest) -> Vec<u32> {
-    let largest = forest.area_m2(Forest::ROOT) * COARSE_SHARE;
+    let largest = forest.made_m2() * COARSE_SHARE;
     let mut out = Vec::new();
     let groups = forest.groups().roots().to_vec();
     for patch in 0..scene.patches.len() as u32 {
@@ -109,7 +109,7 @@ impl Coarse {
         coarse: &[u32],
         surfaces: &CoarseSurfaces<'_>,
     ) -> Brightness {
-        let total_area = seed.area_m2(Forest::ROOT);
+        let total_area = seed.made_m2();
         let mean = |v: [f32; 3]| v.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
         let mut irradiance = vec![0.0; coarse.len()];
         for facet in surfaces.facets() {
@@ -153,6 +153,16 @@ impl Coarse {
             coarse.iter().map(uniform).collect()
         };
         Brightness::new(known, lights, total_area * REFERENCE_SHARE)
+    }
+
+    /// Follows elements to their new ids, and coarse elements to other numbers.
+    pub(super) fn renumber(&mut self, to: &Renumbering, numbers: &[Option<usize>]) {
+        for links in [&mut self.links, &mut self.open] {
+            links.extend(to.old_len());
+            links.renumber(to);
+        }
+        self.radiosity = Radiosity::default();
+        self.brightness.renumber(numbers);
     }
 
     /// Radiosity of a coarse element.

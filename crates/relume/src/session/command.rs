@@ -10,6 +10,7 @@ use crate::scene::limits::{COORDINATE_MAX_M, EMISSION_MAX, is_place};
 use crate::scene::{BodyId, LightId, MaterialId, NewBody, Scene, SceneError, TakenBody};
 
 use super::Session;
+use super::replant::Edit;
 
 /// A change of the world: [`Session::apply`] returns its inverse.
 ///
@@ -117,14 +118,14 @@ impl Session {
     /// The law: any commands followed by their inverses in reverse order lead to the state of the start, and the state
     /// after any commands equals that of a session that was given the same world at once, links bit for bit.
     ///
-    /// Cost: of the command itself none; of the next solve, what the change changes. It is a cold build after
-    /// [`Command::Insert`], [`Command::Remove`] and [`Command::PutBack`], where a material comes to emit that never does in
-    /// the clip, and where a body that rests against others is taken from its place, or put back there.
+    /// Cost: of the command itself little; of the next solve, what the change changes, and some passes over all pairs where a
+    /// body comes or leaves. It is a cold build where a material comes to emit that never does in the clip, and, in a scene
+    /// with groups of patches, where a body that rests is taken from its place, or put back there.
     ///
     /// # Errors
     /// [`CommandError`]; nothing has changed then.
     pub fn apply(&mut self, command: Command) -> Result<Command, CommandError> {
-        check(&self.scene, &command)?;
+        check(&self.bed.scene, &command)?;
         let held = &mut self.held;
         Ok(match command {
             Command::SetTime(time_s) => {
@@ -146,22 +147,22 @@ impl Session {
                 Command::SetIntensity(light, set(&mut held.intensities, light, to))
             }
             Command::Insert(new) => {
-                let (scene, body) = self.scene.with_body(&new)?;
-                self.change_scene(scene);
+                let (scene, body) = self.bed.scene.with_body(&new)?;
+                self.change_scene(scene, Edit::In(body));
                 Command::Remove(body)
             }
             Command::Remove(body) => {
-                let (scene, taken) = self.scene.without_body(body);
+                let (scene, taken) = self.bed.scene.without_body(body);
                 let (pose, presence) = (held.poses.remove(&body), held.presence.remove(&body));
-                self.change_scene(scene);
+                self.change_scene(scene, Edit::Out(body));
                 Command::PutBack(Arc::new(Removed { id: body, body: taken, pose, presence }))
             }
             Command::PutBack(removed) => {
                 let Removed { id, body, pose, presence } = &*removed;
                 set(&mut held.poses, *id, *pose);
                 set(&mut held.presence, *id, *presence);
-                let scene = self.scene.with_body_back(*id, body);
-                self.change_scene(scene);
+                let scene = self.bed.scene.with_body_back(*id, body);
+                self.change_scene(scene, Edit::In(*id));
                 Command::Remove(*id)
             }
         })
@@ -235,13 +236,13 @@ fn found<'a, T>(what: &'static str, all: &'a [T], index: u32) -> Result<&'a T, C
 
 fn name_of(scene: &Scene, body: BodyId) -> Result<&str, CommandError> {
     let found = found("body", &scene.bodies, body.0)?;
-    match found.patches.is_empty() {
-        true => Err(CommandError::Unknown {
+    match scene.has_body(body) {
+        true => Ok(&found.name),
+        false => Err(CommandError::Unknown {
             what: "body",
             index: body.0,
-            count: scene.bodies.iter().filter(|b| !b.patches.is_empty()).count(),
+            count: (0..scene.bodies.len() as u32).filter(|&k| scene.has_body(BodyId(k))).count(),
         }),
-        false => Ok(&found.name),
     }
 }
 

@@ -216,7 +216,7 @@ impl<'a> Look<'a> {
     fn gather(&self) -> Gathered {
         let session = self.session;
         let mut out = Gathered::default();
-        for patch in 0..session.scene.patches.len() as u32 {
+        for patch in 0..session.bed.scene.patches.len() as u32 {
             self.add_patch(PatchId(patch), &mut out);
         }
         for id in self.forest.children(Forest::ROOT).map(ElementId) {
@@ -418,7 +418,7 @@ impl<'a> Look<'a> {
     /// In a gap most of what is seen there is as close again, and so on: one part of it is followed, chosen by its form
     /// factor and the number `k` of the first part, so that many of them together show all ways that light takes.
     fn sent_by(&self, part: &Part, k: usize) -> [f64; 3] {
-        let scene = &self.session.scene;
+        let scene = &self.session.bed.scene;
         let (mut b, mut share, mut part) = ([0.0; 3], [1.0; 3], *part);
         for step in 0.. {
             let patch = self.forest.patch(part.leaf).expect("an element has a patch");

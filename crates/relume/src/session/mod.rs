@@ -6,9 +6,8 @@ use std::time::Instant;
 
 use crate::element::{ElementId, Forest, WorldView};
 use crate::event::Ticks;
-use crate::geometry::Pose;
 use crate::pair::{LinkEvent, PairHash, PairTree};
-use crate::scene::{BodyId, Held, Patch, Scene, World};
+use crate::scene::{BodyId, Held, Scene, World};
 use crate::solver::{GroupLinks, Links, Radiosity};
 use crate::transport::Simd;
 
@@ -34,6 +33,7 @@ mod options;
 mod pieces;
 mod promise;
 mod reconstruct;
+mod replant;
 mod report;
 mod snapshot;
 mod solution;
@@ -65,6 +65,7 @@ pub(crate) use surfaces::{Receivers, apply_edits, links_of};
 pub(crate) use tally::balance_of;
 
 use coarse::Coarse;
+use replant::{Bed, Left};
 
 /// Why a frame could not be computed.
 #[derive(Debug, thiserror::Error)]
@@ -131,14 +132,14 @@ fn names(surfaces: &[String]) -> String {
 
 /// One scene being solved, frame by frame.
 pub struct Session {
-    scene: Arc<Scene>,
+    bed: Bed,
+    /// Whether the seed is that of the scene.
+    is_planted: bool,
     options: Options,
     simd: Simd,
-    /// The part of the forest that is always there, where every build starts.
-    seed: Forest,
-    /// Coarse elements of the seed by number; none for oracles that ask for no brightness.
-    coarse_ids: Vec<u32>,
     solved: Option<Solved>,
+    /// In place of it once bodies came or left since.
+    left: Option<Left>,
     /// What others may see of a step under way.
     watch: Arc<Watch>,
     /// Time that `moved` compares with, where it is not that of the last step.
@@ -184,6 +185,8 @@ struct Solved {
     /// The world it was in.
     sound_world: World,
     events: Vec<LinkEvent>,
+    /// Facets of which another part is covered than when they were solved, ascending.
+    touched: Vec<ElementId>,
     report: FrameReport,
 }
 
@@ -213,21 +216,22 @@ impl Session {
     pub fn new(scene: impl Into<Arc<Scene>>, options: Options) -> Result<Session, SessionError> {
         options.validate()?;
         let scene = scene.into();
-        let (seed, coarse_ids) = seed_of(&scene, &options, &BTreeSet::new());
+        let displaced: BTreeSet<BodyId> = scene.removed_bodies().collect();
+        let (seed, coarse_ids) = seed_of(&scene, &options, &displaced);
         let simd = Simd::detect();
         let (watch, solved, came_from) = (Arc::default(), None, None);
         let (held, time_s, frames) = (Held::default(), 0.0, 0);
         Ok(Session {
-            scene,
+            bed: Bed { scene, seed, coarse_ids },
+            is_planted: true,
             options,
             simd,
-            seed,
-            coarse_ids,
             solved,
+            left: None,
             watch,
             came_from,
             held,
-            displaced: BTreeSet::new(),
+            displaced,
             time_s,
             frames,
         })
@@ -235,7 +239,7 @@ impl Session {
 
     /// The scene being solved.
     pub fn scene(&self) -> &Arc<Scene> {
-        &self.scene
+        &self.bed.scene
     }
 
     /// What can be seen of a step while it is under way, from any thread.
@@ -274,10 +278,20 @@ impl Session {
     }
 
     fn step_on(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, SessionError> {
-        self.follow_hands();
-        let world = self.scene.at_but(time_s, &self.held);
+        let Some(scene) = self.follow_hands() else { return self.step_to(frame, time_s) };
+        // On the way bodies that left are still there, absent.
+        let done = self.step_to(frame, time_s);
+        match self.solved.take() {
+            Some(solved) => self.solved = Some(self.forget_remains(solved, scene)),
+            None => (self.bed.scene, self.is_planted) = (scene, false),
+        }
+        done.map(|_| self.now().report.clone())
+    }
+
+    fn step_to(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, SessionError> {
+        let world = self.bed.scene.at_but(time_s, &self.held);
         let came_from = self.came_from.take();
-        let from = came_from.map(|from_s| self.scene.at_but(from_s, &self.held));
+        let from = came_from.map(|from_s| self.bed.scene.at_but(from_s, &self.held));
         let from = from.or(self.solved.as_ref().map(|s| s.world.clone()));
         let moved = from.as_ref().map_or(Vec::new(), |from| self.moved(from, &world));
         let next = Next { frame, time_s, world, from };
@@ -291,7 +305,9 @@ impl Session {
             |last: &Solved| last.ticks.goes_on(last.time_s, time_s) && last.held == self.held;
         last = last.filter(|last| last.is_settled() || goes_on(last));
         let solved = match last {
-            Some(mut last) if last.is_settled() && last.world == next.world => {
+            Some(mut last)
+                if last.is_settled() && last.world == next.world && last.touched.is_empty() =>
+            {
                 if time_s < last.time_s || !last.held.promises_as(&self.held) {
                     // What was foreseen from a later time says nothing of an earlier one.
                     last.ticks = Ticks::default();
@@ -348,7 +364,7 @@ impl Session {
 
     /// The world that the next [`Session::solve`] solves.
     pub fn world(&self) -> World {
-        self.scene.at_but(self.time_s, &self.held)
+        self.bed.scene.at_but(self.time_s, &self.held)
     }
 
     /// Time of the clip that the next [`Session::solve`] is at, seconds.
@@ -361,49 +377,9 @@ impl Session {
         &self.held
     }
 
-    /// Goes on with another scene: nothing that was solved stays.
-    fn change_scene(&mut self, scene: Scene) {
-        self.scene = Arc::new(scene);
-        self.displaced = self.displaced_now();
-        (self.seed, self.coarse_ids) = seed_of(&self.scene, &self.options, &self.displaced);
-        self.solved = None;
-    }
-
-    /// Tells the seed what hands have changed of it: which patches emit at any time, and which bodies at rest are where
-    /// the scene has them, covering what they stand on. Where either changes anything, nothing that was solved stays.
-    fn follow_hands(&mut self) {
-        let displaced = self.displaced_now();
-        if displaced != self.displaced {
-            let (seed, coarse_ids) = seed_of(&self.scene, &self.options, &displaced);
-            if !seed.is_as_displaced(&self.seed) {
-                (self.seed, self.coarse_ids, self.solved) = (seed, coarse_ids, None);
-            }
-            self.displaced = displaced;
-        }
-        let (scene, held) = (&self.scene, &self.held);
-        let by_hand = |patch: &Patch| {
-            let exitance = held.exitances.get(&patch.material)?;
-            let share = scene.emission_share(patch);
-            Some((0..3).any(|c| exitance[c] * share[c] > 0.0))
-        };
-        let emits = |p: &Patch| scene.patch_emits(p) || by_hand(p).unwrap_or(false);
-        if self.seed.set_glows(scene.patches.iter().map(emits).collect()) {
-            self.solved = None;
-        }
-    }
-
-    /// Bodies that no clip moves, and that a hand has moved or hidden.
-    fn displaced_now(&self) -> BTreeSet<BodyId> {
-        let Held { poses, presence, .. } = &self.held;
-        let moved =
-            poses.iter().filter(|(_, pose)| **pose != Pose::IDENTITY).map(|(&body, _)| body);
-        let hidden = presence.iter().filter(|(_, there)| !**there).map(|(&body, _)| body);
-        moved.chain(hidden).filter(|&body| !self.scene.moves(body)).collect()
-    }
-
     /// Names of the bodies that are elsewhere in one world than in another.
     fn moved(&self, from: &World, to: &World) -> Vec<String> {
-        let bodies = self.scene.bodies.iter().enumerate();
+        let bodies = self.bed.scene.bodies.iter().enumerate();
         let moved = bodies.filter(|(b, _)| from.poses()[*b] != to.poses()[*b]);
         moved.map(|(_, body)| body.name.clone()).collect()
     }
@@ -454,7 +430,7 @@ impl Session {
     #[doc(hidden)]
     pub fn events(&self) -> Vec<Event> {
         let solved = self.solved.as_ref().expect("a step comes before its events");
-        events::named(&self.scene, solved)
+        events::named(&self.bed.scene, solved)
     }
 
     /// Sum of the form factors from every leaf element, in no order of meaning; 1 in a closed scene,
@@ -465,12 +441,12 @@ impl Session {
     #[doc(hidden)]
     pub fn row_sums(&self) -> Vec<(ElementId, f64)> {
         let solved = self.solved.as_ref().expect("a step comes before a look at the rows");
-        tally::row_sums_of(&self.scene, solved)
+        tally::row_sums_of(&self.bed.scene, solved)
     }
 
     /// Bytes that the engine's structures hold now.
     pub fn memory(&self) -> Memory {
-        let fixed = self.seed.memory_bytes() + self.seed.shared_bytes();
+        let fixed = self.bed.seed.memory_bytes() + self.bed.seed.shared_bytes();
         let mut memory = Memory { fixed, ..Memory::default() };
         if let Some(s) = &self.solved {
             memory.pairs = s.tree.memory_bytes() + s.links.pool_bytes() + s.groups.memory_bytes();
@@ -490,7 +466,7 @@ impl Session {
 
 /// The part of the forest that is always there, and its coarse elements by number.
 fn seed_of(scene: &Scene, options: &Options, displaced: &BTreeSet<BodyId>) -> (Forest, Vec<u32>) {
-    let is_displaced = |body: BodyId| displaced.contains(&body);
+    let is_displaced = |body: BodyId| displaced.contains(&body) || scene.is_inserted(body);
     let mut seed = match (options.oracle, options.groups) {
         (Oracle::Error, true) => Forest::with_groups(scene, &is_displaced),
         _ => Forest::displaced(scene, &is_displaced),

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::Range;
 
-use crate::element::{ElementId, ElementKey, Forest};
+use crate::element::{ElementKey, Forest};
 use crate::scene::Scene;
 
 /// An element or a punctual light as a user knows it.
@@ -36,10 +36,10 @@ pub enum ElementName {
 
 /// The name of an element or light by its key.
 pub(super) fn name_of(scene: &Scene, forest: &Forest, key: ElementKey) -> ElementName {
-    let facet = ElementId(key.facet);
+    let facet = forest.named(key.facet);
     if let Some(group) = forest.group(facet) {
         let leaves = forest.groups().leaves_of(group);
-        let first = name_of(scene, forest, ElementKey { facet: leaves[0].facet.0, path: 1 });
+        let first = name_of(scene, forest, forest.key(leaves[0].facet));
         return ElementName::Group { facets: leaves.len() as u32, first: Box::new(first) };
     }
     let Some(id) = forest.patch(facet) else {

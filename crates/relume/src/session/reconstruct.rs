@@ -49,7 +49,7 @@ pub(super) fn solve(session: &Session, solved: &Solved) -> (Links, Radiosity) {
     let links = builder.fill(|add| found.iter().flatten().for_each(|(to, link)| add(*to, *link)));
     let mut out = solved.radiosity.clone();
     let surfaces =
-        LitForest::new(&session.scene, forest, &solved.world).with_groups(&solved.groups);
+        LitForest::new(&session.bed.scene, forest, &solved.world).with_groups(&solved.groups);
     out.solve(&surfaces, &links, Dirty::All, Stop::Sweeps(SWEEPS));
     (links, out)
 }

@@ -112,7 +112,7 @@ pub(super) fn take(
     solved: &Solved,
     (links, radiosity): (&Links, &Radiosity),
 ) -> Snapshot {
-    let (scene, forest) = (&session.scene, &solved.forest);
+    let (scene, forest) = (&session.bed.scene, &solved.forest);
     let surfaces = LitForest::new(scene, forest, &solved.world).with_groups(&solved.groups);
     let bends = Bends { simd: session.simd, solved, links, radiosity };
     let of_facet = |facet: ElementId, out: &mut Vec<Leaf>| {

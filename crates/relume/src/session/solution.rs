@@ -86,7 +86,7 @@ impl Solution for Session {
     }
 
     fn name_of(&self, key: ElementKey) -> ElementName {
-        name_of(&self.scene, &self.now().forest, key)
+        name_of(&self.bed.scene, &self.now().forest, key)
     }
 
     fn area_m2(&self, id: ElementId) -> f64 {
@@ -104,12 +104,13 @@ impl Solution for Session {
 
     fn reflectance_max(&self) -> f64 {
         let now = &self.now().world;
-        let all = self.scene.patches.iter().flat_map(|patch| now.reflectance(&self.scene, patch));
+        let all =
+            self.bed.scene.patches.iter().flat_map(|patch| now.reflectance(&self.bed.scene, patch));
         all.fold(0.0, f64::max)
     }
 
     fn is_of_the_scene_of(&self, other: &Session) -> bool {
-        let (a, b) = (&self.scene, &other.scene);
+        let (a, b) = (&self.bed.scene, &other.bed.scene);
         let (one, two) = (&self.now().forest, &other.now().forest);
         let alike = a.patches.len() == b.patches.len() && a.lights.len() == b.lights.len();
         // The forest's fixed part is a function of the scene.

@@ -82,6 +82,10 @@ impl Surfaces for LitForest<'_> {
         self.forest.near_facets()
     }
 
+    fn first_facets(&self) -> usize {
+        self.facets().partition_point(|&facet| self.forest.is_made(facet))
+    }
+
     fn is_surface(&self, id: u32) -> bool {
         self.forest.receives(ElementId(id))
     }
@@ -169,6 +173,10 @@ impl Surfaces for CoarseSurfaces<'_> {
 
     fn facets(&self) -> &[ElementId] {
         &self.facets
+    }
+
+    fn first_facets(&self) -> usize {
+        self.facets.partition_point(|&facet| self.lit.forest.is_made(facet))
     }
 
     fn is_surface(&self, id: u32) -> bool {

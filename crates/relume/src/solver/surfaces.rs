@@ -75,6 +75,12 @@ pub trait Surfaces: Sync {
     }
     /// The roots of the quadtrees.
     fn facets(&self) -> &[ElementId];
+
+    /// How many of them, the first ones, share the work of a sweep out among its batches: what a sweep finds on them does not
+    /// depend on how many others there are.
+    fn first_facets(&self) -> usize {
+        self.facets().len()
+    }
     /// Root of the quadtree that an element is in.
     fn facet_of(&self, id: u32) -> u32;
     /// Parent of an element within its quadtree; `None` for a facet.

@@ -71,11 +71,12 @@ pub(super) const PENDING_SHARE: f32 = 0.5;
 impl Work {
     pub(super) fn new(surfaces: &impl Surfaces, dirty: Dirty) -> Work {
         let facets = surfaces.facets();
-        let count = facets.len().min(BATCHES);
+        let first = surfaces.first_facets();
+        let count = first.min(BATCHES).max(facets.len().min(1));
         let mut batches: Vec<Batch> = (0..count).map(|_| Batch::default()).collect();
         let mut batch_of = vec![0; facets.last().map_or(0, |f| f.0 as usize + 1)];
         for (k, facet) in facets.iter().enumerate() {
-            let batch = k * count / facets.len();
+            let batch = if k < first { k * count / first } else { count - 1 };
             batches[batch].facets.push(facet.0);
             batch_of[facet.0 as usize] = batch as u16;
         }

@@ -221,14 +221,14 @@ impl Session {
     /// Before the first [`Session::step`], or if the grouping is of another scene.
     pub fn factors(&self, grouping: &Grouping) -> Factors {
         let solved = self.solved.as_ref().expect("a step comes before a look at the factors");
-        assert_eq!(grouping.of_patch.len(), self.scene.patches.len());
+        assert_eq!(grouping.of_patch.len(), self.bed.scene.patches.len());
         let fragments = Fragments::whole(&solved.forest, grouping);
-        let fixed = Fixed::of(self.scene.area_m2());
+        let fixed = Fixed::of(self.bed.scene.area_m2());
         let links: Vec<Link> = solved.tree.links().collect();
         let spread = Spread { sharing: Sharing::new(self, solved), fragments: &fragments };
         let none = vec![Vec::new(); grouping.names.len()];
         let upper = plus(&none, &links, &spread, (&fixed, Sign::Plus));
-        mirrored(areas(solved, &self.scene, grouping), &upper, &fixed, Room::default())
+        mirrored(areas(solved, &self.bed.scene, grouping), &upper, &fixed, Room::default())
     }
 }
 

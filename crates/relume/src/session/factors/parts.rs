@@ -66,11 +66,11 @@ impl PartFactors {
     /// Before the first [`Session::step`], or if the session solves another scene.
     pub fn factors(&mut self, session: &Session) -> Factors {
         let solved = session.solved.as_ref().expect("a step comes before a look at the factors");
-        assert_eq!(self.parts.len(), session.scene.patches.len());
-        let fixed = Fixed::of(session.scene.area_m2());
+        assert_eq!(self.parts.len(), session.bed.scene.patches.len());
+        let fixed = Fixed::of(session.bed.scene.area_m2());
         let fragments = Fragments::of_parts(&solved.forest, &self.parts, &self.grouping);
         let spread = Spread { sharing: Sharing::new(session, solved), fragments: &fragments };
-        let movers = Movers::of(&session.scene, solved);
+        let movers = Movers::of(&session.bed.scene, solved);
         let (rest, moving): (Vec<Link>, Vec<Link>) = {
             let links: Vec<Link> = solved.tree.links().collect();
             links.into_par_iter().partition(|link| !movers.meet(solved, link))

@@ -1,0 +1,173 @@
+//! How a running forest goes on when bodies came into its scene or left it, or cover other parts of what they rest on.
+//!
+//! What the old and the new scene have in common has the same nodes below its root in both fixed parts. Their ids are those
+//! of a forest that is made anew; what is above the kept part keeps its order.
+
+use super::{BodyId, ElementId, Fan, Forest, NONE, Node, Renumbering, Twins, exposed_m2};
+use crate::scene::FIRST_NAME;
+
+impl Forest {
+    /// Where the elements of this forest, which grew from one seed, go in one that grows from another; `body` says which
+    /// body of the new scene one of the old is. What is new stands in `old_of` as the root, which has neither links nor
+    /// light. `None` where what both have in common was planted in another way, or glows at other times.
+    pub fn renumbering_to(
+        &self,
+        (old, new): (&Forest, &Forest),
+        body: &dyn Fn(BodyId) -> Option<BodyId>,
+    ) -> Option<Renumbering> {
+        let mut new_of = vec![NONE; old.kept_len as usize];
+        let made = old.fixed.made_children;
+        if made != new.fixed.made_children {
+            return None;
+        }
+        new_of[Forest::ROOT.0 as usize] = Forest::ROOT.0;
+        let common = (1..=made).map(|id| (id, id));
+        let inserted = old.children(Forest::ROOT).skip(made as usize).filter_map(|id| {
+            let was = old.cluster_body(ElementId(id)).expect("an inserted body");
+            Some((id, new.body_root(body(was)?).0))
+        });
+        let mut stack: Vec<(u32, u32)> = common.chain(inserted).collect();
+        while let Some((was, is)) = stack.pop() {
+            let (one, two) = (ElementId(was), ElementId(is));
+            let (below, then) = (old.children(one), new.children(two));
+            if !old.is_like((new, two), one) || below.len() != then.len() {
+                return None;
+            }
+            new_of[was as usize] = is;
+            stack.extend(below.zip(then));
+        }
+        let mut old_of = vec![Forest::ROOT.0; new.kept_len as usize];
+        for (was, &is) in (0..).zip(&new_of) {
+            if is != NONE {
+                old_of[is as usize] = was;
+            }
+        }
+        let beyond = old.kept_len..self.nodes.len() as u32;
+        new_of.extend(beyond.clone().map(|id| id - old.kept_len + new.kept_len));
+        old_of.extend(beyond);
+        Some(Renumbering::new(new_of, old_of))
+    }
+
+    /// Whether a node of the kept part is what one of another forest is.
+    fn is_like(&self, (other, id): (&Forest, ElementId), own: ElementId) -> bool {
+        let alike = match (self.group(own), other.group(id)) {
+            (None, None) => true,
+            (Some(a), Some(b)) => a.centre == b.centre && a.radius == b.radius,
+            _ => false,
+        };
+        let glows = |forest: &Forest, id| forest.patch(id).map(|patch| forest.glows(patch));
+        // What was inserted has other numbers of patches and bodies.
+        let subject = |forest: &Forest, id: ElementId| {
+            let subjects = &forest.fixed.subjects;
+            subjects.get(id.0 as usize).copied().filter(|_| self.is_made(own))
+        };
+        alike
+            && subject(self, own) == subject(other, id)
+            && self.kind(own) == other.kind(id)
+            && glows(self, own) == glows(other, id)
+    }
+
+    /// Whether a node is of what the scene was made with, not of a body that was inserted.
+    pub fn is_made(&self, id: ElementId) -> bool {
+        let name = self.fixed.names.get(self.fixed(id).0 as usize);
+        name.is_none_or(|&name| name < FIRST_NAME)
+    }
+
+    /// This forest, which grew from one seed, as it grows from another, with ids as [`Forest::renumbering_to`] says; and
+    /// the facets of which another part is covered. Elements of bodies that left must have been reaped.
+    pub fn replanted(
+        &self,
+        (old, new): (&Forest, &Forest),
+        to: &Renumbering,
+    ) -> (Forest, Vec<ElementId>) {
+        let mut out = new.clone();
+        let numbers = coarse_numbers((old, new), to);
+        let fan = |fan: Fan| match fan.range() {
+            _ if fan.is_other() => fan,
+            below if below.is_empty() => fan,
+            below => Fan::new(to.new_of(below.start), below.len()),
+        };
+        for id in (0..old.kept_len).filter(|&id| to.new_of(id) != NONE) {
+            let at = to.new_of(id) as usize;
+            if !self.nodes[id as usize].fan.is_other() {
+                out.nodes[at].fan = fan(self.nodes[id as usize].fan);
+            }
+            let twins = out.twins_of(at as u32);
+            out.twins[twins].users = self.twins[self.twins_of(id)].users;
+        }
+        let beyond = &self.nodes[old.kept_len as usize..];
+        out.nodes.extend(beyond.iter().map(|node| Node { fan: fan(node.fan), ..*node }));
+        let id = |old: u32| if old == NONE { NONE } else { to.new_of(old) };
+        let number = |old: u32| numbers.get(old as usize).copied().unwrap_or(old);
+        let beyond = &self.twins[self.twins_of(old.kept_len)..];
+        out.twins.extend(beyond.iter().map(|twins| Twins {
+            parent: id(twins.parent),
+            facet: id(twins.facet),
+            coarse: number(twins.coarse),
+            ..*twins
+        }));
+        for (vacant, own) in out.vacant.iter_mut().zip(&self.vacant) {
+            *vacant = own.iter().map(|&first| id(first)).collect();
+        }
+        out.counts.elements += self.counts.elements - old.counts.elements;
+        out.counts.leaves += self.counts.leaves - old.counts.leaves;
+        let beyond = self.exposed.range(old.kept_len..);
+        out.exposed.extend(beyond.map(|(&old, &m2)| (id(old), m2)));
+        let touched = self.touched((old, new), to);
+        touched.iter().for_each(|&facet| out.expose(facet));
+        (out, touched)
+    }
+
+    /// The facets of what a scene was made with of which another part is covered than before.
+    fn touched(&self, (old, new): (&Forest, &Forest), to: &Renumbering) -> Vec<ElementId> {
+        let facets = old.facets().iter().filter(|facet| old.is_made(**facet));
+        let both = facets.map(|&facet| (facet, ElementId(to.new_of(facet.0))));
+        let differs = |&(was, is): &(ElementId, ElementId)| old.covered(was) != new.covered(is);
+        both.filter(differs).map(|(_, is)| is).collect()
+    }
+
+    /// Finds anew what is exposed of the elements of a facet beyond the kept part.
+    fn expose(&mut self, facet: ElementId) {
+        let mut stack = vec![facet.0];
+        while let Some(id) = stack.pop() {
+            stack.extend(self.children(ElementId(id)));
+            if id < self.kept_len {
+                continue;
+            }
+            let area_m2 = self.nodes[id as usize].area_m2;
+            let exposed_m2 = exposed_m2(&self.shape(ElementId(id)), self.covered(ElementId(id)));
+            match (exposed_m2 as f32) < area_m2 {
+                true => drop(self.exposed.insert(id, exposed_m2 as f32)),
+                false => drop(self.exposed.remove(&id)),
+            }
+        }
+    }
+}
+
+/// New numbers of the coarse elements of an old seed, by number.
+fn coarse_numbers((old, new): (&Forest, &Forest), to: &Renumbering) -> Vec<u32> {
+    let mut out = Vec::new();
+    for (id, &number) in (0..).zip(&old.fixed.coarse).filter(|(_, number)| **number != NONE) {
+        out.resize(out.len().max(number as usize + 1), NONE);
+        let at = to.new_of(id);
+        if at != NONE {
+            out[number as usize] = new.fixed.coarse[at as usize];
+        }
+    }
+    out
+}
+
+/// Old numbers of the coarse elements of a new seed, by number; `None` for those that are new.
+pub fn old_coarse_numbers(
+    (old, new): (&Forest, &Forest),
+    to: &Renumbering,
+    count: usize,
+) -> Vec<Option<usize>> {
+    let mut out = vec![None; count];
+    for (was, is) in coarse_numbers((old, new), to).into_iter().enumerate() {
+        if is != NONE {
+            out[is as usize] = Some(was);
+        }
+    }
+    out
+}

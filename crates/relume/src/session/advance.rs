@@ -70,13 +70,20 @@ impl Session {
         let fine = bring(&mut solved, since.as_ref(), Level::Fine, &changes.refined)?;
         changes.work.add_after_coarse(fine.work);
         changes.edits.extend(fine.edits);
+        changes.apart.extend(fine.apart);
         changes.events.extend(fine.events);
         solved.events = std::mem::take(&mut changes.events);
         let work = changes.work;
         report.seconds.evaluate = clock.lap();
 
         let mut dirty = self.edit_links(&mut solved, &changes, cold, &mut report);
-        solved.groups = group_links(&solved.forest, &solved.view, &solved.tree);
+        changes.apart.sort_unstable();
+        let last = match cold || old.far_m() != solved.view.far_m() {
+            true => GroupLinks::default(),
+            false => std::mem::take(&mut solved.groups),
+        };
+        let places = (&solved.forest, &solved.view);
+        solved.groups = group_links(places, &solved.tree, (&last, &changes.apart));
         if let Dirty::Some { parents, .. } = &mut dirty {
             let facets = solved.forest.near_facets();
             parents.extend(self.came_or_went(&solved, &old, facets));
@@ -97,7 +104,6 @@ impl Session {
         if relights {
             coarse::set_sources(now, (&solved.forest, &lit), &mut solved.radiosity);
         }
-        let dirty = if solved.groups.is_empty() { dirty } else { Dirty::All };
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
         let share = if cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE };
         let residual = self.options.tolerance * share;

@@ -15,7 +15,7 @@ use crate::solver::{Dirty, GroupLinks, Links, Radiosity};
 use super::ahead::{Ahead, Void, most_mean, while_extrapolated};
 use super::budget;
 use super::coarse::{self, Coarse};
-use super::groups::group_links;
+use super::groups;
 use super::promise::Promise;
 use super::report::FrameReport;
 use super::surfaces::{LitForest, apply_edits, links_of};
@@ -77,13 +77,16 @@ impl Session {
         report.seconds.evaluate = clock.lap();
 
         let mut dirty = self.edit_links(&mut solved, &changes, cold, &mut report);
-        changes.apart.sort_unstable();
-        let last = match cold || old.far_m() != solved.view.far_m() {
-            true => GroupLinks::default(),
-            false => std::mem::take(&mut solved.groups),
+        let before_groups = match cold || old.far_m() != solved.view.far_m() {
+            true => groups::Before::default(),
+            false => {
+                let links =
+                    (std::mem::take(&mut solved.groups), std::mem::take(&mut changes.apart));
+                groups::Before::new((&self.scene, &solved.forest), (&old, &solved.view), links)
+            }
         };
         let places = (&solved.forest, &solved.view);
-        solved.groups = group_links(places, &solved.tree, (&last, &changes.apart));
+        solved.groups = groups::group_links(places, &solved.tree, &before_groups);
         if let Dirty::Some { parents, .. } = &mut dirty {
             let facets = solved.forest.near_facets();
             parents.extend(self.came_or_went(&solved, &old, facets));

@@ -42,8 +42,10 @@ pub enum GroupEnd {
 pub struct GroupLink {
     /// Both ends.
     pub ends: [GroupEnd; 2],
-    /// K = V / (pi R^2), 1/m2.
+    /// K = V / (pi R^2), 1/m2; where factors have visibilities of their own in them, divided by V^2.
     pub coupling: f32,
+    /// Whether they have.
+    pub by_facets: bool,
 }
 
 /// The facets of a group that is in no other, with the link ends at or below it: link, and which end.
@@ -167,11 +169,15 @@ impl GroupLinks {
         }
     }
 
-    /// Adds the link between two ends to `to` as it is here. Whether there is one.
-    pub fn copy(&self, ids: [u32; 2], to: &mut PlacedLinks) -> bool {
-        let found = self.by_ids.binary_search_by_key(&ids, |&k| self.ids[k as usize]);
-        let Ok(place) = found else { return false };
-        let mut link = self.links[self.by_ids[place] as usize].clone();
+    /// The link between two ends, if there is one.
+    pub fn between(&self, ids: [u32; 2]) -> Option<&GroupLink> {
+        let place = self.by_ids.binary_search_by_key(&ids, |&k| self.ids[k as usize]).ok()?;
+        Some(&self.links[self.by_ids[place] as usize])
+    }
+
+    /// Adds a link of these to others.
+    pub fn copy(&self, link: &GroupLink, ids: [u32; 2], to: &mut PlacedLinks) {
+        let mut link = link.clone();
         for end in &mut link.ends {
             if let GroupEnd::Group { facets, first } = end {
                 let own = *first as usize..*first as usize + facets.len();
@@ -181,7 +187,6 @@ impl GroupLinks {
         }
         to.links.push(link);
         to.ids.push(ids);
-        true
     }
 
     /// Follows elements to their new ids; groups and facets keep theirs.
@@ -356,8 +361,8 @@ mod tests {
         let small = |first| GroupEnd::Group { facets: 0..3, first };
         let last = GroupEnd::Group { facets: 3..4, first: 6 };
         let list = vec![
-            GroupLink { ends: [small(0), element], coupling: 0.1 },
-            GroupLink { ends: [last, small(3)], coupling: 0.2 },
+            GroupLink { ends: [small(0), element], coupling: 0.1, by_facets: false },
+            GroupLink { ends: [last, small(3)], coupling: 0.2, by_facets: false },
         ];
         let factors = vec![1.0, 0.5, 0.0, 0.25, 0.0, 2.0, 0.75];
         let placed = PlacedLinks { links: list, ids: vec![[1, 9], [3, 1]], factors };

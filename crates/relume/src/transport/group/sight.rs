@@ -124,6 +124,9 @@ const FACET_RAYS: usize = 4;
 /// Rays of a pair at least, and at most.
 const RAYS: (usize, usize) = (32, 4_096);
 
+/// Share of the scene's size that is more than the slack of any segment.
+const MARGIN: f64 = 5e-7;
+
 /// One end as rays see it: facets that face the other end, with what they weigh.
 struct Aims {
     /// Places among the facets of the end; one of no meaning for an element.
@@ -198,39 +201,75 @@ impl Tally {
     }
 }
 
+/// A line of sight between facets of two ends.
+struct Ray {
+    /// Which facet of the end that has more of them, and which of the other, by their places among those that face.
+    facets: (usize, usize),
+    from: Aim,
+    to: Aim,
+}
+
+/// The rays of a pair.
+struct Rays<'a> {
+    /// The end that has more facets, and the other.
+    ends: (&'a Spread<'a>, &'a Spread<'a>),
+    aims: (Aims, Aims),
+    /// Whether the end with more facets is the second of the pair.
+    swapped: bool,
+    key: u64,
+}
+
+impl<'a> Rays<'a> {
+    /// `None` if one end shows the other nothing.
+    fn new(a: &'a Spread<'a>, b: &'a Spread<'a>, key: u64) -> Option<Rays<'a>> {
+        let (of_a, of_b) = (Aims::new(a, b)?, Aims::new(b, a)?);
+        Some(match of_b.facets.len() > of_a.facets.len() {
+            false => Rays { ends: (a, b), aims: (of_a, of_b), swapped: false, key },
+            true => Rays { ends: (b, a), aims: (of_b, of_a), swapped: true, key },
+        })
+    }
+
+    /// All of them that leave and arrive on the sides that face.
+    fn all<'s>(&'s self, sight: &'s GroupSight<'_>) -> impl Iterator<Item = Ray> + 's {
+        let count = self.aims.0.facets.len();
+        let each = (RAYS.0.div_ceil(count)).max(FACET_RAYS).min((RAYS.1 / count).max(1));
+        let (many, few) = self.ends;
+        let ray = move |(round, k): (usize, usize)| {
+            let turn = scrambled(self.key, 3 * round as u64 + 1);
+            let within = unit((k as u32).reverse_bits() ^ turn);
+            let share = (((round + k) % each) as f64 + within) / each as f64;
+            let key = self.key.wrapping_add((round * count + k) as u64);
+            let from = sight.aim((many, few), self.aims.0.facets[k], key);
+            let j = self.aims.1.at(share);
+            let key = key.rotate_left(32) ^ self.key;
+            let to = sight.aim((few, many), self.aims.1.facets[j], key);
+            let way = to.at - from.at;
+            let faces = from.normal.dot(way) > 0.0 && to.normal.dot(way) < 0.0;
+            faces.then_some(Ray { facets: (k, j), from, to })
+        };
+        (0..each).flat_map(move |round| (0..count).map(move |k| (round, k))).filter_map(ray)
+    }
+}
+
 impl GroupSight<'_> {
     /// What each facet sees of the other end: rays from each facet of the end that has more of them, to points of the other by
     /// what they weigh. A pure function of the places and of `key`.
     pub fn by_facets(&self, a: &Spread<'_>, b: &Spread<'_>, key: u64) -> FacetSight {
-        let (Some(of_a), Some(of_b)) = (Aims::new(a, b), Aims::new(b, a)) else {
-            return FacetSight::default();
-        };
-        let swapped = of_b.facets.len() > of_a.facets.len();
-        let ((many, of_many), (few, of_few)) =
-            if swapped { ((b, &of_b), (a, &of_a)) } else { ((a, &of_a), (b, &of_b)) };
-        let count = of_many.facets.len();
-        let each = (RAYS.0.div_ceil(count)).max(FACET_RAYS).min((RAYS.1 / count).max(1));
-        let (mut seen_many, mut seen_few) = (Tally::new(count), Tally::new(of_few.facets.len()));
+        let Some(rays) = Rays::new(a, b, key) else { return FacetSight::default() };
+        let (many, few) = rays.ends;
+        let (of_many, of_few) = (&rays.aims.0, &rays.aims.1);
+        let (mut seen_many, mut seen_few) =
+            (Tally::new(of_many.facets.len()), Tally::new(of_few.facets.len()));
         let (mut stack, mut clear_sum, mut sum) = (Vec::with_capacity(64), 0.0, 0.0);
-        for (round, k) in (0..each).flat_map(|round| (0..count).map(move |k| (round, k))) {
-            let turn = scrambled(key, 3 * round as u64 + 1);
-            let within = unit((k as u32).reverse_bits() ^ turn);
-            let share = (((round + k) % each) as f64 + within) / each as f64;
-            let of_ray = key.wrapping_add((round * count + k) as u64);
-            let from = self.aim((many, few), of_many.facets[k], of_ray);
-            let j = of_few.at(share);
-            let to = self.aim((few, many), of_few.facets[j], of_ray.rotate_left(32) ^ key);
-            let way = to.at - from.at;
-            if from.normal.dot(way) <= 0.0 || to.normal.dot(way) >= 0.0 {
-                continue;
-            }
+        for Ray { facets: (k, j), from, to } in rays.all(self) {
             let ends = [(from.at, from.patch), (to.at, to.patch)];
             let clear = !self.is_blocked(self.candidates, ends, (many, few), &mut stack);
             let weight = from.weight * to.weight;
+            let of_ray = weight * of_many.weights[k];
             seen_many.add(k, weight, clear);
-            seen_few.add(j, weight * of_many.weights[k], clear);
-            sum += weight * of_many.weights[k];
-            clear_sum += if clear { weight * of_many.weights[k] } else { 0.0 };
+            seen_few.add(j, of_ray, clear);
+            sum += of_ray;
+            clear_sum += if clear { of_ray } else { 0.0 };
         }
         if sum <= 0.0 {
             return FacetSight::default();
@@ -238,8 +277,22 @@ impl GroupSight<'_> {
         let mean = clear_sum / sum;
         let of_many = seen_many.by_facet((many, of_many), mean, 0.0);
         let of_few = seen_few.by_facet((few, of_few), mean, 1.0);
-        let of_facets = if swapped { [of_few, of_many] } else { [of_many, of_few] };
+        let of_facets = if rays.swapped { [of_few, of_many] } else { [of_many, of_few] };
         FacetSight { mean, of_facets }
+    }
+
+    /// Whether any ray of [`GroupSight::by_facets`] meets one of some boxes in the world: if not, nothing in them has a part in
+    /// what facets see.
+    pub fn rays_meet(&self, a: &Spread<'_>, b: &Spread<'_>, key: u64, boxes: &[Aabb]) -> bool {
+        let Some(rays) = Rays::new(a, b, key) else { return false };
+        let margin_m = MARGIN * self.view.far_m();
+        let pose = self.common.and_then(|body| self.view.poses()[body.0 as usize]);
+        let world = |p: DVec3| pose.map_or(p, |pose| pose.point(p));
+        rays.all(self).any(|ray| {
+            let [from, to] = [ray.from.at, ray.to.at].map(|p| Aabb::of([world(p)]));
+            let segment = ShaftOfBoxes::new(&from, &to);
+            boxes.iter().any(|bounds| segment.meets(bounds, margin_m))
+        })
     }
 
     /// A point of a facet of an end, or of the element that it is.
@@ -267,7 +320,7 @@ impl GroupSight<'_> {
     pub fn between(forest: &Forest, view: &WorldView, a: ElementId, b: ElementId) -> Vec<u32> {
         let (one, other) = (view.end_box(forest.fixed(a)), view.end_box(forest.fixed(b)));
         let shaft = ShaftOfBoxes::new(one, other);
-        let margin_m = 5e-7 * view.far_m();
+        let margin_m = MARGIN * view.far_m();
         let small_m = 0.5 * one.union(*other).diagonal();
         let mut out = Vec::new();
         let mut stack = vec![Forest::ROOT];

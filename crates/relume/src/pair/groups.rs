@@ -12,17 +12,21 @@ use super::oracle::{Oracle, Side};
 use super::tree::{Carried, CullReason, Gradients, in_steps};
 use super::update::{Judgement, Verdict};
 
-/// Distance of two ends, in sums of their radii, below which they are refined whatever they bring.
-const APART: f64 = 1.3;
+/// Distance of two ends, in sums of their radii, below which they are refined whatever they bring: neither reaches into the
+/// ball around the other.
+const APART: f64 = 1.0;
 
 /// Weight of the second order in size over distance, of either end: what facets at their own places leave out.
 const PLACE: f64 = 1.0;
 
-/// Weight of the standard deviation of visibility between the segments of a pair: what all facets of an end share.
+/// Weight of the standard deviation of visibility between the segments of a pair on an element: what all of it shares.
 const SHARED: f64 = 1.0;
 
+/// The same on a group: its facets have a visibility of their own, to the whole of the other end.
+const SHARED_BY_FACETS: f64 = 0.5;
+
 /// Visibility that sixteen segments may miss, as a variance.
-const MISSED: f64 = 0.02;
+const MISSED: f64 = 0.01;
 
 /// Share of its area that a group shows, for each radius over distance of the other end, beyond what it shows to its middle.
 const TURNED: f64 = 0.5;
@@ -172,7 +176,8 @@ impl Placed<'_> {
         let weight = (area_m2 / reference_m2).sqrt();
         let arrives = sent * shows_m2 / (std::f64::consts::PI * apart * apart);
         let place = PLACE * v * (x.size.0 * x.size.0 + x.size.1 * x.size.1);
-        let hidden = if v < 1.0 { SHARED * SHARED * v * (1.0 - v) + MISSED / 16.0 } else { 0.0 };
+        let shared = if self.is_group(receiver) { SHARED_BY_FACETS } else { SHARED };
+        let hidden = if v < 1.0 { shared * shared * v * (1.0 - v) + MISSED / 16.0 } else { 0.0 };
         weight * arrives / light.irradiance * (place * place + hidden).sqrt()
     }
 

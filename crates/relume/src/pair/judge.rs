@@ -195,6 +195,10 @@ impl Judge for Placed<'_> {
         let at_level = |id| self.forest.is_coarse_root(id) || self.forest.kind(id) == Kind::Light;
         at_level(a) && at_level(b)
     }
+
+    fn is_apart(&self, a: ElementId, b: ElementId) -> bool {
+        self.is_group(a) || self.is_group(b)
+    }
 }
 
 /// Depth behind a plane, in roundings of its patch, up to which a group may hold what touches it.

@@ -135,6 +135,12 @@ pub trait Judge: Hierarchy + Sync {
 
     /// Whether this pair is one of those that are held when it is not culled.
     fn holds(&self, a: ElementId, b: ElementId) -> bool;
+
+    /// Whether a link between these two is worked out further from their places once it is one, so that it must be known
+    /// where they were looked at again.
+    fn is_apart(&self, _a: ElementId, _b: ElementId) -> bool {
+        false
+    }
 }
 
 /// Exact counts of what was done.
@@ -274,6 +280,9 @@ pub struct Changes {
     pub held: Vec<Held>,
     /// Pairs that were held once and may be so no more; both ends may have vanished since.
     pub dropped: Vec<(ElementId, ElementId)>,
+    /// Links that are worked out further ([`Judge::is_apart`]) of which more than the light was looked at, whatever they
+    /// carry now; empty where edits are not recorded.
+    pub apart: Vec<(ElementId, ElementId)>,
 }
 
 /// The memory that an update may use is spent.
@@ -626,6 +635,7 @@ impl<J: Judge> Editor<'_, J> {
                     self.changes.work.extrapolated += 1;
                     self.changes.work.dynamic_links += 1;
                     self.carry(item.pair, carried);
+                    self.note_apart(item.pair);
                     if let Some(margin) = margin {
                         self.tree.set_margin(item.pair, *margin);
                     }
@@ -634,10 +644,20 @@ impl<J: Judge> Editor<'_, J> {
                     self.count(found, *stale);
                     self.remember(item.pair, found, *stale);
                     let children = self.apply(item.pair, found, *stale);
+                    if found.verdict == Verdict::Link && *stale != Stale::Brightness {
+                        self.note_apart(item.pair);
+                    }
                     self.certify(item.pair, *due);
                     self.look_at(children, *list, item, (chunk, wave));
                 }
             }
+        }
+    }
+
+    fn note_apart(&mut self, pair: PairId) {
+        let (a, b) = self.tree.ends(pair);
+        if self.record.edits && self.judge.is_apart(a, b) {
+            self.changes.apart.push((a, b));
         }
     }
 

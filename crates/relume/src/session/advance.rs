@@ -15,7 +15,7 @@ use crate::solver::{Dirty, GroupLinks, Links, Radiosity};
 use super::ahead::{Ahead, Void, most_mean, while_extrapolated};
 use super::budget;
 use super::coarse::{self, Coarse};
-use super::groups::group_links;
+use super::groups;
 use super::promise::Promise;
 use super::replant::links_on;
 use super::report::FrameReport;
@@ -76,6 +76,7 @@ impl Session {
         let fine = bring(&mut solved, since.as_ref(), Level::Fine, &changes.refined)?;
         changes.work.add_after_coarse(fine.work);
         changes.edits.extend(fine.edits);
+        changes.apart.extend(fine.apart);
         changes.events.extend(fine.events);
         changes.edits.extend(links_on(&solved, &touched).into_iter().map(Edit::Set));
         solved.events = std::mem::take(&mut changes.events);
@@ -83,7 +84,16 @@ impl Session {
         report.seconds.evaluate = clock.lap();
 
         let mut dirty = self.edit_links(&mut solved, &changes, cold, &mut report);
-        solved.groups = group_links(&solved.forest, &solved.view, &solved.tree);
+        let before_groups = match cold || old.far_m() != solved.view.far_m() {
+            true => groups::Before::default(),
+            false => {
+                let links =
+                    (std::mem::take(&mut solved.groups), std::mem::take(&mut changes.apart));
+                groups::Before::new((&self.scene, &solved.forest), (&old, &solved.view), links)
+            }
+        };
+        let places = (&solved.forest, &solved.view);
+        solved.groups = groups::group_links(places, &solved.tree, &before_groups);
         if let Dirty::Some { parents, .. } = &mut dirty {
             let facets = solved.forest.near_facets();
             parents.extend(self.came_or_went(&solved, &old, facets));
@@ -107,7 +117,6 @@ impl Session {
         if relights {
             coarse::set_sources(now, (&solved.forest, &lit), &mut solved.radiosity);
         }
-        let dirty = if solved.groups.is_empty() { dirty } else { Dirty::All };
         let lit = if let Dirty::All = dirty { lit.with_places() } else { lit };
         let share = if cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE };
         let residual = self.options.tolerance * share;

@@ -22,6 +22,7 @@ impl Solved {
         if self.forest.vacant_len() * VACANT_ELEMENTS > self.forest.len() {
             let to = self.forest.compact();
             self.links.renumber(&to);
+            self.groups.renumber(&to);
             self.radiosity.renumber(&to);
             self.tree.renumber(&to);
         }

@@ -63,6 +63,13 @@ impl Linear {
         self
     }
 
+    /// The largest value within a radius, of any sign and channel; gradients per unit of the radius.
+    pub(super) fn most(&self, radius: f32) -> f32 {
+        let [u, v] = self.gradient;
+        let of = |c: usize| self.mean[c].abs() + radius * (u[c].abs() + v[c].abs());
+        of(0).max(of(1)).max(of(2))
+    }
+
     pub(super) fn difference(&self, other: &Linear) -> f32 {
         let mut out = 0.0_f32;
         for c in 0..3 {
@@ -91,6 +98,11 @@ impl Default for Field {
 }
 
 impl Field {
+    /// Whether it holds no element.
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.len() <= BEYOND
+    }
+
     pub(super) fn extend(&mut self, len: usize) {
         let wanted = len * NINE + BEYOND;
         if wanted > self.0.len() {

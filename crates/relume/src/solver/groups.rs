@@ -4,8 +4,11 @@
 //! facets, and what arrives is handed out by their own factors. An element stands for itself, with a line.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use rayon::prelude::*;
+
+use crate::element::Renumbering;
 
 use super::field::Linear;
 
@@ -39,8 +42,10 @@ pub enum GroupEnd {
 pub struct GroupLink {
     /// Both ends.
     pub ends: [GroupEnd; 2],
-    /// K = V / (pi R^2), 1/m2.
+    /// K = V / (pi R^2), 1/m2; where factors have visibilities of their own in them, divided by V^2.
     pub coupling: f32,
+    /// Whether they have.
+    pub by_facets: bool,
 }
 
 /// The facets of a group that is in no other, with the link ends at or below it: link, and which end.
@@ -58,13 +63,54 @@ pub struct GroupLinks {
     /// Place of each facet, by id; [`NONE`] for what is in no group.
     places: Vec<u32>,
     links: Vec<GroupLink>,
+    /// Ids of both ends of each link.
+    ids: Vec<[u32; 2]>,
+    /// The links by the ids of their ends, ascending.
+    by_ids: Vec<u32>,
     factors: Vec<f32>,
     /// By the first of their facets.
     roots: Vec<Root>,
     /// Ends that are elements, by their ids.
     elements: Vec<(u32, u32, u8)>,
-    /// What arrives where every surface sends 1.
-    rows: Arriving,
+    /// Place of each element among those that are ends, by id; [`NONE`] for others.
+    element_places: Vec<u32>,
+    /// Mean of x^2 / radius^2 over an element.
+    moment: f32,
+    /// What arrives where every surface sends 1, once it is asked for.
+    rows: OnceLock<Arriving>,
+}
+
+/// Links with the ids of their ends and the factors of their facets, one after the other.
+#[derive(Clone, Debug, Default)]
+pub struct PlacedLinks {
+    /// The links.
+    pub links: Vec<GroupLink>,
+    /// Ids of both ends of each.
+    pub ids: Vec<[u32; 2]>,
+    /// Factors of facets.
+    pub factors: Vec<f32>,
+}
+
+impl PlacedLinks {
+    /// Adds others after these.
+    pub fn extend(&mut self, other: PlacedLinks) {
+        let shift = self.factors.len() as u32;
+        self.links.extend(other.links.into_iter().map(|link| link.shifted(shift)));
+        self.ids.extend(other.ids);
+        self.factors.extend(other.factors);
+    }
+}
+
+impl GroupLink {
+    /// With factors this much further on.
+    fn shifted(mut self, by: u32) -> GroupLink {
+        for end in &mut self.ends {
+            if let GroupEnd::Group { first, .. } = end {
+                *first += by;
+            }
+        }
+        self
+    }
 }
 
 const NONE: u32 = u32::MAX;
@@ -74,17 +120,16 @@ const NONE: u32 = u32::MAX;
 pub(super) struct Arriving {
     /// At the facets, by place, W/m2.
     facets: Vec<[f32; 3]>,
-    /// At the elements that are ends themselves, by id, ascending; gradients per metre.
-    elements: Vec<(u32, Linear)>,
+    /// At the elements that are ends themselves, by place; gradients per metre.
+    elements: Vec<Linear>,
 }
 
 impl GroupLinks {
-    /// From facets (id and area, m2), the ranges of them that are in no other group, links with their factors, and the
-    /// mean of x^2 / radius^2 over an element.
+    /// From facets (id and area, m2), the ranges of them that are in no other group, links, and the mean of x^2 / radius^2 over an element.
     pub fn new(
         facets: Vec<(u32, f32)>,
         roots: Vec<Range<u32>>,
-        (links, factors): (Vec<GroupLink>, Vec<f32>),
+        PlacedLinks { links, ids, factors }: PlacedLinks,
         moment: f32,
     ) -> GroupLinks {
         let mut roots: Vec<Root> =
@@ -106,11 +151,59 @@ impl GroupLinks {
         let len = facets.iter().map(|&(id, _)| id as usize + 1).max().unwrap_or(0);
         let mut places = vec![NONE; len];
         facets.iter().zip(0..).for_each(|(&(id, _), place)| places[id as usize] = place);
-        let rows = Arriving::default();
-        let mut out = GroupLinks { facets, places, links, factors, roots, elements, rows };
-        let ones = |_: u32| Linear { mean: [1.0, 0.0, 0.0], ..Linear::default() };
-        out.rows = out.arriving(&ones, moment);
-        out
+        let rows = OnceLock::new();
+        let by_ids = in_order(&ids);
+        let element_places = places_of(&elements);
+        GroupLinks {
+            facets,
+            places,
+            links,
+            ids,
+            by_ids,
+            factors,
+            roots,
+            elements,
+            element_places,
+            moment,
+            rows,
+        }
+    }
+
+    /// The link between two ends, if there is one.
+    pub fn between(&self, ids: [u32; 2]) -> Option<&GroupLink> {
+        let place = self.by_ids.binary_search_by_key(&ids, |&k| self.ids[k as usize]).ok()?;
+        Some(&self.links[self.by_ids[place] as usize])
+    }
+
+    /// Adds a link of these to others.
+    pub fn copy(&self, link: &GroupLink, ids: [u32; 2], to: &mut PlacedLinks) {
+        let mut link = link.clone();
+        for end in &mut link.ends {
+            if let GroupEnd::Group { facets, first } = end {
+                let own = *first as usize..*first as usize + facets.len();
+                *first = to.factors.len() as u32;
+                to.factors.extend_from_slice(&self.factors[own]);
+            }
+        }
+        to.links.push(link);
+        to.ids.push(ids);
+    }
+
+    /// Follows elements to their new ids; groups and facets keep theirs.
+    pub fn renumber(&mut self, to: &Renumbering) {
+        for (link, ids) in self.links.iter_mut().zip(&mut self.ids) {
+            *ids = ids.map(|id| to.new_of(id));
+            for (end, &new) in link.ends.iter_mut().zip(&*ids) {
+                if let GroupEnd::Element { id, .. } = end {
+                    *id = new;
+                }
+            }
+        }
+        self.elements.iter_mut().for_each(|(id, ..)| *id = to.new_of(*id));
+        self.elements.sort_unstable();
+        self.element_places = places_of(&self.elements);
+        self.by_ids = in_order(&self.ids);
+        self.rows = OnceLock::new();
     }
 
     /// Whether there are none.
@@ -175,7 +268,7 @@ impl GroupLinks {
         sum
     }
 
-    fn at_elements(&self, leaving: &[[[f32; 3]; 2]]) -> Vec<(u32, Linear)> {
+    fn at_elements(&self, leaving: &[[[f32; 3]; 2]]) -> Vec<Linear> {
         let of_element = |ends: &[(u32, u32, u8)]| {
             let mut h = Linear::default();
             for &(_, k, side) in ends {
@@ -192,7 +285,7 @@ impl GroupLinks {
                     }
                 }
             }
-            (ends[0].0, h)
+            h
         };
         let by_element: Vec<&[(u32, u32, u8)]> =
             self.elements.chunk_by(|one, other| one.0 == other.0).collect();
@@ -201,8 +294,10 @@ impl GroupLinks {
 
     /// What arrives at one element over its own group links and those of the groups that it is a facet of.
     pub(super) fn at(&self, arriving: &Arriving, id: u32) -> Linear {
-        let own = arriving.elements.binary_search_by_key(&id, |(id, _)| *id);
-        let mut h = own.map_or_else(|_| Linear::default(), |k| arriving.elements[k].1);
+        let mut h = match self.element_places.get(id as usize) {
+            Some(&place) if place != NONE => arriving.elements[place as usize],
+            _ => Linear::default(),
+        };
         match self.places.get(id as usize) {
             Some(&place) if place != NONE => {
                 let facet = arriving.facets[place as usize];
@@ -215,7 +310,9 @@ impl GroupLinks {
 
     /// The sum of form factors from one element over its group links: in the first channel.
     pub(super) fn row(&self, id: u32, linear: bool) -> Linear {
-        let row = self.at(&self.rows, id);
+        let ones = |_: u32| Linear { mean: [1.0, 0.0, 0.0], ..Linear::default() };
+        let rows = self.rows.get_or_init(|| self.arriving(&ones, self.moment));
+        let row = self.at(rows, id);
         if linear { row } else { Linear { mean: row.mean, ..Linear::default() } }
     }
 
@@ -227,10 +324,26 @@ impl GroupLinks {
             + self.facets.capacity() * 8
             + self.places.capacity() * 4
             + self.elements.capacity() * 12
-            + ends
-            + self.rows.facets.capacity() * 12
-            + self.rows.elements.capacity() * size_of::<(u32, Linear)>()) as u64
+            + self.element_places.capacity() * 4
+            + (self.ids.capacity() * 8 + self.by_ids.capacity() * 4)
+            + ends) as u64
     }
+}
+
+/// Number of each element among those of some ends (ascending), by id.
+fn places_of(elements: &[(u32, u32, u8)]) -> Vec<u32> {
+    let mut out = vec![NONE; elements.last().map_or(0, |end| end.0 as usize + 1)];
+    for (place, ends) in elements.chunk_by(|one, other| one.0 == other.0).enumerate() {
+        out[ends[0].0 as usize] = place as u32;
+    }
+    out
+}
+
+/// Places of some pairs of ids in their order.
+fn in_order(ids: &[[u32; 2]]) -> Vec<u32> {
+    let mut out: Vec<u32> = (0..ids.len() as u32).collect();
+    out.sort_unstable_by_key(|&k| ids[k as usize]);
+    out
 }
 
 #[cfg(test)]
@@ -248,11 +361,12 @@ mod tests {
         let small = |first| GroupEnd::Group { facets: 0..3, first };
         let last = GroupEnd::Group { facets: 3..4, first: 6 };
         let list = vec![
-            GroupLink { ends: [small(0), element], coupling: 0.1 },
-            GroupLink { ends: [last, small(3)], coupling: 0.2 },
+            GroupLink { ends: [small(0), element], coupling: 0.1, by_facets: false },
+            GroupLink { ends: [last, small(3)], coupling: 0.2, by_facets: false },
         ];
         let factors = vec![1.0, 0.5, 0.0, 0.25, 0.0, 2.0, 0.75];
-        GroupLinks::new(facets, vec![0..3, 3..4], (list, factors), MOMENT)
+        let placed = PlacedLinks { links: list, ids: vec![[1, 9], [3, 1]], factors };
+        GroupLinks::new(facets, vec![0..3, 3..4], placed, MOMENT)
     }
 
     /// K A_i f_i A_j f_j of every two ends.

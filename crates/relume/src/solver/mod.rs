@@ -15,7 +15,7 @@ mod trend;
 mod work;
 
 pub use field::Linear;
-pub use groups::{GroupEnd, GroupLink, GroupLinks};
+pub use groups::{GroupEnd, GroupLink, GroupLinks, PlacedLinks};
 pub use links::{Link, Links, LinksBuilder};
 pub use push::row_sums;
 pub use radiosity::{Radiosity, Stop};

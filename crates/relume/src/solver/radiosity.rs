@@ -8,6 +8,7 @@ use crate::transport;
 
 use super::field::{Field, Linear, SLACK, grow};
 use super::gather::gather_some;
+use super::groups::Arriving;
 use super::jump::Jump;
 use super::links::Links;
 use super::push::{push, row_sums};
@@ -40,6 +41,8 @@ pub struct Radiosity {
     radiosity: Field,
     /// What an element's own links bring, without those of its ancestors. Gradients are per metre.
     gathered: Field,
+    /// What of that came over links of groups. Empty where there are none.
+    over_groups: Field,
     /// By how much the irradiance of an element may have changed since it was gathered, W/m2.
     pending: Vec<f32>,
     /// By how much the radiosities at and below an element may be off, at most, for what was not pushed down
@@ -109,6 +112,9 @@ impl Radiosity {
     pub fn renumber(&mut self, to: &Renumbering) {
         self.radiosity.renumber(to);
         self.gathered.renumber(to);
+        if !self.over_groups.is_empty() {
+            self.over_groups.renumber(to);
+        }
         self.trend.renumber(to);
         let numbers = [&mut self.pending, &mut self.owed, &mut self.limits];
         let kept = numbers.into_iter().filter(|v| !v.is_empty());
@@ -119,8 +125,8 @@ impl Radiosity {
 
     /// Gives back room beyond a small reserve.
     pub fn trim(&mut self) {
-        let Radiosity { radiosity, gathered, pending, owed, .. } = self;
-        for values in [&mut radiosity.0, &mut gathered.0, pending, owed] {
+        let Radiosity { radiosity, gathered, over_groups, pending, owed, .. } = self;
+        for values in [&mut radiosity.0, &mut gathered.0, &mut over_groups.0, pending, owed] {
             values.shrink_to(values.len() + values.len() / SLACK);
         }
         self.trend.trim();
@@ -148,6 +154,10 @@ impl Radiosity {
             }
             self.radiosity.set(child, &own);
             self.gathered.set(child, &Linear::default());
+            if !self.over_groups.is_empty() {
+                self.over_groups.extend(child as usize + 1);
+                self.over_groups.set(child, &Linear::default());
+            }
             if let Some(owed) = self.owed.get_mut(child as usize) {
                 *owed = 0.0;
             }
@@ -215,6 +225,7 @@ impl Radiosity {
             });
         }
         self.pending.fill(0.0);
+        self.over_groups = Field::default();
         // A solve that changed most of the scene has given it back.
         self.owed.clear();
         self.owed.resize(self.pending.len(), 0.0);
@@ -255,6 +266,10 @@ impl Radiosity {
         let start = (to_residual && self.trend.is_wide)
             .then(|| self.trend.follow(surfaces, &mut self.radiosity));
         let mut is_wide = work.all && !is_first;
+        let mut arriving = match work.all {
+            true => None,
+            false => self.mark_over_groups(surfaces, &mut work, limit),
+        };
         loop {
             if self.held > HELD_MAX * limit && !work.all && to_residual {
                 // What was little beside a brighter scene is too much beside this one.
@@ -265,7 +280,8 @@ impl Radiosity {
             if all {
                 jump.before(&self.radiosity);
             }
-            let small = self.sweep(surfaces, links, &mut work, limit);
+            let over_groups = arriving.take().or_else(|| self.arriving(surfaces));
+            let small = self.sweep((surfaces, links, over_groups.as_ref()), &mut work, limit);
             self.sweeps += 1;
             if all {
                 (self.passed_over, self.held) = (small, 0.0);
@@ -273,7 +289,8 @@ impl Radiosity {
                 self.held = self.held.max(limit);
             }
             // A radiosity stays, what its ancestors gathered is owed to it, and they may gather other values.
-            let left = self.passed_over + self.held * (1.0 + 1.0 + PENDING_SHARE);
+            let gathered = if surfaces.groups().is_some() { 2.0 } else { 1.0 };
+            let left = self.passed_over + self.held * (1.0 + 1.0 + gathered * PENDING_SHARE);
             let (mean, before) = (self.mean_w_m2(surfaces), limit);
             limit = limit_of(mean);
             self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
@@ -288,7 +305,13 @@ impl Radiosity {
                     work.start_all(surfaces);
                     false
                 }
-                _ => !work.is_left(surfaces, links, limit, &mut self.pending),
+                _ => {
+                    let is_left = work.is_left(surfaces, links, limit, &mut self.pending);
+                    if !work.all {
+                        arriving = self.mark_over_groups(surfaces, &mut work, limit);
+                    }
+                    !is_left && !work.waits()
+                }
             };
             if done {
                 break;
@@ -317,22 +340,17 @@ impl Radiosity {
     /// One pass over all batches; returns the largest change that is too small to be followed.
     fn sweep(
         &mut self,
-        surfaces: &impl Surfaces,
-        links: &Links,
+        (surfaces, links, arriving): (&impl Surfaces, &Links, Option<&Arriving>),
         work: &mut Work,
         limit: f32,
     ) -> f32 {
         let mut small = 0.0_f32;
         work.changed.clear();
-        let moment = surfaces.source_moment();
-        let arriving = surfaces
-            .groups()
-            .map(|groups| (groups, groups.arriving(&|id| self.radiosity.get(id), moment)));
         let mut scratch = std::mem::take(&mut work.scratch);
         for batch in 0..work.batches.len() {
             let mut now = work.take(surfaces, batch);
             let most_owed = if work.all { None } else { Some(limit) };
-            let over_groups = |id: u32| arriving.as_ref().map(|(groups, all)| groups.at(all, id));
+            let over_groups = |id: u32| Some(surfaces.groups()?.at(arriving?, id));
             let sources = (links, &over_groups as &dyn Fn(u32) -> Option<Linear>);
             self.gather((surfaces, sources), &mut now, most_owed, &mut scratch.gathered);
             let way = if work.all { None } else { Some(work.way.mark(surfaces, &mut now)) };
@@ -363,6 +381,35 @@ impl Radiosity {
         small
     }
 
+    /// What arrives over groups as surfaces are now; `None` where there are none.
+    fn arriving(&self, surfaces: &impl Surfaces) -> Option<Arriving> {
+        let moment = surfaces.source_moment();
+        Some(surfaces.groups()?.arriving(&|id| self.radiosity.get(id), moment))
+    }
+
+    /// Lets those wait to be gathered to whom something else arrives over groups than they gathered, as soon as the
+    /// difference is as large as what may add up of other sources. What arrives.
+    fn mark_over_groups(
+        &mut self,
+        surfaces: &impl Surfaces,
+        work: &mut Work,
+        limit: f32,
+    ) -> Option<Arriving> {
+        let groups = surfaces.groups()?;
+        let arriving = self.arriving(surfaces)?;
+        self.over_groups.extend(surfaces.len());
+        let differs = |&id: &u32| {
+            let change = groups.at(&arriving, id).minus(&self.over_groups.get(id));
+            change != Linear::default()
+                && surfaces.is_surface(id)
+                && change.most(surfaces.place(id).radius) > limit * PENDING_SHARE
+        };
+        let ids = (0..surfaces.len() as u32).into_par_iter();
+        let found: Vec<u32> = ids.with_min_len(CHUNK).filter(differs).collect();
+        found.into_iter().for_each(|id| work.mark(surfaces, id));
+        Some(arriving)
+    }
+
     /// Area-weighted mean radiosity of all surfaces and channels, W/m2.
     pub fn mean_w_m2(&self, surfaces: &impl Surfaces) -> f64 {
         let (mut flux, mut area) = (0.0, 0.0);
@@ -387,7 +434,10 @@ impl Radiosity {
         let receivers = &mut batch.receivers;
         self.gathers += receivers.len() as u64;
         receivers.iter().for_each(|&id| self.pending[id as usize] = 0.0);
-        let Radiosity { radiosity, gathered, owed, constant, .. } = self;
+        let Radiosity { radiosity, gathered, over_groups: kept, owed, constant, .. } = self;
+        if surfaces.groups().is_some() {
+            kept.extend(surfaces.len());
+        }
         let linear = !*constant;
         found.resize(found.len().max(receivers.len()), Linear::default());
         let level = transport::Simd::detect().level();
@@ -403,7 +453,13 @@ impl Radiosity {
         let mut next = found.iter();
         receivers.retain(|&id| {
             let own = next.next().expect("one for each receiver");
-            let h = &over_groups(id).map_or(*own, |groups| own.plus(&groups));
+            let h = &match over_groups(id) {
+                Some(groups) => {
+                    kept.set(id, &groups);
+                    own.plus(&groups)
+                }
+                None => *own,
+            };
             let Some(most) = most_owed else {
                 gathered.set(id, h);
                 owed[id as usize] = 0.0;
@@ -494,7 +550,11 @@ impl Radiosity {
     pub fn memory_bytes(&self) -> u64 {
         let single = self.pending.capacity() + self.owed.capacity() + self.limits.capacity();
         let single = (single * size_of::<f32>()) as u64;
-        self.radiosity.bytes() + self.gathered.bytes() + single + self.trend.bytes()
+        self.radiosity.bytes()
+            + self.gathered.bytes()
+            + self.over_groups.bytes()
+            + single
+            + self.trend.bytes()
     }
 }
 

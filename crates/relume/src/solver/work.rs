@@ -28,8 +28,6 @@ pub(super) struct Work {
     marks: Vec<u64>,
     /// Every sweep gathers everything.
     pub(super) all: bool,
-    /// Sweeps are over everything to the end: who gathers from a group is not known by element.
-    always_all: bool,
     /// Elements that the last sweep changed by more than the limit, and by how much.
     pub(super) changed: Vec<(u32, f32)>,
     pub(super) way: Way,
@@ -86,15 +84,12 @@ impl Work {
             batch_of,
             marks,
             all: false,
-            always_all: surfaces.groups().is_some(),
             changed: Vec::new(),
             way: Way::new(surfaces.len()),
             scratch: Scratch::default(),
         };
         match dirty {
-            Dirty::Some { receivers, parents }
-                if receivers.len() <= surfaces.len() / MANY && !work.always_all =>
-            {
+            Dirty::Some { receivers, parents } if receivers.len() <= surfaces.len() / MANY => {
                 for parent in parents {
                     let batch = work.batch_of(surfaces, parent);
                     work.batches[batch].parents.push(parent);
@@ -121,7 +116,8 @@ impl Work {
         usize::from(self.batch_of[surfaces.facet_of(id) as usize])
     }
 
-    fn mark(&mut self, surfaces: &impl Surfaces, id: u32) {
+    /// Lets a receiver wait to be gathered.
+    pub(super) fn mark(&mut self, surfaces: &impl Surfaces, id: u32) {
         if !set_bit(&mut self.marks, id) {
             let batch = self.batch_of(surfaces, id);
             self.batches[batch].receivers.push(id);
@@ -176,9 +172,6 @@ impl Work {
         limit: f32,
         pending: &mut [f32],
     ) -> bool {
-        if self.all && self.always_all {
-            return !self.changed.is_empty();
-        }
         let many = self.changed.len() > surfaces.len() / if self.all { FEW } else { MANY };
         if self.all && !many {
             // From now on only what depends on a change.
@@ -190,7 +183,12 @@ impl Work {
         } else if many && !self.all {
             self.start_all(surfaces);
         }
-        self.all || self.batches.iter().any(|b| !b.receivers.is_empty())
+        self.all || self.waits()
+    }
+
+    /// Whether receivers wait.
+    pub(super) fn waits(&self) -> bool {
+        self.batches.iter().any(|b| !b.receivers.is_empty())
     }
 }
 

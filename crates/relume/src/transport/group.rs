@@ -13,10 +13,12 @@ use glam::{DVec2, DVec3};
 use crate::element::{
     ElementId, Forest, GroupLeaf, Kind, WorldElement, WorldView, bilinear, bilinear_area,
 };
-use crate::geometry::{Aabb, Pose, ShaftOfBoxes};
-use crate::scene::{BodyId, PatchId};
+use crate::geometry::Pose;
+use crate::scene::BodyId;
 
-use super::segments::EDGE_OVERLAP;
+mod sight;
+
+pub use sight::GroupSight;
 
 /// One end of a pair in the frame of the pair: that of the body that both are of, or else the world.
 pub struct Spread<'a> {
@@ -262,21 +264,31 @@ impl Samples {
         (forest, view, pose): (&Forest, &WorldView, &Pose),
         key: u64,
     ) {
-        let patch = forest.patch(leaf.facet).expect("a facet has a patch");
-        let (place, turn) = (view.patch(patch), scrambled(key, k as u64 + 1));
+        let turn = scrambled(key, k as u64 + 1);
         let unit = |bits: u32| f64::from(bits & 0xffff) / 65_536.0;
-        let shape = forest.shape(leaf.facet);
-        // Groups of what never moves are in the world.
-        let frame = match forest.moves_with_group(leaf.facet) {
-            true => &place.local,
-            false => &place.world,
-        };
-        let corners = shape.corners.map(|c| frame.point(c));
-        self.points[k] = pose.point(bilinear(&corners, unit(turn), unit(turn >> 16)));
+        let (patch, at) = point_of(leaf, (forest, view, pose), (unit(turn), unit(turn >> 16)));
+        self.points[k] = at;
         self.normals[k] = pose.direction(leaf.normal);
         self.weights[k] = 1.0;
-        self.patches[k] = patch.0;
+        self.patches[k] = patch;
     }
+}
+
+/// A point of a facet in the frame of a pair, and its patch.
+fn point_of(
+    leaf: &GroupLeaf,
+    (forest, view, pose): (&Forest, &WorldView, &Pose),
+    (s, t): (f64, f64),
+) -> (u32, DVec3) {
+    let patch = forest.patch(leaf.facet).expect("a facet has a patch");
+    let place = view.patch(patch);
+    // Groups of what never moves are in the world.
+    let frame = match forest.moves_with_group(leaf.facet) {
+        true => &place.local,
+        false => &place.world,
+    };
+    let corners = forest.shape(leaf.facet).corners.map(|c| frame.point(c));
+    (patch.0, pose.point(bilinear(&corners, s, t)))
 }
 
 /// 32 bits of the finaliser of SplitMix64.
@@ -290,107 +302,6 @@ fn scrambled(key: u64, k: u64) -> u32 {
 /// Where within its sixteenth a sample is taken, in (0, 1).
 fn jitter(key: u64, k: usize) -> f64 {
     (f64::from(scrambled(key, k as u64 + 32)) + 0.5) / 4_294_967_296.0
-}
-
-/// What may stand between two ends.
-pub struct GroupSight<'a> {
-    /// The forest.
-    pub forest: &'a Forest,
-    /// The poses.
-    pub view: &'a WorldView,
-    /// The body in whose frame both ends are, if that is not the world.
-    pub common: Option<BodyId>,
-    /// Nodes that hold all that may block.
-    pub candidates: &'a [u32],
-}
-
-impl GroupSight<'_> {
-    /// Visibility between two ends over sixteen fixed segments, and how many were traced: none where nothing may
-    /// block, and then it is exactly 1. A pure function of the places and of `key`: candidates only say where to look.
-    pub fn visibility(&self, a: &Spread<'_>, b: &Spread<'_>, key: u64) -> (f64, u32) {
-        let candidates: Vec<u32> =
-            self.candidates.iter().copied().filter(|&id| self.may_block(id, a, b)).collect();
-        if candidates.is_empty() {
-            return (1.0, 0);
-        }
-        let from = a.samples(self.forest, self.view, b, key);
-        let to = b.samples(self.forest, self.view, a, key.rotate_left(32));
-        let (mut clear, mut all) = (0.0, 0.0);
-        let mut stack = Vec::with_capacity(64);
-        for k in 0..GROUP_SEGMENTS as usize {
-            let other = (k as u32).reverse_bits() as usize >> 28;
-            // What is behind one of the planes is out of sight: candidates may leave out what would block it.
-            let way = to.points[other] - from.points[k];
-            let faces = from.normals[k].dot(way) > 0.0 && to.normals[other].dot(way) < 0.0;
-            let weight = if faces { from.weights[k] * to.weights[other] } else { 0.0 };
-            all += weight;
-            let ends = [(from.points[k], from.patches[k]), (to.points[other], to.patches[other])];
-            if weight > 0.0 && !self.is_blocked(&candidates, ends, (a, b), &mut stack) {
-                clear += weight;
-            }
-        }
-        if all <= 0.0 { (1.0, GROUP_SEGMENTS) } else { (clear / all, GROUP_SEGMENTS) }
-    }
-
-    /// Whether what is at or below a node may be in the way of facets that see the other end: not what a convex group
-    /// consists of.
-    fn may_block(&self, id: u32, a: &Spread<'_>, b: &Spread<'_>) -> bool {
-        let groups = self.forest.groups();
-        ![a, b].iter().any(|end| {
-            let own = self.forest.group(end.id).filter(|group| group.is_convex);
-            own.is_some_and(|group| groups.is_within(ElementId(id), group))
-        })
-    }
-
-    fn is_blocked(
-        &self,
-        candidates: &[u32],
-        [(p, on_p), (q, on_q)]: [(DVec3, u32); 2],
-        (a, b): (&Spread<'_>, &Spread<'_>),
-        stack: &mut Vec<ElementId>,
-    ) -> bool {
-        let (forest, view) = (self.forest, self.view);
-        let pose = self.common.map(|body| view.poses()[body.0 as usize].unwrap_or(Pose::IDENTITY));
-        let world = match &pose {
-            Some(pose) => (pose.point(p), pose.point(q)),
-            None => (p, q),
-        };
-        let rounding = |patch: u32| match patch {
-            u32::MAX => 0.0,
-            patch => view.patch(PatchId(patch)).rounding_m,
-        };
-        let slack_m = 4.0 * (rounding(on_p) + rounding(on_q));
-        let segment = ShaftOfBoxes::new(&Aabb::of([world.0]), &Aabb::of([world.1]));
-        stack.clear();
-        stack.extend(candidates.iter().map(|&id| ElementId(id)));
-        while let Some(id) = stack.pop() {
-            let bounds = view.fixed_box(id);
-            if bounds.is_empty() || !segment.meets(bounds, slack_m) || !self.may_block(id.0, a, b) {
-                continue;
-            }
-            let Some(patch) = forest.patch(id) else {
-                stack.extend(forest.children(id).map(ElementId));
-                continue;
-            };
-            if patch.0 == on_p || patch.0 == on_q || view.is_hidden_twin(patch) {
-                continue;
-            }
-            let rides = self.common.is_some() && Some(view.patch(patch).body) == self.common;
-            let (polygon, (p, q)) = match rides {
-                true => (view.occluder_in_body(patch), (p, q)),
-                false => (view.occluder(patch), world),
-            };
-            let (s0, s1) = (polygon.plane.distance(p), polygon.plane.distance(q));
-            if s0.min(s1) >= -slack_m || s0.max(s1) <= slack_m {
-                continue;
-            }
-            let x = p + (q - p) * (s0 / (s0 - s1));
-            if polygon.edges.iter().all(|e| e.distance(x) >= -EDGE_OVERLAP * slack_m) {
-                return true;
-            }
-        }
-        false
-    }
 }
 
 #[cfg(test)]
@@ -526,5 +437,77 @@ mod tests {
         let (forest, view) = balls(16, 6.0, wall(0.1, 9.0));
         let half = visibility(&forest, &view).0;
         assert!((half - 0.5).abs() < 0.2, "{half}");
+    }
+
+    /// Two balls with a wall between them that hides all above their middles.
+    fn half_hidden() -> (Forest, WorldView) {
+        balls(16, 6.0, |b: &mut SceneBuilder| {
+            let grey = b.double_sided_material("wall", [0.5; 3], [0.0; 3]);
+            let node = b.node("wall", None, DVec3::ZERO, DQuat::IDENTITY);
+            let corners = [(0.1, -9.0), (9.0, -9.0), (9.0, 9.0), (0.1, 9.0)];
+            b.polygon(node, "wall", grey, &corners.map(|(y, z)| DVec3::new(0.0, y, z)));
+        })
+    }
+
+    /// Visibility of each facet of the first of two ends by all lines to the middles of the facets of the other, with what
+    /// it weighs: below the wall's edge at a height of 0.1 m they are clear.
+    fn by_all_lines(forest: &Forest, [a, b]: [ElementId; 2]) -> Vec<(f64, f64)> {
+        let leaves = |id| forest.groups().leaves_of(forest.group(id).unwrap());
+        let middle = |id| forest.group(id).unwrap().centre;
+        let of = |leaf: &GroupLeaf, to: DVec3| {
+            leaf.area_m2 * factor(leaf.centre, leaf.normal, to, to.distance_squared(leaf.centre))
+        };
+        let of_leaf = |p: &GroupLeaf| {
+            let (mut clear, mut all) = (0.0, 0.0);
+            for q in leaves(b) {
+                let (weight, d) = (of(q, middle(a)), q.centre - p.centre);
+                let height = p.centre.y - d.y * p.centre.x / d.x;
+                all += weight;
+                clear += if height < 0.1 { weight } else { 0.0 };
+            }
+            (clear / all, of(p, middle(b)))
+        };
+        leaves(a).iter().map(of_leaf).collect()
+    }
+
+    #[test]
+    fn facets_see_the_other_end_from_their_own_places() {
+        let (forest, view) = half_hidden();
+        let [a, b] = ends(&forest)[..] else { unreachable!() };
+        let end = |id| Spread::new(&forest, &view, id, None);
+        let candidates = GroupSight::between(&forest, &view, a, b);
+        let sight =
+            GroupSight { forest: &forest, view: &view, common: None, candidates: &candidates };
+        let seen = sight.by_facets(&end(a), &end(b), 7);
+        for (side, ends) in [[a, b], [b, a]].into_iter().enumerate() {
+            let want = by_all_lines(&forest, ends);
+            let weight: f64 = want.iter().map(|w| w.1).sum();
+            let mean_of = |f: &dyn Fn(usize) -> f64| {
+                (0..want.len()).map(|k| want[k].1 * f(k)).sum::<f64>() / weight
+            };
+            let found = |k: usize| f64::from(seen.of_facets[side][k]);
+            let mean = mean_of(&|k| want[k].0);
+            let off = mean_of(&|k| (found(k) - want[k].0).powi(2)).sqrt();
+            let shared = mean_of(&|k| (seen.mean - want[k].0).powi(2)).sqrt();
+            println!("{side}: {off:.3}, all alike {shared:.3}; mean {:.3} of {mean:.3}", seen.mean);
+            assert!((seen.mean - mean).abs() < 0.05 && (mean_of(&found) - mean).abs() < 0.05);
+            assert!(off < 0.2 && shared > 0.25, "{off} {shared}");
+        }
+    }
+
+    #[test]
+    fn facets_see_all_where_nothing_is_between() {
+        let (forest, view) = balls(16, 6.0, |_| {});
+        let [a, b] = ends(&forest)[..] else { unreachable!() };
+        let end = |id| Spread::new(&forest, &view, id, None);
+        let candidates = GroupSight::between(&forest, &view, a, b);
+        let sight =
+            GroupSight { forest: &forest, view: &view, common: None, candidates: &candidates };
+        let wall = forest.patch_root(crate::scene::PatchId(0));
+        for other in [b, wall] {
+            let seen = sight.by_facets(&end(a), &end(other), 7);
+            assert_eq!(seen.mean, 1.0);
+            assert!(seen.of_facets.iter().flatten().all(|&v| v == 1.0));
+        }
     }
 }

@@ -1,0 +1,344 @@
+//! What stands between two ends of which one is a group: over fixed segments.
+
+use crate::element::{ElementId, Forest, WorldView, bilinear_area};
+use crate::geometry::{Aabb, Pose, ShaftOfBoxes};
+use crate::scene::{BodyId, PatchId};
+use crate::transport::segments::EDGE_OVERLAP;
+use glam::DVec3;
+
+use super::{GROUP_SEGMENTS, Points, Spread, factor, point_of, scrambled, seen_from};
+
+/// What may stand between two ends.
+pub struct GroupSight<'a> {
+    /// The forest.
+    pub forest: &'a Forest,
+    /// The poses.
+    pub view: &'a WorldView,
+    /// The body in whose frame both ends are, if that is not the world.
+    pub common: Option<BodyId>,
+    /// Nodes that hold all that may block.
+    pub candidates: &'a [u32],
+}
+
+impl GroupSight<'_> {
+    /// Visibility between two ends over sixteen fixed segments, and how many were traced: none where nothing may
+    /// block, and then it is exactly 1. A pure function of the places and of `key`: candidates only say where to look.
+    pub fn visibility(&self, a: &Spread<'_>, b: &Spread<'_>, key: u64) -> (f64, u32) {
+        let candidates: Vec<u32> =
+            self.candidates.iter().copied().filter(|&id| self.may_block(id, a, b)).collect();
+        if candidates.is_empty() {
+            return (1.0, 0);
+        }
+        let from = a.samples(self.forest, self.view, b, key);
+        let to = b.samples(self.forest, self.view, a, key.rotate_left(32));
+        let (mut clear, mut all) = (0.0, 0.0);
+        let mut stack = Vec::with_capacity(64);
+        for k in 0..GROUP_SEGMENTS as usize {
+            let other = (k as u32).reverse_bits() as usize >> 28;
+            // What is behind one of the planes is out of sight: candidates may leave out what would block it.
+            let way = to.points[other] - from.points[k];
+            let faces = from.normals[k].dot(way) > 0.0 && to.normals[other].dot(way) < 0.0;
+            let weight = if faces { from.weights[k] * to.weights[other] } else { 0.0 };
+            all += weight;
+            let ends = [(from.points[k], from.patches[k]), (to.points[other], to.patches[other])];
+            if weight > 0.0 && !self.is_blocked(&candidates, ends, (a, b), &mut stack) {
+                clear += weight;
+            }
+        }
+        if all <= 0.0 { (1.0, GROUP_SEGMENTS) } else { (clear / all, GROUP_SEGMENTS) }
+    }
+
+    /// Whether what is at or below a node may be in the way of facets that see the other end: not what a convex group
+    /// consists of.
+    fn may_block(&self, id: u32, a: &Spread<'_>, b: &Spread<'_>) -> bool {
+        let groups = self.forest.groups();
+        ![a, b].iter().any(|end| {
+            let own = self.forest.group(end.id).filter(|group| group.is_convex);
+            own.is_some_and(|group| groups.is_within(ElementId(id), group))
+        })
+    }
+
+    fn is_blocked(
+        &self,
+        candidates: &[u32],
+        [(p, on_p), (q, on_q)]: [(DVec3, u32); 2],
+        (a, b): (&Spread<'_>, &Spread<'_>),
+        stack: &mut Vec<ElementId>,
+    ) -> bool {
+        let (forest, view) = (self.forest, self.view);
+        let pose = self.common.map(|body| view.poses()[body.0 as usize].unwrap_or(Pose::IDENTITY));
+        let world = match &pose {
+            Some(pose) => (pose.point(p), pose.point(q)),
+            None => (p, q),
+        };
+        let rounding = |patch: u32| match patch {
+            u32::MAX => 0.0,
+            patch => view.patch(PatchId(patch)).rounding_m,
+        };
+        let slack_m = 4.0 * (rounding(on_p) + rounding(on_q));
+        let segment = ShaftOfBoxes::new(&Aabb::of([world.0]), &Aabb::of([world.1]));
+        stack.clear();
+        stack.extend(candidates.iter().map(|&id| ElementId(id)));
+        while let Some(id) = stack.pop() {
+            let bounds = view.fixed_box(id);
+            if bounds.is_empty() || !segment.meets(bounds, slack_m) || !self.may_block(id.0, a, b) {
+                continue;
+            }
+            let Some(patch) = forest.patch(id) else {
+                stack.extend(forest.children(id).map(ElementId));
+                continue;
+            };
+            if patch.0 == on_p || patch.0 == on_q || view.is_hidden_twin(patch) {
+                continue;
+            }
+            let rides = self.common.is_some() && Some(view.patch(patch).body) == self.common;
+            let (polygon, (p, q)) = match rides {
+                true => (view.occluder_in_body(patch), (p, q)),
+                false => (view.occluder(patch), world),
+            };
+            let (s0, s1) = (polygon.plane.distance(p), polygon.plane.distance(q));
+            if s0.min(s1) >= -slack_m || s0.max(s1) <= slack_m {
+                continue;
+            }
+            let x = p + (q - p) * (s0 / (s0 - s1));
+            if polygon.edges.iter().all(|e| e.distance(x) >= -EDGE_OVERLAP * slack_m) {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// What the facets of two ends see of each other.
+#[derive(Clone, Debug, Default)]
+pub struct FacetSight {
+    /// Visibility of the pair: the mean over all rays, by what they carry.
+    pub mean: f64,
+    /// Visibility of each facet of both ends to the whole of the other; empty for an element.
+    pub of_facets: [Vec<f32>; 2],
+}
+
+/// Rays from each facet of the end that has more of them.
+const FACET_RAYS: usize = 4;
+
+/// Rays of a pair at least, and at most.
+const RAYS: (usize, usize) = (32, 4_096);
+
+/// Share of the scene's size that is more than the slack of any segment.
+const MARGIN: f64 = 5e-7;
+
+/// One end as rays see it: facets that face the other end, with what they weigh.
+struct Aims {
+    /// Places among the facets of the end; one of no meaning for an element.
+    facets: Vec<u32>,
+    /// Running sum of their weights, from 0 to 1.
+    sums: Vec<f64>,
+    /// Weights, relative to the mean one.
+    weights: Vec<f64>,
+}
+
+impl Aims {
+    fn new(own: &Spread<'_>, other: &Spread<'_>) -> Option<Aims> {
+        let Points::Group(leaves, pose) = &own.points else {
+            return Some(Aims { facets: vec![0], sums: vec![1.0], weights: vec![1.0] });
+        };
+        let (to, r2) = seen_from(pose, own, other);
+        let (mut facets, mut weights, mut sums, mut sum) = (vec![], vec![], vec![], 0.0);
+        for (k, leaf) in leaves.iter().enumerate() {
+            let weight = leaf.area_m2 * factor(leaf.centre, leaf.normal, to, r2);
+            if weight > 0.0 {
+                sum += weight;
+                facets.push(k as u32);
+                weights.push(weight);
+                sums.push(sum);
+            }
+        }
+        let mean = sum / facets.len() as f64;
+        sums.iter_mut().for_each(|s| *s /= sum);
+        weights.iter_mut().for_each(|w| *w /= mean);
+        (sum > 0.0).then_some(Aims { facets, sums, weights })
+    }
+
+    /// The facet at a share of the whole weight.
+    fn at(&self, share: f64) -> usize {
+        self.sums.partition_point(|&sum| sum <= share).min(self.facets.len() - 1)
+    }
+}
+
+/// A point that a ray starts from or ends on.
+struct Aim {
+    at: DVec3,
+    normal: DVec3,
+    patch: u32,
+    weight: f64,
+}
+
+/// How often the facets of an end were seen, by weight.
+struct Tally {
+    clear: Vec<f64>,
+    all: Vec<f64>,
+}
+
+impl Tally {
+    fn new(len: usize) -> Tally {
+        Tally { clear: vec![0.0; len], all: vec![0.0; len] }
+    }
+
+    fn add(&mut self, k: usize, weight: f64, clear: bool) {
+        self.all[k] += weight;
+        self.clear[k] += if clear { weight } else { 0.0 };
+    }
+
+    /// Visibility of each facet of an end: the mean where little is known of it.
+    fn by_facet(&self, (own, aims): (&Spread<'_>, &Aims), mean: f64, doubt: f64) -> Vec<f32> {
+        let Points::Group(leaves, _) = &own.points else { return Vec::new() };
+        let mut out = vec![mean as f32; leaves.len()];
+        for (k, &facet) in aims.facets.iter().enumerate() {
+            let (clear, all) = (self.clear[k] + doubt * mean, self.all[k] + doubt);
+            out[facet as usize] = if all > 0.0 { (clear / all) as f32 } else { mean as f32 };
+        }
+        out
+    }
+}
+
+/// A line of sight between facets of two ends.
+struct Ray {
+    /// Which facet of the end that has more of them, and which of the other, by their places among those that face.
+    facets: (usize, usize),
+    from: Aim,
+    to: Aim,
+}
+
+/// The rays of a pair.
+struct Rays<'a> {
+    /// The end that has more facets, and the other.
+    ends: (&'a Spread<'a>, &'a Spread<'a>),
+    aims: (Aims, Aims),
+    /// Whether the end with more facets is the second of the pair.
+    swapped: bool,
+    key: u64,
+}
+
+impl<'a> Rays<'a> {
+    /// `None` if one end shows the other nothing.
+    fn new(a: &'a Spread<'a>, b: &'a Spread<'a>, key: u64) -> Option<Rays<'a>> {
+        let (of_a, of_b) = (Aims::new(a, b)?, Aims::new(b, a)?);
+        Some(match of_b.facets.len() > of_a.facets.len() {
+            false => Rays { ends: (a, b), aims: (of_a, of_b), swapped: false, key },
+            true => Rays { ends: (b, a), aims: (of_b, of_a), swapped: true, key },
+        })
+    }
+
+    /// All of them that leave and arrive on the sides that face.
+    fn all<'s>(&'s self, sight: &'s GroupSight<'_>) -> impl Iterator<Item = Ray> + 's {
+        let count = self.aims.0.facets.len();
+        let each = (RAYS.0.div_ceil(count)).max(FACET_RAYS).min((RAYS.1 / count).max(1));
+        let (many, few) = self.ends;
+        let ray = move |(round, k): (usize, usize)| {
+            let turn = scrambled(self.key, 3 * round as u64 + 1);
+            let within = unit((k as u32).reverse_bits() ^ turn);
+            let share = (((round + k) % each) as f64 + within) / each as f64;
+            let key = self.key.wrapping_add((round * count + k) as u64);
+            let from = sight.aim((many, few), self.aims.0.facets[k], key);
+            let j = self.aims.1.at(share);
+            let key = key.rotate_left(32) ^ self.key;
+            let to = sight.aim((few, many), self.aims.1.facets[j], key);
+            let way = to.at - from.at;
+            let faces = from.normal.dot(way) > 0.0 && to.normal.dot(way) < 0.0;
+            faces.then_some(Ray { facets: (k, j), from, to })
+        };
+        (0..each).flat_map(move |round| (0..count).map(move |k| (round, k))).filter_map(ray)
+    }
+}
+
+impl GroupSight<'_> {
+    /// What each facet sees of the other end: rays from each facet of the end that has more of them, to points of the other by
+    /// what they weigh. A pure function of the places and of `key`.
+    pub fn by_facets(&self, a: &Spread<'_>, b: &Spread<'_>, key: u64) -> FacetSight {
+        let Some(rays) = Rays::new(a, b, key) else { return FacetSight::default() };
+        let (many, few) = rays.ends;
+        let (of_many, of_few) = (&rays.aims.0, &rays.aims.1);
+        let (mut seen_many, mut seen_few) =
+            (Tally::new(of_many.facets.len()), Tally::new(of_few.facets.len()));
+        let (mut stack, mut clear_sum, mut sum) = (Vec::with_capacity(64), 0.0, 0.0);
+        for Ray { facets: (k, j), from, to } in rays.all(self) {
+            let ends = [(from.at, from.patch), (to.at, to.patch)];
+            let clear = !self.is_blocked(self.candidates, ends, (many, few), &mut stack);
+            let weight = from.weight * to.weight;
+            let of_ray = weight * of_many.weights[k];
+            seen_many.add(k, weight, clear);
+            seen_few.add(j, of_ray, clear);
+            sum += of_ray;
+            clear_sum += if clear { of_ray } else { 0.0 };
+        }
+        if sum <= 0.0 {
+            return FacetSight::default();
+        }
+        let mean = clear_sum / sum;
+        let of_many = seen_many.by_facet((many, of_many), mean, 0.0);
+        let of_few = seen_few.by_facet((few, of_few), mean, 1.0);
+        let of_facets = if rays.swapped { [of_few, of_many] } else { [of_many, of_few] };
+        FacetSight { mean, of_facets }
+    }
+
+    /// Whether any ray of [`GroupSight::by_facets`] meets one of some boxes in the world: if not, nothing in them has a part in
+    /// what facets see.
+    pub fn rays_meet(&self, a: &Spread<'_>, b: &Spread<'_>, key: u64, boxes: &[Aabb]) -> bool {
+        let Some(rays) = Rays::new(a, b, key) else { return false };
+        let margin_m = MARGIN * self.view.far_m();
+        let pose = self.common.and_then(|body| self.view.poses()[body.0 as usize]);
+        let world = |p: DVec3| pose.map_or(p, |pose| pose.point(p));
+        rays.all(self).any(|ray| {
+            let [from, to] = [ray.from.at, ray.to.at].map(|p| Aabb::of([world(p)]));
+            let segment = ShaftOfBoxes::new(&from, &to);
+            boxes.iter().any(|bounds| segment.meets(bounds, margin_m))
+        })
+    }
+
+    /// A point of a facet of an end, or of the element that it is.
+    fn aim(&self, (own, other): (&Spread<'_>, &Spread<'_>), facet: u32, key: u64) -> Aim {
+        let turn = scrambled(key, 0);
+        let (s, t) = (unit(turn << 16), unit(turn & 0xffff_0000));
+        match &own.points {
+            Points::Element(e) => {
+                let r2 = own.centre.distance_squared(other.centre);
+                let at = e.point(s, t);
+                let weight = bilinear_area(&e.corners, s, t).length() / own.area_m2
+                    * factor(at, e.plane.normal, other.centre, r2);
+                let patch = self.forest.patch(own.id).map_or(u32::MAX, |p| p.0);
+                Aim { at, normal: e.plane.normal, patch, weight }
+            }
+            Points::Group(leaves, pose) => {
+                let leaf = &leaves[facet as usize];
+                let (patch, at) = point_of(leaf, (self.forest, self.view, pose), (s, t));
+                Aim { at, normal: pose.direction(leaf.normal), patch, weight: 1.0 }
+            }
+        }
+    }
+
+    /// Nodes that may hold what stands between two ends, wherever they are.
+    pub fn between(forest: &Forest, view: &WorldView, a: ElementId, b: ElementId) -> Vec<u32> {
+        let (one, other) = (view.end_box(forest.fixed(a)), view.end_box(forest.fixed(b)));
+        let shaft = ShaftOfBoxes::new(one, other);
+        let margin_m = MARGIN * view.far_m();
+        let small_m = 0.5 * one.union(*other).diagonal();
+        let mut out = Vec::new();
+        let mut stack = vec![Forest::ROOT];
+        while let Some(id) = stack.pop() {
+            let bounds = view.fixed_box(id);
+            if bounds.is_empty() || !shaft.meets(bounds, margin_m) {
+                continue;
+            }
+            match forest.patch(id).is_some() || bounds.diagonal() <= small_m {
+                true => out.push(id.0),
+                false => stack.extend(forest.children(id).rev().map(ElementId)),
+            }
+        }
+        out
+    }
+}
+
+/// A number in (0, 1) from 32 bits.
+fn unit(bits: u32) -> f64 {
+    (f64::from(bits) + 0.5) / 4_294_967_296.0
+}

@@ -134,9 +134,9 @@ impl Clip {
         !self.flags.outside.is_empty() || !self.flags.animation.edits.emit.is_empty()
     }
 
-    /// The same clip in the light of a default sky too.
-    pub(crate) fn under_sky(&self) -> Result<Clip, Failure> {
-        let scene = Arc::new(outside::lit_by_default(&self.scene, self.tolerance)?);
+    /// The same clip in the light of a default sky too, and of a sun where its azimuth is known, degrees.
+    pub(crate) fn under_sky(&self, azimuth: Option<f64>) -> Result<Clip, Failure> {
+        let scene = Arc::new(outside::lit_by_default(&self.scene, azimuth, self.tolerance)?);
         Ok(self.with_scene(scene))
     }
 

@@ -16,7 +16,7 @@ const YFOV_INSIDE: f64 = 1.1;
 pub(super) const ASPECT: f64 = 4.0 / 3.0;
 
 /// A point that sees fronts in this share of directions is in a room.
-const ROOM: f64 = 0.45;
+const ROOM: f64 = 0.6;
 
 /// A point in a room must also see things this far apart, in units of the scene: the inside of a
 /// double-sided object is no room.
@@ -31,7 +31,7 @@ const SLOPES: [(f64, f64); 7] =
     [(0.5, 0.0), (0.3, 0.0), (0.8, 0.05), (0.12, 0.02), (0.0, 0.1), (1.8, 0.2), (-0.5, 0.2)];
 
 /// The same of views from inside, which fill the picture whatever they show: for what is lit on the inside only.
-const INSIDE: f64 = 0.2;
+const INSIDE: f64 = 0.3;
 
 /// A view that may be chosen.
 #[derive(Clone, Copy)]

@@ -101,7 +101,7 @@ fn a_sky_is_added_where_what_emits_lights_little_of_what_is_seen() {
         (ran.err, watts.as_f64().unwrap())
     };
     let (said, with_sky) = emitted(&[]);
-    assert!(said.contains("% of what the view shows: --sky uniform=1"), "{said}");
+    assert!(said.contains("% of what the view shows: --sky overcast=3 --sun"), "{said}");
     assert!(said.contains("--sky none leaves it out"), "{said}");
     let (said, without) = emitted(&["--sky", "none"]);
     assert!(!said.contains("--sky"), "{said}");

@@ -10,9 +10,9 @@ use crate::event::{Foresight, Lookahead, Tick};
 use crate::geometry::{Aabb, Plane, ShaftOfBoxes, no_smaller};
 use crate::scene::{BodyId, LightKind, PatchId};
 use crate::transport::{
-    BlockerSizes, CELLS_MAX, CLIPPED_MAX, CONNECTED_SHARE, Clipping, Exchange, Meeting, SegmentBundle, Shaft, Simd,
-    Visibility, clipping, contact_exchange, exchange_by_points, light_at, light_exchange,
-    light_visibility, meeting, visibility,
+    BlockerSizes, CELLS_MAX, CLIPPED_MAX, CONNECTED_SHARE, Clipping, Exchange, Meeting,
+    SegmentBundle, Shaft, Simd, Visibility, clipping, contact_exchange, exchange_by_points,
+    light_at, light_exchange, light_visibility, meeting, visibility,
 };
 
 use super::brightness::Brightness;

@@ -410,3 +410,45 @@ fn lights(scene: &Scene, time_s: f64, caster: &Caster) -> Vec<(Vec3, Vec3, Light
     lights.truncate(LIGHTS);
     lights
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+    use relume::scene::{BodyId, SceneBuilder};
+
+    use super::*;
+
+    /// A floor of many small tiles of two reflectances: points are far fewer than tiles, and stand for all of them.
+    #[test]
+    fn small_neighbours_share_a_point() {
+        let mut b = SceneBuilder::new("tiles");
+        let node = b.node("floor", None, DVec3::ZERO, DQuat::IDENTITY);
+        let colours = [0.2, 0.6].map(|r| b.material(&format!("{r}"), [r; 3], [0.0; 3]));
+        let side = 110;
+        for k in 0..side * side {
+            let (x, z) = (f64::from(k % side), f64::from(k / side));
+            let corners = [(x, z), (x, z + 1.0), (x + 1.0, z + 1.0), (x + 1.0, z)];
+            let corners = corners.map(|(x, z)| DVec3::new(x, 0.0, z));
+            // A group each, so that they stay polygons of their own.
+            b.polygon(node, &k.to_string(), colours[(k % 2) as usize], &corners);
+        }
+        let scene = b.build().unwrap();
+        let patches = scene.patches.len();
+        assert_eq!(patches, (side * side) as usize);
+        let poses = [scene.pose(BodyId(0), 0.0)];
+        let unit = (DVec3::new(55.0, 0.0, 55.0), 156.0);
+        let caster = Caster::new(&scene, &poses, unit);
+        let (points, ranges) = spread(&scene, 0.0, &poses, &caster);
+        assert!(points.len() < patches / 8, "{}", points.len());
+        let whole_m2: f64 = points.iter().map(|p| p.area_m2).sum();
+        assert!((whole_m2 - scene.area_m2()).abs() < 1e-6 * whole_m2);
+        let reflected: f64 = points.iter().map(|p| p.area_m2 * p.reflectance).sum();
+        assert!((reflected / whole_m2 - 0.4).abs() < 1e-6);
+        let is_near = |patch: usize| {
+            let own = caster.place(scene.patches[patch].frame.origin);
+            let range = &ranges[patch];
+            range.len() == 1 && points[range.start as usize].at.distance(own) < 2.0 / CELLS
+        };
+        assert!((0..patches).all(is_near));
+    }
+}

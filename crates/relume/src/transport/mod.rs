@@ -28,6 +28,6 @@ pub use lookout::{CELLS_MAX, Clipping, FactorPast, Looker, Lookout, form_factor_
 pub use point::form_factor_from_point;
 pub use segments::{SEGMENTS, SegmentBundle};
 pub use visibility::{
-    BlockerSizes, CLIPPED_MAX, CONNECTED_SHARE, Candidates, Shaft, Visibility, clipping,
-    light_visibility, lookout, segment_is_clear, visibility,
+    BlockerSizes, CLIPPED_MAX, Candidates, Shaft, Visibility, clipping, light_visibility, lookout,
+    segment_is_clear, visibility,
 };

@@ -70,19 +70,13 @@ const COVER: f64 = 0.5;
 /// disregarded because it is close to an end.
 const LIFT: f64 = 8.0;
 
-/// Share of the area of connected patches that counts as the size of the thing that they make up, a face of a cube: an element
-/// of them weighs 1 in the error norm at that area, and their shadow has edges of that size. With 1/2 the device in a hall misses the tolerance, with
-/// 1/12 a room of 64 boxes has a fifth more links.
-pub const CONNECTED_SHARE: f64 = 1.0 / 6.0;
-
 /// Sizes of what stands between two ends; infinite where nothing does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BlockerSizes {
     /// For each end the width (area over length, m) of the narrowest blocker that emits light at any time and shines
     /// on the end.
     pub lamps_m: (f64, f64),
-    /// Size of the smallest thing that stands between, m2: the area of a blocker, or a sixth of that of the patches that it
-    /// is connected with if that is more. A triangle of a tessellated body throws no shadow of its own.
+    /// Area of the smallest blocker, m2.
     pub least_m2: f64,
     /// Area of all blockers, m2.
     pub all_m2: f64,
@@ -281,11 +275,9 @@ impl<'a> Shaft<'a> {
             return BlockerSizes::NOTHING;
         }
         let area = |&patch: &PatchId| self.forest.area_m2(self.forest.patch_root(patch));
-        let of_thing =
-            |patch: &PatchId| area(patch).max(CONNECTED_SHARE * self.forest.connected_m2(*patch));
         BlockerSizes {
             lamps_m: self.lamp_widths_m(blockers),
-            least_m2: blockers.iter().map(of_thing).fold(f64::INFINITY, f64::min),
+            least_m2: blockers.iter().map(area).fold(f64::INFINITY, f64::min),
             all_m2: blockers.iter().map(area).sum(),
         }
     }

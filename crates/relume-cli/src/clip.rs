@@ -140,17 +140,12 @@ impl Clip {
         Ok(self.with_scene(scene))
     }
 
-    /// The same clip with a lamp at a place in the world (metres), which is said: what is half the scene's extent away gets
+    /// The same clip with a lamp at a place in the world (metres): what is half the scene's extent away gets
     /// 1 W/m2 at most.
     pub(crate) fn with_lamp(&self, at: DVec3) -> Clip {
         let extent =
             self.scene.bounds(self.time_of(self.frames[0])).map_or(1.0, |(a, b)| a.distance(b));
         let intensity = extent * extent / 4.0;
-        self.say(&format!(
-            "note: no light from outside gets to what the view shows of `{}`: a lamp is put where the view is from; choose \
-             with --emit MATERIAL=RADIANCE, or --sky none for what the file has alone",
-            self.scene.name
-        ));
         self.with_scene(Arc::new(self.scene.with_point_light(at, [intensity; 3])))
     }
 

@@ -49,12 +49,35 @@ pub(crate) fn for_pictures(
     let view = views.at(&under_sky.scene, first, clip.fps());
     // A sky lights no closed room.
     if share_lit(&under_sky, &views).is_some_and(|lit| lit < LIT_MIN) {
-        return Ok((clip.with_lamp(view?.world_from_camera.translation), Some(views)));
+        return lit_from_within(&clip, flags, views, view?.world_from_camera.translation);
     }
     // Where a camera is absent at first any side is as good.
     let azimuth = view.map_or(0.0, |view| azimuth_beside(&view));
     clip.say(&outside::said_of_default(&clip.scene.name, azimuth, &why));
     Ok((clip.under_sky(Some(azimuth))?, Some(views)))
+}
+
+/// A clip with a lamp where its view is from; if that is outside of what is closed, in the middle, with views chosen anew.
+fn lit_from_within(
+    clip: &Clip,
+    flags: &ViewFlags,
+    views: Viewing,
+    eye: DVec3,
+) -> Result<(Clip, Option<Viewing>), Failure> {
+    let beside = clip.with_lamp(eye);
+    let lit = share_lit(&beside, &views).unwrap_or(0.0);
+    if lit < LIT_MIN
+        && let Some((low, high)) = clip.scene.bounds(clip.time_of(clip.frames[0]))
+    {
+        let within = clip.with_lamp(low.midpoint(high));
+        let anew = Viewing::new(&within.scene, flags)?;
+        if share_lit(&within, &anew).is_some_and(|more| more > lit) {
+            clip.say(&outside::said_of_lamp(&clip.scene.name, "in the middle of the scene"));
+            return Ok((within, Some(anew)));
+        }
+    }
+    clip.say(&outside::said_of_lamp(&clip.scene.name, "where the view is from"));
+    Ok((beside, Some(views)))
 }
 
 /// Azimuth of a sun that shines over the left shoulder of a view, whole degrees from north (-Z) by east: it tells sides apart,

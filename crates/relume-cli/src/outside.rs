@@ -198,6 +198,14 @@ pub(crate) fn said_of_default(name: &str, azimuth: f64, why: &Unlit) -> String {
     }
 }
 
+/// What is said of a lamp where no light from outside gets in.
+pub(crate) fn said_of_lamp(name: &str, place: &str) -> String {
+    format!(
+        "note: no light from outside gets to what the view shows of `{name}`: a lamp is put {place}; choose with \
+         --emit MATERIAL=RADIANCE, or --sky none for what the file has alone"
+    )
+}
+
 /// Numbers between commas.
 fn numbers(text: &str) -> Result<Vec<f64>, String> {
     let number = |piece: &str| match piece.trim().parse::<f64>() {

@@ -122,6 +122,11 @@ fn a_closed_room_without_a_lamp_gets_one_for_its_picture() {
     let ran = relume(&[&render[..], &SMALL].concat()).succeeds();
     assert!(ran.err.contains("a lamp is put where the view is from"), "{}", ran.err);
     assert!(!ran.err.contains("almost no light"), "{}", ran.err);
+    // Seen from outside, through the backs of its walls, it is lit from its middle.
+    let from_outside = ["--eye", "20,9,30"];
+    let ran = relume(&[&render[..], &SMALL, &from_outside].concat()).succeeds();
+    assert!(ran.err.contains("a lamp is put in the middle of the scene"), "{}", ran.err);
+    assert!(!ran.err.contains("almost no light"), "{}", ran.err);
     // Under a sky that was asked for it stays dark, and that is said in place of a balance of nothing.
     let ran = relume(&[&render[..], &SMALL, &["--sky", "uniform=1"]].concat()).succeeds();
     assert!(ran.out.contains("next to no light from outside gets in"), "{}", ran.out);

@@ -134,23 +134,18 @@ impl Clip {
         !self.flags.outside.is_empty() || !self.flags.animation.edits.emit.is_empty()
     }
 
-    /// The same clip in the light of a default sky too.
-    pub(crate) fn under_sky(&self) -> Result<Clip, Failure> {
-        let scene = Arc::new(outside::lit_by_default(&self.scene, self.tolerance)?);
+    /// The same clip in the light of a default sky too, and of a sun where its azimuth is known, degrees.
+    pub(crate) fn under_sky(&self, azimuth: Option<f64>) -> Result<Clip, Failure> {
+        let scene = Arc::new(outside::lit_by_default(&self.scene, azimuth, self.tolerance)?);
         Ok(self.with_scene(scene))
     }
 
-    /// The same clip with a lamp at a place in the world (metres), which is said: what is half the scene's extent away gets
+    /// The same clip with a lamp at a place in the world (metres): what is half the scene's extent away gets
     /// 1 W/m2 at most.
     pub(crate) fn with_lamp(&self, at: DVec3) -> Clip {
         let extent =
             self.scene.bounds(self.time_of(self.frames[0])).map_or(1.0, |(a, b)| a.distance(b));
         let intensity = extent * extent / 4.0;
-        self.say(&format!(
-            "note: no light from outside gets to what the view shows of `{}`: a lamp is put where the view is from; choose \
-             with --emit MATERIAL=RADIANCE, or --sky none for what the file has alone",
-            self.scene.name
-        ));
         self.with_scene(Arc::new(self.scene.with_point_light(at, [intensity; 3])))
     }
 

@@ -179,7 +179,7 @@ fn emitters(out: &mut String, scene: &Scene) -> fmt::Result {
     if none {
         writeln!(
             out,
-            "  none: `render` lights it with a uniform sky, unless it is told --sky, --sun, --environment or --emit"
+            "  none: `render` lights it with an overcast sky and a sun, unless it is told --sky, --sun, --environment or --emit"
         )?;
     }
     Ok(())

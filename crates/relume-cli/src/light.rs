@@ -1,7 +1,8 @@
 //! Scenes in which nothing shines, or little of what is looked at: nothing is solved for a black picture.
 
+use glam::DVec3;
 use relume::scene::Scene;
-use relume_picture::picture::Sketch;
+use relume_picture::picture::{Sketch, View};
 
 use crate::clip::Clip;
 use crate::failure::Failure;
@@ -15,6 +16,9 @@ const NAMED: usize = 5;
 /// Share of what is seen of surfaces that has to be lit at some time, so that a picture shows what it is of: eyes that glow
 /// and headlights light less, lamps in rooms and streets more.
 const LIT_MIN: f64 = 0.5;
+
+/// How far a default sun is to the left of where the view is from, degrees.
+const BESIDE: f64 = 50.0;
 
 /// Instants of a clip at which that is looked at.
 const INSTANTS: usize = 3;
@@ -39,16 +43,49 @@ pub(crate) fn for_pictures(
     } else {
         Unlit::Dark
     };
-    let under_sky = clip.under_sky()?;
+    let under_sky = clip.under_sky(None)?;
     let views = Viewing::new(&under_sky.scene, flags)?;
+    let first = clip.frames.first().copied().unwrap_or_default();
+    let view = views.at(&under_sky.scene, first, clip.fps());
     // A sky lights no closed room.
     if share_lit(&under_sky, &views).is_some_and(|lit| lit < LIT_MIN) {
-        let first = clip.frames.first().copied().unwrap_or_default();
-        let view = views.at(&under_sky.scene, first, clip.fps())?;
-        return Ok((clip.with_lamp(view.world_from_camera.translation), Some(views)));
+        return lit_from_within(&clip, flags, views, view?.world_from_camera.translation);
     }
-    clip.say(&outside::said_of_default(&clip.scene.name, &why));
-    Ok((under_sky, Some(views)))
+    // Where a camera is absent at first any side is as good.
+    let azimuth = view.map_or(0.0, |view| azimuth_beside(&view));
+    clip.say(&outside::said_of_default(&clip.scene.name, azimuth, &why));
+    Ok((clip.under_sky(Some(azimuth))?, Some(views)))
+}
+
+/// A clip with a lamp where its view is from; if that is outside of what is closed, in the middle, with views chosen anew.
+fn lit_from_within(
+    clip: &Clip,
+    flags: &ViewFlags,
+    views: Viewing,
+    eye: DVec3,
+) -> Result<(Clip, Option<Viewing>), Failure> {
+    let beside = clip.with_lamp(eye);
+    let lit = share_lit(&beside, &views).unwrap_or(0.0);
+    if lit < LIT_MIN
+        && let Some((low, high)) = clip.scene.bounds(clip.time_of(clip.frames[0]))
+    {
+        let within = clip.with_lamp(low.midpoint(high));
+        let anew = Viewing::new(&within.scene, flags)?;
+        if share_lit(&within, &anew).is_some_and(|more| more > lit) {
+            clip.say(&outside::said_of_lamp(&clip.scene.name, "in the middle of the scene"));
+            return Ok((within, Some(anew)));
+        }
+    }
+    clip.say(&outside::said_of_lamp(&clip.scene.name, "where the view is from"));
+    Ok((beside, Some(views)))
+}
+
+/// Azimuth of a sun that shines over the left shoulder of a view, whole degrees from north (-Z) by east: it tells sides apart,
+/// and shadows fall where they are seen.
+fn azimuth_beside(view: &View) -> f64 {
+    let back = view.world_from_camera.direction(DVec3::Z);
+    let of_back = libm::atan2(back.x, -back.z).to_degrees();
+    (of_back + BESIDE).round().rem_euclid(360.0)
 }
 
 /// The largest share of what is seen of surfaces that is lit at some of a clip's instants; `None` where none is seen.
@@ -102,6 +139,15 @@ mod tests {
     use super::*;
     use crate::args::DemoScene;
     use crate::demo;
+
+    /// The camera looks north, and so back is south and left is west.
+    #[test]
+    fn a_default_sun_is_behind_the_view_and_to_its_left() {
+        let from = |eye| View::look_at(eye, DVec3::ZERO, 0.7);
+        assert_eq!(azimuth_beside(&from(DVec3::new(0.0, 1.0, 5.0))), 230.0);
+        assert_eq!(azimuth_beside(&from(DVec3::new(5.0, 1.0, 0.0))), 140.0);
+        assert_eq!(azimuth_beside(&from(DVec3::new(0.0, -3.0, -5.0))), 50.0);
+    }
 
     #[test]
     fn a_scene_without_light_is_refused_with_its_materials() {

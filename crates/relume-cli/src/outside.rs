@@ -19,8 +19,8 @@ pub(crate) struct OutsideFlags {
     /// Light from the sky, without the sun's disc: none, uniform=L (radiance, W/m2/sr; or R,G,B), overcast[=E] (CIE overcast;
     /// E is horizontal irradiance, W/m2 [100]), clear[=E] (CIE clear [100]), perez=T (by turbidity, 1.7 to 10, with its
     /// colours; luminance over 125 lm/W), perez=DIRECT,DIFFUSE (all-weather, by the sun's normal and the sky's horizontal
-    /// irradiance, W/m2). `perez` and `clear` need --sun. `render` adds a uniform one where what emits lights little of
-    /// what is seen, unless it is told none.
+    /// irradiance, W/m2). `perez` and `clear` need --sun. `render` adds an overcast one and a sun where what emits lights little
+    /// of what is seen, unless it is told none.
     #[arg(long, value_name = "SKY", conflicts_with = "environment")]
     pub(crate) sky: Option<SkyFlag>,
     /// The sun: AZIMUTH,ELEVATION[,E] in degrees, azimuth from north (-Z) clockwise (east, +X, is 90), or
@@ -79,9 +79,13 @@ const SKY_W_M2: f64 = 100.0;
 /// Frames of a day where nothing else says.
 const DAY_FRAMES: u32 = 96;
 
-/// What `render` lights a scene with in which nothing emits: a uniform sky of this radiance (W/m2/sr), over ground of this
-/// reflectance, so that undersides are seen too.
-pub(crate) const DEFAULT_SKY: (f64, f64) = (1.0, 0.3);
+/// What `render` lights a scene with in which nothing emits: an overcast sky and a sun of these irradiances (W/m2; of the sky
+/// horizontal, of the sun at normal incidence), the sun so high (degrees), above ground of this reflectance, so that undersides
+/// are seen too.
+const DEFAULT_SKY_W_M2: f64 = 3.0;
+const DEFAULT_SUN_W_M2: f64 = 3.0;
+const DEFAULT_ELEVATION: f64 = 40.0;
+const DEFAULT_GROUND: f64 = 0.2;
 
 impl OutsideFlags {
     /// Whether nothing of it was asked for.
@@ -161,18 +165,27 @@ pub(crate) enum Unlit {
     Dim(f64),
 }
 
-/// A scene in the light that pictures have by default.
-pub(crate) fn lit_by_default(scene: &Scene, fineness: f64) -> Result<Scene, Failure> {
-    let (radiance, ground) = DEFAULT_SKY;
-    let sky = Some(Sky::Uniform([radiance; 3]));
-    let outside = Outside { sky, ground, fineness, ..Outside::default() };
+/// A scene in the light that pictures have by default: with a sun where its azimuth is known, degrees.
+pub(crate) fn lit_by_default(
+    scene: &Scene,
+    azimuth: Option<f64>,
+    fineness: f64,
+) -> Result<Scene, Failure> {
+    let sky = Some(Sky::Overcast { irradiance: DEFAULT_SKY_W_M2 });
+    let sun = azimuth.map(|azimuth| Sun {
+        place: SunPlace::Direction { azimuth, elevation: DEFAULT_ELEVATION },
+        irradiance: Some([DEFAULT_SUN_W_M2; 3]),
+        diameter_deg: SUN_DIAMETER_DEG,
+    });
+    let outside = Outside { sky, sun, ground: DEFAULT_GROUND, fineness, ..Outside::default() };
     scene.clone().with_outside(outside).map_err(scene_file::failure)
 }
 
 /// What is said of that light.
-pub(crate) fn said_of_default(name: &str, why: &Unlit) -> String {
-    let (radiance, ground) = DEFAULT_SKY;
-    let light = format!("--sky uniform={radiance} --ground {ground}");
+pub(crate) fn said_of_default(name: &str, azimuth: f64, why: &Unlit) -> String {
+    let light = format!(
+        "--sky overcast={DEFAULT_SKY_W_M2} --sun {azimuth},{DEFAULT_ELEVATION},{DEFAULT_SUN_W_M2} --ground {DEFAULT_GROUND}"
+    );
     match why {
         Unlit::Dark => format!(
             "note: nothing emits light in `{name}`: lit by {light}; choose with --sky, --sun or --environment"
@@ -183,6 +196,14 @@ pub(crate) fn said_of_default(name: &str, why: &Unlit) -> String {
             100.0 * share
         ),
     }
+}
+
+/// What is said of a lamp where no light from outside gets in.
+pub(crate) fn said_of_lamp(name: &str, place: &str) -> String {
+    format!(
+        "note: no light from outside gets to what the view shows of `{name}`: a lamp is put {place}; choose with \
+         --emit MATERIAL=RADIANCE, or --sky none for what the file has alone"
+    )
 }
 
 /// Numbers between commas.

@@ -18,7 +18,7 @@ use crate::output::{self, counted};
 use crate::viewing::Viewing;
 
 /// The first frame has this long, from the start of the run, before a rough picture is drawn beside it.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(5);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(2);
 
 /// A rough picture that is drawn where the first frame takes long, and goes when that is finished.
 pub(crate) struct Meanwhile {

@@ -153,15 +153,24 @@ impl Job {
             self.warn_of_old_pictures(wanted, &report);
             self.warn_of_no_events();
         }
+        let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.quiet());
+        // Before the session, which takes its time with many patches.
+        let first = pending.first().filter(|_| report.frames.is_empty());
+        let patience = PATIENCE.saturating_sub(started.elapsed());
+        let mut meanwhile = match (first, &views) {
+            (Some(&frame), Some(views)) => {
+                self.meanwhile((&clip, views), frame, &progress, patience)?
+            }
+            _ => None,
+        };
         let events = self.solve.events.as_ref().map(|_| EventTable::new());
         let options = clip.options(self.solve.update, true)?;
         let session = clip.session_with(Options { events: events.is_some(), ..options })?;
         let size = Size::of(&clip, session.options());
         if !self.quiet() {
             let rough = if self.picture.is_some() { ", or rough pictures: --preview" } else { "" };
-            size.warn(&clip, pending.len(), rough);
+            progress.suspend(|| size.warn(&clip, pending.len(), rough));
         }
-        let progress = Progress::new(wanted.len(), wanted.len() - pending.len(), self.quiet());
         progress.watch(session.watch(), size.pairs());
         let paths = (self.report_paths(), self.solve.events.clone());
         let finished = Arc::new(Mutex::new(Finished { report, events, paths }));
@@ -178,7 +187,6 @@ impl Job {
             suspects: Vec::new(),
             estimates: Estimates::new(self.solve.accuracy),
         };
-        let mut meanwhile = run.meanwhile(&pending, PATIENCE.saturating_sub(started.elapsed()))?;
         let outcome = run.frames((wanted, &pending), &mut meanwhile);
         run.progress.clear();
         // Also where a frame failed: what was finished stays.
@@ -197,6 +205,30 @@ impl Job {
 
     fn quiet(&self) -> bool {
         self.solve.clip.quiet
+    }
+
+    /// A rough picture of a frame, for as long as none is finished.
+    fn meanwhile(
+        &self,
+        (clip, views): (&Clip, &Viewing),
+        frame: u32,
+        progress: &Progress,
+        patience: Duration,
+    ) -> Result<Option<(Meanwhile, PathBuf)>, Failure> {
+        let (Some(dir), Some((_, flags))) = (&self.dir, &self.picture) else { return Ok(None) };
+        let view = views.at(&clip.scene, frame, clip.fps())?;
+        let aside = progress.aside();
+        let quiet = self.quiet();
+        let say = move |line: &str| {
+            if !quiet {
+                aside(line);
+            }
+        };
+        let path = preview::path(dir);
+        let of = (Arc::clone(&clip.scene), clip.time_of(frame));
+        let picture =
+            Meanwhile::new(of, (view, preview::settings(flags)), (path.clone(), patience), say);
+        Ok(Some((picture, path)))
     }
 
     /// Where the report goes.
@@ -436,30 +468,6 @@ struct Run<'a> {
 impl Run<'_> {
     fn finished(&self) -> MutexGuard<'_, Finished> {
         interrupt::locked(&self.finished)
-    }
-
-    /// A rough picture for as long as none is finished.
-    fn meanwhile(
-        &self,
-        pending: &[u32],
-        patience: Duration,
-    ) -> Result<Option<(Meanwhile, PathBuf)>, Failure> {
-        let first = pending.first().filter(|_| self.finished().report.frames.is_empty());
-        let (Some(&frame), Some(dir)) = (first, &self.job.dir) else { return Ok(None) };
-        let Some((view, _, flags)) = self.view(frame)? else { return Ok(None) };
-        let of =
-            (Arc::clone(self.session.scene()), frames::time_of(frame, self.job.solve.clip.fps));
-        let aside = self.progress.aside();
-        let quiet = self.job.quiet();
-        let say = move |line: &str| {
-            if !quiet {
-                aside(line);
-            }
-        };
-        let path = preview::path(dir);
-        let picture =
-            Meanwhile::new(of, (view, preview::settings(flags)), (path.clone(), patience), say);
-        Ok(Some((picture, path)))
     }
 
     /// Solves and draws the frames that are not finished yet, in order.

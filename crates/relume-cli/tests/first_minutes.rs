@@ -99,7 +99,7 @@ fn a_sky_is_added_where_what_emits_lights_little_of_what_is_seen() {
         (ran.err, watts.as_f64().unwrap())
     };
     let (said, with_sky) = emitted(&[]);
-    assert!(said.contains("% of what the view shows: --sky uniform=1"), "{said}");
+    assert!(said.contains("% of what the view shows: --sky overcast=3 --sun"), "{said}");
     assert!(said.contains("--sky none leaves it out"), "{said}");
     let (said, without) = emitted(&["--sky", "none"]);
     assert!(!said.contains("--sky"), "{said}");
@@ -119,6 +119,11 @@ fn a_closed_room_without_a_lamp_gets_one_for_its_picture() {
     let render = ["render", text(&scene), "-o", text(&out)];
     let ran = relume(&[&render[..], &SMALL].concat()).succeeds();
     assert!(ran.err.contains("a lamp is put where the view is from"), "{}", ran.err);
+    assert!(!ran.err.contains("almost no light"), "{}", ran.err);
+    // Seen from outside, through the backs of its walls, it is lit from its middle.
+    let from_outside = ["--eye", "20,9,30"];
+    let ran = relume(&[&render[..], &SMALL, &from_outside].concat()).succeeds();
+    assert!(ran.err.contains("a lamp is put in the middle of the scene"), "{}", ran.err);
     assert!(!ran.err.contains("almost no light"), "{}", ran.err);
     // Under a sky that was asked for it stays dark, and that is said in place of a balance of nothing.
     let ran = relume(&[&render[..], &SMALL, &["--sky", "uniform=1"]].concat()).succeeds();

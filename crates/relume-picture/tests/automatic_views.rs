@@ -102,6 +102,20 @@ fn a_double_sided_object_is_no_room() {
     assert!(eye.length() > 6.0, "{eye}");
 }
 
+/// A box without a lid, of both sides, as wide as it is high, without light of its own.
+#[test]
+fn what_is_open_at_the_top_is_looked_into_from_outside() {
+    let mut scene = empty();
+    let white = material(&mut scene, [0.9; 3], 0.0);
+    let (low, high) = (v(-1.0, 0.0, -1.0), v(1.0, 1.6, 1.0));
+    let sides = SIDES.iter().filter(|&&s| s != Side::Ceiling);
+    let sides: Vec<_> = sides.map(|&s| (side(low, high, s), white)).collect();
+    body(&mut scene, &sides);
+    let scene = double_sided(&scene);
+    let eye = View::automatic(&scene).world_from_camera.translation;
+    assert!(eye.cmplt(low).any() || eye.cmpgt(high).any(), "{eye}");
+}
+
 #[test]
 fn a_floating_object_is_seen_from_outside_and_whole() {
     let mut scene = empty();

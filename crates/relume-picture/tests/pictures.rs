@@ -3,6 +3,7 @@
 use crate::common::*;
 use glam::{DQuat, DVec2, DVec3};
 use relume::scene::{BodyId, Held, Projection};
+use relume::session::Snapshot;
 use relume_picture::picture::{
     Exposure, Image, Metered, Settings, Shading, Tone, View, Viewpoint, render,
 };
@@ -339,4 +340,39 @@ fn a_lamp_in_the_plane_of_the_ceiling_is_seen() {
             }
         }
     }
+}
+
+/// Sides of a prism about the vertical axis, a metre in radius and two high, with light from +X.
+fn prism(count: u32) -> Snapshot {
+    let mut scene = empty();
+    let white = material(&mut scene, [0.5; 3], 0.0);
+    let at = |k: u32, y: f64| {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(count)).sin_cos();
+        v(cos, y, -sin)
+    };
+    let of = |k: u32| (vec![at(k, -1.0), at(k + 1, -1.0), at(k + 1, 1.0), at(k, 1.0)], white);
+    body(&mut scene, &(0..count).map(of).collect::<Vec<_>>());
+    let mut made = snapshot(&scene, |_, _, _| false, |_, _, _| [0.0; 3]);
+    for (patch, leaf) in made.scene.patches.iter().zip(&mut made.leaves) {
+        leaf.irradiance = [(1.5 + patch.frame.normal.x) as f32; 3];
+        leaf.radiosity = leaf.irradiance.map(|h| 0.5 * h);
+    }
+    made
+}
+
+/// A prism of sixteen sides stands for a cylinder: no step between neighbours. One of six sides is what it is.
+#[test]
+fn curved_bodies_show_no_facets() {
+    let view = View::look_at(v(0.0, 0.0, 6.0), DVec3::ZERO, 0.5);
+    let largest_step = |count: u32, shading: Shading| {
+        let image = render(&prism(count), &view, &settings(shading));
+        let row: Vec<[u8; 3]> = (0..200).map(|x| image.pixel(x, 75)).collect();
+        let is_seen = |p: &&[u8; 3]| **p != [255, 0, 255] && p[0] == p[1];
+        let seen: Vec<[u8; 3]> = row.iter().filter(is_seen).copied().collect();
+        assert!(seen.len() > 60, "{seen:?}");
+        seen.windows(2).map(|w| w[0][0].abs_diff(w[1][0])).max().unwrap()
+    };
+    assert!(largest_step(16, Shading::Flat) > 12);
+    assert!(largest_step(16, Shading::Gouraud) < 6);
+    assert_eq!(largest_step(6, Shading::Gouraud), largest_step(6, Shading::Flat));
 }

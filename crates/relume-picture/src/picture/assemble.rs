@@ -17,6 +17,7 @@ use super::printed::Shown;
 use super::project::{Projector, SeenPlane, clip_to_pixels};
 use super::raster::{Grid, Primitive};
 use super::render::Shading;
+use super::smooth::Smooth;
 
 /// Depth of the near plane as a share of the distance to the farthest point of the scene.
 const NEAR: f64 = 1e-6;
@@ -73,6 +74,11 @@ impl Drawing {
     ) -> Drawing {
         let near = NEAR * farthest(snapshot, projector.eye());
         let count = snapshot.scene.patches.len() as u32;
+        let smooth = match shading {
+            Shading::Flat => Smooth::default(),
+            Shading::Gouraud => Smooth::new(snapshot),
+        };
+        let shading = (shading, &smooth);
         let of_patches: Vec<Option<PatchDrawing>> = (0..count)
             .into_par_iter()
             .map(|i| {
@@ -154,7 +160,7 @@ impl PatchDrawing {
         projector: &Projector,
         grid: &Grid,
         near: f64,
-        shading: Shading,
+        (shading, smooth): (Shading, &Smooth),
         outlines: bool,
     ) -> Option<PatchDrawing> {
         let patch = &snapshot.scene.patches[id.0 as usize];
@@ -172,7 +178,19 @@ impl PatchDrawing {
         let mut pen = Pen { plane: &plane, grid, near, corners: Vec::new() };
         let triangles = match shading {
             Shading::Flat => Vec::new(),
-            Shading::Gouraud => gouraud::triangulate(&patch.corners, leaves),
+            Shading::Gouraud => {
+                let at_corners = smooth.of(id).map(|irradiance| {
+                    let now = &snapshot.world;
+                    let (exitance, reflectance) = (
+                        now.exitance(&snapshot.scene, patch),
+                        now.reflectance(&snapshot.scene, patch),
+                    );
+                    let radiosity =
+                        |h: &[f64; 3]| [0, 1, 2].map(|c| exitance[c] + reflectance[c] * h[c]);
+                    irradiance.iter().map(radiosity).collect::<Vec<_>>()
+                });
+                gouraud::triangulate(&patch.corners, leaves, at_corners.as_deref())
+            }
         };
         let mut pieces: Vec<(Primitive, Fill)> = if triangles.is_empty() {
             leaves.iter().filter_map(|leaf| pen.leaf(leaf)).collect()

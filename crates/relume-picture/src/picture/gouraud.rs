@@ -31,14 +31,25 @@ pub(crate) struct Triangle {
 
 /// Triangles that cover the convex polygon `corners`, which `leaves` tile; metres.
 ///
-/// Empty where there is nothing to triangulate (fewer than two leaves, no finite extent): such a
-/// patch is drawn flat. Where all leaves have one radiosity, so has every corner, exactly; a linear
+/// `at_corners` is what the corners are to have, W/m2, where neighbours have their say: what is between changes along. Empty where
+/// there is nothing to triangulate (fewer than two leaves and no say of neighbours, no finite extent): such a patch is drawn
+/// flat. Where all leaves have one radiosity, so has every corner, exactly; a linear
 /// field is reproduced up to the leaves' own error. Cost O(n log n) in the number of leaves.
-pub(crate) fn triangulate(corners: &[DVec2], leaves: &[Leaf]) -> Vec<Triangle> {
+pub(crate) fn triangulate(
+    corners: &[DVec2],
+    leaves: &[Leaf],
+    at_corners: Option<&[Rgb]>,
+) -> Vec<Triangle> {
     let (low, high) =
         corners.iter().fold((corners[0], corners[0]), |(l, h), &c| (l.min(c), h.max(c)));
     let extent = (high - low).max_element();
-    if leaves.len() < 2 || !extent.is_normal() {
+    if !extent.is_normal() {
+        return Vec::new();
+    }
+    if let ([leaf], Some(at_corners)) = (leaves, at_corners) {
+        return fan(corners, leaf, at_corners);
+    }
+    if leaves.len() < 2 {
         return Vec::new();
     }
     let mut points: Vec<DVec2> = leaves.iter().map(|leaf| centroid(&leaf.corners)).collect();
@@ -48,7 +59,10 @@ pub(crate) fn triangulate(corners: &[DVec2], leaves: &[Leaf]) -> Vec<Triangle> {
     let Ok(mesh) = DelaunayTriangulation::<Site>::bulk_load(sites.collect()) else {
         return Vec::new();
     };
-    let values = values(&mesh, &points, leaves, &boundary);
+    let mut values = values(&mesh, &points, leaves, &boundary);
+    if let Some(at_corners) = at_corners {
+        bend(corners, at_corners, &points, &mut values);
+    }
     let mut triangles = Vec::with_capacity(mesh.num_inner_faces());
     for face in mesh.inner_faces() {
         let index = face.vertices().map(|v| v.data().index as usize);
@@ -58,6 +72,57 @@ pub(crate) fn triangulate(corners: &[DVec2], leaves: &[Leaf]) -> Vec<Triangle> {
         });
     }
     triangles
+}
+
+/// Triangles from the middle of a patch of one leaf to its corners; of a triangle itself.
+fn fan(corners: &[DVec2], leaf: &Leaf, at_corners: &[Rgb]) -> Vec<Triangle> {
+    let at =
+        |k: usize| (corners[k % corners.len()], at_corners[k % corners.len()].map(|b| b as f32));
+    let of = |of: [(DVec2, [f32; 3]); 3]| Triangle {
+        corners: of.map(|(corner, _)| corner),
+        radiosity: of.map(|(_, radiosity)| radiosity),
+    };
+    if corners.len() == 3 {
+        return vec![of([at(0), at(1), at(2)])];
+    }
+    let middle = (corners.iter().sum::<DVec2>() / corners.len() as f64, leaf.radiosity);
+    (0..corners.len()).map(|k| of([middle, at(k), at(k + 1)])).collect()
+}
+
+/// Moves values at points of a convex polygon so that its corners have the values given: by what the corners lack, weighed
+/// with coordinates that are linear along the edges (Wachspress 1975). Never below zero.
+fn bend(corners: &[DVec2], at_corners: &[Rgb], points: &[DVec2], values: &mut [Rgb]) {
+    let own = |corner: &DVec2| points.iter().position(|p| p == corner).map(|k| values[k]);
+    let lack = |(corner, wanted): (&DVec2, &Rgb)| {
+        own(corner).map_or([0.0; 3], |own| [0, 1, 2].map(|c| wanted[c] - own[c]))
+    };
+    let lacks: Vec<Rgb> = corners.iter().zip(at_corners).map(lack).collect();
+    for (point, value) in points.iter().zip(values) {
+        let weights = weights(corners, *point);
+        for c in 0..3 {
+            let moved: f64 = weights.iter().zip(&lacks).map(|(w, lack)| w * lack[c]).sum();
+            value[c] = (value[c] + moved).max(0.0);
+        }
+    }
+}
+
+/// Wachspress' coordinates of a point in a convex polygon; all zero where they are not determined.
+fn weights(corners: &[DVec2], point: DVec2) -> Vec<f64> {
+    let n = corners.len();
+    let corner = |k: usize| corners[k % n];
+    let twice = |a: DVec2, b: DVec2, c: DVec2| (b - a).perp_dot(c - a).max(0.0);
+    let of_edge: Vec<f64> = (0..n).map(|k| twice(point, corner(k), corner(k + 1))).collect();
+    let most = of_edge.iter().fold(f64::MIN_POSITIVE, |most, &a| most.max(a));
+    let weight = |k: usize| {
+        let before = (k + n - 1) % n;
+        let others = (0..n).filter(|&edge| edge != k && edge != before);
+        let rest: f64 = others.map(|edge| of_edge[edge] / most).product();
+        twice(corner(before), corner(k), corner(k + 1)) * rest
+    };
+    let weights: Vec<f64> = (0..n).map(weight).collect();
+    let whole: f64 = weights.iter().sum();
+    let share = |w: f64| if whole > 0.0 { w / whole } else { 0.0 };
+    weights.into_iter().map(share).collect()
 }
 
 /// A sample point in coordinates scaled to the unit square.
@@ -234,7 +299,7 @@ mod tests {
     #[test]
     fn triangles_cover_the_patch_once() {
         let (corners, leaves) = mixed(|p| p.x as f32);
-        let triangles = triangulate(&corners, &leaves);
+        let triangles = triangulate(&corners, &leaves, None);
         assert!(triangles.iter().all(|t| area(t) >= 0.0));
         assert!((triangles.iter().map(area).sum::<f64>() - 2.0).abs() < 1e-12);
     }
@@ -243,7 +308,7 @@ mod tests {
     fn a_linear_field_is_reproduced_at_every_corner() {
         let field = |p: DVec2| (3.0 + p.x - 0.5 * p.y) as f32;
         let (corners, leaves) = mixed(field);
-        for t in triangulate(&corners, &leaves) {
+        for t in triangulate(&corners, &leaves, None) {
             for (p, b) in t.corners.iter().zip(t.radiosity) {
                 assert!((b[0] - field(*p)).abs() < 1e-5, "{b:?} at {p}, not {}", field(*p));
             }
@@ -253,14 +318,14 @@ mod tests {
     #[test]
     fn a_constant_field_stays_exactly_constant() {
         let (corners, leaves) = mixed(|_| 0.7);
-        let triangles = triangulate(&corners, &leaves);
+        let triangles = triangulate(&corners, &leaves, None);
         assert!(triangles.iter().all(|t| t.radiosity == [[0.7; 3]; 3]));
     }
 
     #[test]
     fn extrapolation_stays_nonnegative() {
         let (corners, leaves) = mixed(|p| if p.x < 0.2 { 0.0 } else { 10.0 });
-        let triangles = triangulate(&corners, &leaves);
+        let triangles = triangulate(&corners, &leaves, None);
         assert!(triangles.iter().flat_map(|t| t.radiosity).flatten().all(|b| b >= 0.0));
     }
 
@@ -282,7 +347,22 @@ mod tests {
             leaf(ca, bc, c, 3.0),
             leaf(ab, bc, ca, 2.0),
         ];
-        let total: f64 = triangulate(&corners, &leaves).iter().map(area).sum();
+        let total: f64 = triangulate(&corners, &leaves, None).iter().map(area).sum();
         assert!((total - 0.5).abs() < 1e-6, "{total}");
+    }
+
+    /// What is between the corners moves along, linearly along the edges, of a patch of many leaves and of one.
+    #[test]
+    fn corners_have_what_neighbours_say() {
+        let (corners, leaves) = mixed(|_| 1.0);
+        let wanted = [[2.0; 3], [1.0; 3], [1.0; 3], [2.0; 3]];
+        for leaves in [leaves, vec![leaf(0.0, 0.0, 2.0, 1.0, |_| 1.5)]] {
+            let triangles = triangulate(&corners, &leaves, Some(&wanted));
+            assert!((triangles.iter().map(area).sum::<f64>() - 2.0).abs() < 1e-12);
+            for (p, b) in triangles.iter().flat_map(|t| t.corners.iter().zip(t.radiosity)) {
+                let expected = 2.0 - 0.5 * p.x;
+                assert!((f64::from(b[0]) - expected).abs() < 1e-5, "{b:?} at {p}");
+            }
+        }
     }
 }

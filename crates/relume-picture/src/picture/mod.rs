@@ -12,6 +12,7 @@
 //! | `project` | world to pixels, near clipping, and pixels back to a patch's plane |
 //! | `outline` | edges of polygons, for line drawings: [`Outlines`] |
 //! | `gouraud` | sample points of a patch, triangulated in the patch's own frame |
+//! | `smooth` | light at the corners of curved bodies, as neighbours have it |
 //! | `assemble` | a snapshot as an ordered list of things to draw |
 //! | `raster` | which thing each sample of each pixel sees |
 //! | `tone` | radiosity to display values and bytes |
@@ -31,6 +32,7 @@ mod project;
 mod raster;
 mod render;
 mod sketch;
+mod smooth;
 mod tone;
 
 pub use camera::{View, ViewError, Viewpoint};

@@ -32,6 +32,7 @@ pub(super) fn read_scene(
         source,
         remedy: "check the path and its permissions".into(),
     })?;
+    SceneError::unless_placeholder(&file, &bytes)?;
     Ok((bytes, path.file_stem().map_or(file, |s| s.to_string_lossy().into_owned())))
 }
 
@@ -62,6 +63,7 @@ impl Folder {
         let mut bytes = Vec::new();
         let file = std::fs::File::open(&path).map_err(failed)?;
         file.take(at_most as u64).read_to_end(&mut bytes).map_err(failed)?;
+        SceneError::unless_placeholder(name, &bytes)?;
         Ok(bytes)
     }
 
@@ -84,6 +86,23 @@ impl Folder {
     }
 }
 
+/// The first bytes of what Git LFS leaves in place of a file.
+const PLACEHOLDER: &[u8] = b"version https://git-lfs";
+
+impl SceneError {
+    /// An error if bytes are what Git LFS leaves in place of a file that it was not asked for.
+    fn unless_placeholder(file: &str, bytes: &[u8]) -> Result<(), SceneError> {
+        if !bytes.starts_with(PLACEHOLDER) {
+            return Ok(());
+        }
+        Err(SceneError::Read {
+            file: file.to_owned(),
+            source: std::io::Error::other("it is a placeholder of Git LFS, not the file itself"),
+            remedy: "fetch it with `git lfs pull`".into(),
+        })
+    }
+}
+
 /// Whether a path leads out of the folder that it starts from: on any system, whichever this one is.
 fn leaves_folder(name: &str) -> bool {
     let drive = name.as_bytes().get(1) == Some(&b':');
@@ -102,6 +121,18 @@ fn leaves_folder(name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn placeholders_of_git_lfs_are_told_from_damaged_files() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("part.stl");
+        std::fs::write(&path, "version https://git-lfs.github.com/spec/v1\noid sha256:75e4\n")
+            .unwrap();
+        let said = read_scene(&path, None).unwrap_err().to_string();
+        assert!(said.contains("git lfs pull"), "{said}");
+        std::fs::write(&path, "solid part\nendsolid part\n").unwrap();
+        assert!(read_scene(&path, None).is_ok());
+    }
 
     #[test]
     fn ways_out_of_a_folder_are_known_in_every_spelling() {

@@ -413,3 +413,36 @@ fn assimp_models_are_read_or_refused_in_words() {
         }
     }
 }
+
+/// What a camera looks at is read though the camera makes no picture; degrees in place of radians are taken as such.
+#[test]
+fn cameras_that_make_no_picture_are_left_out_or_mended() {
+    let camera = |camera: Value| {
+        let mut g = Gltf::cube();
+        g.json["cameras"] = json!([camera]);
+        g.json["nodes"][0]["camera"] = json!(0);
+        let scene = scene_of(&g).unwrap();
+        let said =
+            with_code(&scene.notes, "camera").iter().map(|n| n.message.clone()).collect::<Vec<_>>();
+        (scene.cameras.first().map(|c| c.projection), said.join("\n"))
+    };
+    let perspective = |yfov: f64| {
+        camera(json!({"type": "perspective", "perspective": {"yfov": yfov, "znear": 0.1}}))
+    };
+    let (seen, said) = perspective(45.0);
+    let yfov = 45.0_f64.to_radians();
+    assert_eq!(seen, Some(relume::scene::Projection::Perspective { yfov, aspect: None }));
+    says(&said, &["45 rad", "taken as degrees"]);
+    let (seen, said) = perspective(1.0);
+    assert!(seen.is_some() && said.is_empty(), "{said}");
+    for broken in [
+        json!({"type": "perspective", "perspective": {"yfov": 0.0, "znear": 0.1}}),
+        json!({"type": "perspective", "perspective": {"yfov": 400.0, "znear": 0.1}}),
+        json!({"type": "orthographic", "orthographic": {"xmag": 0.0, "ymag": 1.0, "znear": 0, "zfar": 9}}),
+        json!({"type": "perspective"}),
+    ] {
+        let (seen, said) = camera(broken);
+        assert_eq!(seen, None);
+        says(&said, &["left out", "--eye"]);
+    }
+}

@@ -124,6 +124,28 @@ const OBJ: &str = "mtllib room.mtl\no floor\nv 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 0.5 
 const MTL: &str =
     "newmtl red\nKd 0.8 0.1 1.0\nmap_Kd wood.png\nd 0.5\nnewmtl light\nKe 4 2 0\nKd 0.2 0.2 0.2\n";
 
+/// What only black materials are known of is drawn grey; one that is black among others is black.
+#[test]
+fn obj_files_that_are_black_all_over_are_grey() {
+    let reflectances = |materials: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("room.mtl"), materials).unwrap();
+        let path = folder.path().join("room.obj");
+        std::fs::write(&path, OBJ).unwrap();
+        let scene = relume::scene::import(&path, &Default::default()).unwrap();
+        let of = |name: &str| {
+            scene.materials.iter().find(|m| m.name == name).map(|m| m.reflectance[0]).unwrap()
+        };
+        (of("red"), of("light"), with_code(&scene.notes, "black").len())
+    };
+    let black = "newmtl red\nKd 0 0 0\nnewmtl light\nKd 0 0 0\n";
+    assert_eq!(reflectances(black), (0.5, 0.5, 1));
+    let one = "newmtl red\nKd 0 0 0\nnewmtl light\nKd 0.2 0.2 0.2\n";
+    assert_eq!(reflectances(one), (0.0, 0.2, 0));
+    let textured = "newmtl red\nKd 0 0 0\nmap_Kd wood.png\nnewmtl light\nKd 0.2 0.2 0.2\n";
+    assert_eq!(reflectances(textured), (0.5, 0.2, 0));
+}
+
 #[test]
 fn strips_of_triangles_in_ply_are_surfaces() {
     let strips = |list: &str| {

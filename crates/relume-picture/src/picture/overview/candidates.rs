@@ -30,8 +30,10 @@ const SWEEP_STEPS: u32 = 64;
 const SLOPES: [(f64, f64); 7] =
     [(0.5, 0.0), (0.3, 0.0), (0.8, 0.05), (0.12, 0.02), (0.0, 0.1), (1.8, 0.2), (-0.5, 0.2)];
 
-/// The same of views from inside, which fill the picture whatever they show: for what is lit on the inside only.
+/// What views from inside, which fill the picture whatever they show, are worth less: for what is lit on the inside only; and
+/// how much less where nothing is around the eye: what is open, as a cup, is looked into from outside.
 const INSIDE: f64 = 0.2;
+const OPEN: f64 = 1.5;
 
 /// A view that may be chosen.
 #[derive(Clone, Copy)]
@@ -117,7 +119,8 @@ impl Bounds {
             let (enclosure, span) = stage.look_around(eye);
             if enclosure > ROOM && span > SPAN {
                 let views_from = targets.iter().map(|&at| View::look_at(eye, at, YFOV_INSIDE));
-                views.extend(views_from.map(|view| Candidate { view, oddness: INSIDE }));
+                let oddness = INSIDE + OPEN * (1.0 - enclosure);
+                views.extend(views_from.map(|view| Candidate { view, oddness }));
             }
         }
         views

@@ -4,6 +4,9 @@
 //! Direct light from points on lamps and from punctual lights, by one shadow ray each; then bounces along
 //! fixed rays from point to point. Luminance only. Good for choosing a view and for sketches; no number may rest on it.
 
+use std::collections::BTreeMap;
+use std::ops::Range;
+
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use relume::geometry::Pose;
@@ -13,9 +16,13 @@ use relume::scene::{Light, LightKind, Patch, PatchId, Scene};
 use super::super::tone::luminance;
 use super::caster::{Caster, LIFT};
 
-/// Points on surfaces, besides one on every patch; and on one patch at most.
+/// Points on surfaces, besides one on every patch or group of neighbours; and on one patch at most.
 const POINTS: f64 = 4096.0;
 const POINTS_OF_PATCH: usize = 64;
+
+/// Patches above which neighbours that face alike share a point, and in how many cells a unit of the scene is divided for it.
+const MANY: usize = 8192;
+const CELLS: f32 = 40.0;
 
 /// Points on lamps.
 const LAMP_POINTS: usize = 32;
@@ -51,8 +58,8 @@ struct Point {
 pub(in super::super) struct Preview {
     points: Vec<Point>,
     lamps: Lamps,
-    /// For each patch the range of its points; one entry more than patches.
-    offsets: Vec<u32>,
+    /// For each patch the range of its points.
+    ranges: Vec<Range<u32>>,
     /// How bright a point is in the eye of a picture exposed for what is lit: 1 at the typical radiosity, 0
     /// eight stops below it.
     pub(in super::super) brightness: Vec<f64>,
@@ -76,10 +83,10 @@ impl Preview {
         poses: &[Option<Pose>],
         caster: &Caster,
     ) -> Preview {
-        let (points, offsets) = spread(scene, time_s, poses, caster);
+        let (points, ranges) = spread(scene, time_s, poses, caster);
         let (brightness, reflected) = (Vec::new(), vec![0.0; points.len()]);
         let lamps = Lamps::new(scene, time_s, poses, caster);
-        let mut preview = Preview { points, lamps, offsets, brightness, reflected, is_lit: false };
+        let mut preview = Preview { points, lamps, ranges, brightness, reflected, is_lit: false };
         let of_sky = |k: usize| sky.map_or(0.0, |sky| preview.sky_irradiance(sky, caster, k));
         let direct: Vec<f64> = (0..preview.points.len())
             .into_par_iter()
@@ -120,9 +127,11 @@ impl Preview {
 
     /// The point of a patch that is nearest to a place on it.
     pub(in super::super) fn point_at(&self, patch: PatchId, place: Vec3) -> usize {
-        let [from, to] = [0, 1].map(|k| self.offsets[patch.0 as usize + k] as usize);
+        let Range { start, end } = self.ranges[patch.0 as usize];
         let off = |k: &usize| self.points[*k].at.distance_squared(place);
-        (from..to).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(from)
+        (start as usize..end as usize)
+            .min_by(|a, b| off(a).total_cmp(&off(b)))
+            .unwrap_or(start as usize)
     }
 
     /// Reflected radiosity of each point after some bounces, W/m2.
@@ -203,35 +212,68 @@ impl Preview {
     }
 }
 
-/// Points on all patches that are present, and where those of each patch begin.
+/// Points on all patches that are present, and which are those of each patch: of some thousand patches and more, small
+/// neighbours that face alike share one, so that the cost is bounded.
 fn spread(
     scene: &Scene,
     time_s: f64,
     poses: &[Option<Pose>],
     caster: &Caster,
-) -> (Vec<Point>, Vec<u32>) {
-    let mut points = Vec::new();
-    let mut offsets = vec![0];
+) -> (Vec<Point>, Vec<Range<u32>>) {
+    let mut points: Vec<Point> = Vec::new();
+    let mut ranges = Vec::with_capacity(scene.patches.len());
+    let mut shared: BTreeMap<Cell, u32> = BTreeMap::new();
+    let are_many = scene.patches.len() > MANY;
     let whole_m2 = scene.area_m2();
     for patch in &scene.patches {
-        if let Some(pose) = &poses[patch.body.0 as usize] {
-            let area_m2 = patch.area_m2();
-            let count = (area_m2 / whole_m2 * POINTS).ceil() as usize;
-            let count = count.clamp(1, POINTS_OF_PATCH);
-            let emits = scene.exitance_at(patch, time_s).iter().any(|&m| m > 0.0);
-            for at in on_patch(patch, count) {
-                points.push(Point {
-                    at: caster.place(pose.point(patch.frame.point(at))),
-                    normal: pose.direction(patch.frame.normal).as_vec3(),
-                    area_m2: area_m2 / count as f64,
-                    reflectance: scene.reflectance(patch).iter().sum::<f64>() / 3.0,
-                    emits,
-                });
+        let first = points.len() as u32;
+        let Some(pose) = &poses[patch.body.0 as usize] else {
+            ranges.push(first..first);
+            continue;
+        };
+        let area_m2 = patch.area_m2();
+        let count = (area_m2 / whole_m2 * POINTS).ceil() as usize;
+        let count = count.clamp(1, POINTS_OF_PATCH);
+        let point = |at| Point {
+            at: caster.place(pose.point(patch.frame.point(at))),
+            normal: pose.direction(patch.frame.normal).as_vec3(),
+            area_m2: area_m2 / count as f64,
+            reflectance: scene.reflectance(patch).iter().sum::<f64>() / 3.0,
+            emits: scene.exitance_at(patch, time_s).iter().any(|&m| m > 0.0),
+        };
+        if are_many && count == 1 {
+            let one = on_patch(patch, 1).map(point).next().expect("one point was asked for");
+            let index = *shared.entry(one.cell()).or_insert(first);
+            match points.get_mut(index as usize) {
+                Some(point) => point.stand_for(&one),
+                None => points.push(one),
             }
+            ranges.push(index..index + 1);
+        } else {
+            points.extend(on_patch(patch, count).map(point));
+            ranges.push(first..points.len() as u32);
         }
-        offsets.push(points.len() as u32);
     }
-    (points, offsets)
+    (points, ranges)
+}
+
+/// Where a point is and where it faces, roughly, and whether it emits.
+type Cell = ([i32; 3], usize, bool);
+
+impl Point {
+    fn cell(&self) -> Cell {
+        let at = (self.at * CELLS).floor().as_ivec3().to_array();
+        let n = self.normal.to_array();
+        let axis = (0..3).fold(0, |most, k| if n[k].abs() > n[most].abs() { k } else { most });
+        (at, 2 * axis + usize::from(n[axis] < 0.0), self.emits)
+    }
+
+    /// Counts another point in, where this one is.
+    fn stand_for(&mut self, other: &Point) {
+        let area_m2 = self.area_m2 + other.area_m2;
+        let reflected = self.reflectance * self.area_m2 + other.reflectance * other.area_m2;
+        (self.reflectance, self.area_m2) = (reflected / area_m2, area_m2);
+    }
 }
 
 /// Points spread evenly over a patch, in its frame.
@@ -367,4 +409,46 @@ fn lights(scene: &Scene, time_s: f64, caster: &Caster) -> Vec<(Vec3, Vec3, Light
     lights.sort_by(|one, other| other.3.total_cmp(&one.3));
     lights.truncate(LIGHTS);
     lights
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+    use relume::scene::{BodyId, SceneBuilder};
+
+    use super::*;
+
+    /// A floor of many small tiles of two reflectances: points are far fewer than tiles, and stand for all of them.
+    #[test]
+    fn small_neighbours_share_a_point() {
+        let mut b = SceneBuilder::new("tiles");
+        let node = b.node("floor", None, DVec3::ZERO, DQuat::IDENTITY);
+        let colours = [0.2, 0.6].map(|r| b.material(&format!("{r}"), [r; 3], [0.0; 3]));
+        let side = 110;
+        for k in 0..side * side {
+            let (x, z) = (f64::from(k % side), f64::from(k / side));
+            let corners = [(x, z), (x, z + 1.0), (x + 1.0, z + 1.0), (x + 1.0, z)];
+            let corners = corners.map(|(x, z)| DVec3::new(x, 0.0, z));
+            // A group each, so that they stay polygons of their own.
+            b.polygon(node, &k.to_string(), colours[(k % 2) as usize], &corners);
+        }
+        let scene = b.build().unwrap();
+        let patches = scene.patches.len();
+        assert_eq!(patches, (side * side) as usize);
+        let poses = [scene.pose(BodyId(0), 0.0)];
+        let unit = (DVec3::new(55.0, 0.0, 55.0), 156.0);
+        let caster = Caster::new(&scene, &poses, unit);
+        let (points, ranges) = spread(&scene, 0.0, &poses, &caster);
+        assert!(points.len() < patches / 8, "{}", points.len());
+        let whole_m2: f64 = points.iter().map(|p| p.area_m2).sum();
+        assert!((whole_m2 - scene.area_m2()).abs() < 1e-6 * whole_m2);
+        let reflected: f64 = points.iter().map(|p| p.area_m2 * p.reflectance).sum();
+        assert!((reflected / whole_m2 - 0.4).abs() < 1e-6);
+        let is_near = |patch: usize| {
+            let own = caster.place(scene.patches[patch].frame.origin);
+            let range = &ranges[patch];
+            range.len() == 1 && points[range.start as usize].at.distance(own) < 2.0 / CELLS
+        };
+        assert!((0..patches).all(is_near));
+    }
 }

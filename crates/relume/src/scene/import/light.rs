@@ -72,27 +72,41 @@ fn kind_of(document: &Document, light: &json::Light, name: &str) -> Result<Light
     }
 }
 
-/// The projection of camera `index` of the file.
-pub(super) fn projection(document: &Document, index: usize) -> Result<Projection, SceneError> {
+/// The projection of camera `index` of the file, and what is to be said of it; `None` where its numbers make no picture: that is
+/// no reason to refuse what it looks at. Fields of view of half a turn and more are degrees, as some exporters write them.
+pub(super) fn projection(
+    document: &Document,
+    index: usize,
+) -> Result<(Option<Projection>, Option<String>), SceneError> {
     let camera =
         document.root.cameras.get(index).ok_or_else(|| document.out_of_range("camera", index))?;
-    let bad = |what: &str| Err(document.malformed(format!("camera {index}: {what}")));
+    let left_out = |what: String| {
+        Ok((
+            None,
+            Some(format!("{what}: the camera is left out; repair it or choose a view with --eye")),
+        ))
+    };
     let sensible = |x: f64| x.is_finite() && x > 0.0;
     match (camera.kind.as_str(), &camera.perspective, &camera.orthographic) {
-        ("perspective", Some(p), _) if sensible(p.yfov) && p.yfov < std::f64::consts::PI => {
-            Ok(Projection::Perspective {
-                yfov: p.yfov,
-                aspect: p.aspect_ratio.filter(|&a| sensible(a)),
-            })
+        ("perspective", Some(p), _) if sensible(p.yfov) && p.yfov < 180.0 => {
+            let aspect = p.aspect_ratio.filter(|&a| sensible(a));
+            let is_in_degrees = p.yfov >= std::f64::consts::PI;
+            let yfov = if is_in_degrees { p.yfov.to_radians() } else { p.yfov };
+            let said = format!(
+                "its field of view is {} rad, which is taken as degrees; export radians",
+                p.yfov
+            );
+            Ok((Some(Projection::Perspective { yfov, aspect }), is_in_degrees.then_some(said)))
         }
-        ("perspective", Some(p), _) => bad(&format!("its field of view is {} rad", p.yfov)),
+        ("perspective", Some(p), _) => left_out(format!("its field of view is {} rad", p.yfov)),
         // Negative extents are discouraged but legal; they mirror the picture, which is not done.
         ("orthographic", _, Some(o)) if sensible(o.xmag.abs()) && sensible(o.ymag.abs()) => {
-            Ok(Projection::Orthographic { xmag: o.xmag.abs(), ymag: o.ymag.abs() })
+            let (xmag, ymag) = (o.xmag.abs(), o.ymag.abs());
+            Ok((Some(Projection::Orthographic { xmag, ymag }), None))
         }
         ("orthographic", _, Some(o)) => {
-            bad(&format!("its extents are {} and {} m", o.xmag, o.ymag))
+            left_out(format!("its extents are {} and {} m", o.xmag, o.ymag))
         }
-        (kind, _, _) => bad(&format!("its type `{kind}` has no numbers to go with it")),
+        (kind, _, _) => left_out(format!("its type `{kind}` has no numbers to go with it")),
     }
 }

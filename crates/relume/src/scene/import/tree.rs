@@ -189,8 +189,15 @@ impl Tree<'_> {
             self.draft.lights.push(light);
         }
         if let Some(camera) = node.camera {
-            let projection = light::projection(self.document, camera)?;
-            self.draft.cameras.push(Camera { name, node: id, projection });
+            let (projection, said) = light::projection(self.document, camera)?;
+            if let Some(said) = said {
+                self.note(Severity::Warning, "camera", index, said);
+            }
+            self.draft.cameras.extend(projection.map(|projection| Camera {
+                name,
+                node: id,
+                projection,
+            }));
         }
         Ok(me)
     }

@@ -37,6 +37,7 @@ pub(super) fn read(bytes: &[u8], stem: &str, folder: &Folder) -> Result<Contents
         let translated = translated(&material, &mut contents.notes);
         contents.materials.push(translated);
     }
+    grey_if_all_black(&mut contents, stem);
     let mut corners = 0;
     let mut places: BTreeMap<String, usize> = BTreeMap::new();
     for model in models {
@@ -60,6 +61,23 @@ pub(super) fn read(bytes: &[u8], stem: &str, folder: &Folder) -> Result<Contents
         add(&mut contents.objects[place], part);
     }
     Ok(contents)
+}
+
+/// Where no material reflects or emits anything, as exporters write what they do not know, all get the grey of what has none.
+fn grey_if_all_black(contents: &mut Contents, stem: &str) {
+    let is_black = |m: &Material| m.reflectance == [0.0; 3] && m.exitance == [0.0; 3];
+    if contents.materials.is_empty() || !contents.materials.iter().all(is_black) {
+        return;
+    }
+    let count = contents.materials.len();
+    let message = format!(
+        "all materials are black (Kd 0 0 0), and are taken as reflecting {}; give them their Kd",
+        super::REFLECTANCE
+    );
+    contents.notes.push(warning("black", stem, count, message));
+    for material in &mut contents.materials {
+        material.reflectance = [super::REFLECTANCE; 3];
+    }
 }
 
 /// Adds a part, to what is there of its material already.
@@ -140,8 +158,15 @@ fn translated(material: &tobj::Material, notes: &mut Vec<Note>) -> Material {
         let message = format!("its reflectance {stated:?} is taken as {REFLECTANCE_MAX} at most");
         notes.push(warning("reflectance", &name, 1, message));
     }
+    let mut reflectance = reflectance;
     if let Some(texture) = &material.diffuse_texture {
-        let message = format!("its texture {texture} is not read: Kd counts alone");
+        let message = if stated == [0.0; 3] {
+            // The texture alone was meant.
+            reflectance = [super::REFLECTANCE; 3];
+            format!("its texture {texture} is not read, and its Kd is black: it is grey")
+        } else {
+            format!("its texture {texture} is not read: Kd counts alone")
+        };
         notes.push(warning("texture", &name, 1, message));
     }
     if material.dissolve.is_some_and(|d| d < 1.0) {

@@ -55,7 +55,9 @@ impl Scene {
     fn extent(&self) -> (DVec3, DVec3) {
         let [from, to] = self.motion.span_s();
         let time = |k: u32| from + (to - from) * f64::from(k) / f64::from(INSTANTS);
-        let bounds = (0..=INSTANTS).filter_map(|k| self.bounds(time(k)));
+        // Where nothing moves one instant is as good as many.
+        let instants = if to > from { INSTANTS } else { 0 };
+        let bounds = (0..=instants).filter_map(|k| self.bounds(time(k)));
         let all = bounds.reduce(|one, two| (one.0.min(two.0), one.1.max(two.1)));
         // Nothing is there at any of these instants: any place will do.
         all.unwrap_or((DVec3::ZERO, DVec3::ONE))

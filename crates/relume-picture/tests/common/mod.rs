@@ -42,6 +42,7 @@ pub(crate) fn empty() -> Scene {
         motion: Motion::default(),
         outside: None,
         notes: Vec::new(),
+        edited: Default::default(),
     }
 }
 

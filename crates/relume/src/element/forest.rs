@@ -421,18 +421,8 @@ impl Forest {
 
     fn plant_patches(&mut self, to: Plot<'_>, patches: &[u32], subject: u32, at: u32) {
         let (scene, cuts, _) = to;
-        let of_patch = |&patch: &u32| {
-            let patch = &scene.patches[patch as usize];
-            match subject {
-                // Together with others: in the world, where it rests.
-                STAGE => {
-                    let pose =
-                        scene.pose(patch.body, 0.0).unwrap_or(crate::geometry::Pose::IDENTITY);
-                    Aabb::of(patch.corners_in_body().map(|c| pose.point(c)))
-                }
-                _ => Aabb::of(patch.corners_in_body()),
-            }
-        };
+        // What is planted together with others rests, so that its body's frame is the world's.
+        let of_patch = |&patch: &u32| Aabb::of(scene.patches[patch as usize].corners_in_body());
         let boxes: Vec<Aabb> = patches.iter().map(of_patch).collect();
         let tree = binary_tree(&boxes);
         self.plant(&tree, 0, at, subject, &mut |forest, leaf, id| {

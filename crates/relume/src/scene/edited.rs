@@ -9,9 +9,9 @@ use std::ops::Range;
 
 use super::{BodyId, Scene};
 
-/// Bodies that came or went.
+/// Bodies that came into a scene or left it after it was made ([`Scene::with_body`], [`Scene::without_body`]).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Edited {
+pub struct Edited {
     /// Names for the parts of each body that was inserted, also where it left again and its id is reserved.
     inserted: BTreeMap<BodyId, Range<u32>>,
     /// Bodies that are absent at all times, with all their patches.

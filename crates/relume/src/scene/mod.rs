@@ -56,7 +56,8 @@ pub use covered::Covered;
 pub use discontinuity::Lines;
 pub use drift::Drift;
 pub use edit::Edits;
-pub(crate) use edited::{Edited, FIRST_NAME};
+pub use edited::Edited;
+pub(crate) use edited::FIRST_NAME;
 pub use error::SceneError;
 pub use glow::Glow;
 pub use import::{ImportOptions, import};
@@ -122,8 +123,8 @@ pub struct Scene {
     pub outside: Option<Arc<outside::Outside>>,
     /// What was noticed while reading, for `info` and `check`.
     pub notes: Vec<Note>,
-    /// Bodies that came or went since.
-    pub(crate) edited: Edited,
+    /// Bodies that came or went since it was made: none by default.
+    pub edited: Edited,
 }
 
 /// Everything that moves rigidly together: an animated node with what hangs rigidly below it,

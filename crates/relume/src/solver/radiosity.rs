@@ -395,11 +395,17 @@ impl Radiosity {
         work: &mut Work,
         limit: f32,
     ) -> Option<Arriving> {
-        let groups = surfaces.groups()?;
-        let arriving = self.arriving(surfaces)?;
+        if surfaces.groups().is_none() && self.over_groups.is_empty() {
+            return None;
+        }
+        let arriving = self.arriving(surfaces);
         self.over_groups.extend(surfaces.len());
+        let now = |id: u32| match (surfaces.groups(), &arriving) {
+            (Some(groups), Some(arriving)) => groups.at(arriving, id),
+            _ => Linear::default(),
+        };
         let differs = |&id: &u32| {
-            let change = groups.at(&arriving, id).minus(&self.over_groups.get(id));
+            let change = now(id).minus(&self.over_groups.get(id));
             change != Linear::default()
                 && surfaces.is_surface(id)
                 && change.most(surfaces.place(id).radius) > limit * PENDING_SHARE
@@ -407,7 +413,7 @@ impl Radiosity {
         let ids = (0..surfaces.len() as u32).into_par_iter();
         let found: Vec<u32> = ids.with_min_len(CHUNK).filter(differs).collect();
         found.into_iter().for_each(|id| work.mark(surfaces, id));
-        Some(arriving)
+        arriving
     }
 
     /// Area-weighted mean radiosity of all surfaces and channels, W/m2.
@@ -435,7 +441,7 @@ impl Radiosity {
         self.gathers += receivers.len() as u64;
         receivers.iter().for_each(|&id| self.pending[id as usize] = 0.0);
         let Radiosity { radiosity, gathered, over_groups: kept, owed, constant, .. } = self;
-        if surfaces.groups().is_some() {
+        if surfaces.groups().is_some() || !kept.is_empty() {
             kept.extend(surfaces.len());
         }
         let linear = !*constant;
@@ -458,7 +464,12 @@ impl Radiosity {
                     kept.set(id, &groups);
                     own.plus(&groups)
                 }
-                None => *own,
+                None => {
+                    if !kept.is_empty() {
+                        kept.set(id, &Linear::default());
+                    }
+                    *own
+                }
             };
             let Some(most) = most_owed else {
                 gathered.set(id, h);
@@ -578,6 +589,8 @@ mod tests {
     use std::ops::Range;
 
     use proptest::prelude::*;
+
+    use super::super::groups::{GroupEnd, GroupLink, GroupLinks, PlacedLinks};
 
     use crate::element::ElementId;
     use crate::solver::{Link, Lit, Place};
@@ -749,5 +762,69 @@ mod tests {
         let dirty = Dirty::Some { receivers: vec![], parents: vec![] };
         warm.solve(&plates, &links, dirty, STOP);
         assert_eq!((warm.sweeps, warm.gathers), (1, 0));
+    }
+
+    /// A toy with links of groups.
+    struct Grouped<'a>(&'a Toy, Option<GroupLinks>);
+
+    impl Surfaces for Grouped<'_> {
+        fn len(&self) -> usize {
+            self.0.len()
+        }
+        fn facets(&self) -> &[ElementId] {
+            self.0.facets()
+        }
+        fn facet_of(&self, id: u32) -> u32 {
+            self.0.facet_of(id)
+        }
+        fn parent(&self, id: u32) -> Option<u32> {
+            self.0.parent(id)
+        }
+        fn children(&self, id: u32) -> Range<u32> {
+            self.0.children(id)
+        }
+        fn area_m2(&self, id: u32) -> f64 {
+            self.0.area_m2(id)
+        }
+        fn place(&self, id: u32) -> Place {
+            self.0.place(id)
+        }
+        fn lit(&self, facet: u32) -> &Lit {
+            self.0.lit(facet)
+        }
+        fn groups(&self) -> Option<&GroupLinks> {
+            self.1.as_ref()
+        }
+    }
+
+    /// The first plate as a group of one facet, linked with the lower half of the second.
+    fn one_group_link(coupling: f32) -> Option<GroupLinks> {
+        let group = GroupEnd::Group { facets: 0..1, first: 0 };
+        let (mean, gradient) = (1.0, [0.0; 2]);
+        let half = GroupEnd::Element { id: 2, area_m2: 0.5, radius: 0.25, mean, gradient };
+        let link = GroupLink { ends: [group, half], coupling, by_facets: false };
+        let placed = PlacedLinks { links: vec![link], ids: vec![[6, 2]], factors: vec![1.0] };
+        (coupling > 0.0).then(|| GroupLinks::new(vec![(0, 1.0)], vec![0..1], placed, 1.0 / 3.0))
+    }
+
+    #[test]
+    fn what_comes_over_groups_is_followed_when_it_changes_and_when_it_ends() {
+        let (plates, links) = plates();
+        let mut warm = Radiosity::new(&plates);
+        for (k, coupling) in [0.2, 0.1, 0.3, 0.0, 0.2].into_iter().enumerate() {
+            let now = Grouped(&plates, one_group_link(coupling));
+            let dirty = match k {
+                0 => Dirty::All,
+                _ => Dirty::Some { receivers: vec![], parents: vec![] },
+            };
+            warm.solve(&now, &links, dirty, STOP);
+            let mut cold = Radiosity::new(&now);
+            cold.solve(&now, &links, Dirty::All, STOP);
+            for id in 0..4 {
+                for (one, two) in warm.radiosity(id).iter().zip(cold.radiosity(id)) {
+                    assert!((one - two).abs() < 1e-4 * two, "{coupling}: {id} {one} {two}");
+                }
+            }
+        }
     }
 }

@@ -503,9 +503,8 @@ mod tests {
         let candidates = GroupSight::between(&forest, &view, a, b);
         let sight =
             GroupSight { forest: &forest, view: &view, common: None, candidates: &candidates };
-        let wall = forest.patch_root(crate::scene::PatchId(0));
-        for other in [b, wall] {
-            let seen = sight.by_facets(&end(a), &end(other), 7);
+        for (one, other) in [(a, b), (b, a)] {
+            let seen = sight.by_facets(&end(one), &end(other), 7);
             assert_eq!(seen.mean, 1.0);
             assert!(seen.of_facets.iter().flatten().all(|&v| v == 1.0));
         }

@@ -490,6 +490,7 @@ fn hall(boxes: u32) -> Scene {
 }
 
 /// Solves, and says what it cost: pairs looked at, and seconds.
+#[allow(clippy::disallowed_methods)] // seconds are printed, and decide nothing
 fn cost(session: &mut Session, what: &str) -> u64 {
     let start = Instant::now();
     let report = session.solve().unwrap().report().clone();

@@ -804,7 +804,8 @@ mod tests {
         let half = GroupEnd::Element { id: 2, area_m2: 0.5, radius: 0.25, mean, gradient };
         let link = GroupLink { ends: [group, half], coupling, by_facets: false };
         let placed = PlacedLinks { links: vec![link], ids: vec![[6, 2]], factors: vec![1.0] };
-        (coupling > 0.0).then(|| GroupLinks::new(vec![(0, 1.0)], vec![0..1], placed, 1.0 / 3.0))
+        let roots = std::iter::once(0..1).collect();
+        (coupling > 0.0).then(|| GroupLinks::new(vec![(0, 1.0)], roots, placed, 1.0 / 3.0))
     }
 
     #[test]

@@ -151,7 +151,7 @@ impl Meter<'_> {
     fn places(&self, points: usize) -> (Vec<Place>, f64) {
         let mesh = self.session.snapshot();
         let arrives = |leaf: &Leaf| leaf.irradiance.iter().map(|&h| f64::from(h)).sum::<f64>();
-        let patches = (0..self.session.scene.patches.len() as u32).map(PatchId);
+        let patches = (0..self.session.scene().patches.len() as u32).map(PatchId);
         let leaves: Vec<(PatchId, Leaf, f64)> = patches
             .flat_map(|patch| mesh.leaves_of(patch).iter().map(move |leaf| (patch, *leaf)))
             .map(|(patch, leaf)| (patch, leaf, Shape { corners: leaf.corners, len: 4 }.area()))
@@ -224,7 +224,7 @@ impl Meter<'_> {
             let (arrives, next) = look.by_source();
             let e = WorldElement::new(&self.solved.view, &self.solved.forest, leaf, false);
             let said = look.radiosity_at(&e, leaf, at);
-            let (scene, world) = (&self.session.scene, &self.solved.world);
+            let (scene, world) = (self.session.scene(), &self.solved.world);
             let patch = &scene.patches[patch.0 as usize];
             let (m, rho) = (world.exitance(scene, patch), world.reflectance(scene, patch));
             for c in 0..3 {

@@ -89,7 +89,7 @@ impl Session {
             false => {
                 let links =
                     (std::mem::take(&mut solved.groups), std::mem::take(&mut changes.apart));
-                groups::Before::new((&self.scene, &solved.forest), (&old, &solved.view), links)
+                groups::Before::new((&self.bed.scene, &solved.forest), (&old, &solved.view), links)
             }
         };
         let places = (&solved.forest, &solved.view);

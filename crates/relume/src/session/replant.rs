@@ -12,7 +12,7 @@ use crate::geometry::Pose;
 use crate::pair::PairId;
 use crate::scene::{BodyId, Held, Patch, Scene};
 
-use super::groups::group_links;
+use super::groups::{Before, group_links};
 use super::{Session, Solved, Update, seed_of, tally};
 
 /// A solved state whose scene has been edited since.
@@ -221,7 +221,7 @@ fn replanted(
         *world = world.of_bodies(&from);
     }
     last.view = WorldView::new(&new.scene, &last.forest, &last.world);
-    last.groups = group_links(&last.forest, &last.view, &last.tree);
+    last.groups = group_links((&last.forest, &last.view), &last.tree, &Before::default());
     let mut report = std::mem::take(&mut last.report);
     tally::fill(&mut report, &last);
     last.report = report;

@@ -55,9 +55,10 @@ fn places(scene: &Scene, count: usize, random: &mut Random) -> Vec<Sensor> {
 #[test]
 fn a_solution_knows_its_own_error() {
     let scenes = [(lit_room(), 0.9), (behind_a_slit(), 0.5), (between_blocks(), 0.5)];
+    let mut found_alike = Vec::new();
     for (scene, tolerance) in scenes {
         let scene = Arc::new(scene);
-        let sensors = places(&scene, 48, &mut Random::of_part(5, 0));
+        let sensors = places(&scene, 96, &mut Random::of_part(5, 0));
         let mut session = Session::new(Arc::clone(&scene), at_tolerance(tolerance)).unwrap();
         session.step(0, 0.0).unwrap();
         let said = session.accuracy_at(&sensors);
@@ -76,14 +77,16 @@ fn a_solution_knows_its_own_error() {
         }
         let rms = (squares.iter().sum::<f64>() / squares.len() as f64).max(0.0).sqrt();
         println!(
-            "{} at {tolerance}: RMS {:.2} %, said {:.2} % (largest {:+.1} %); everywhere {:.2} %, meshes {:.2} %",
+            "{} at {tolerance}: RMS {:.2} %, said {:.2} % (resolved {:.2} %, largest {:+.1} %); everywhere {:.2} %, meshes {:.2} %",
             scene.name,
             100.0 * rms,
             100.0 * said.rms,
+            100.0 * said.resolved,
             100.0 * said.largest,
             100.0 * everywhere.rms,
             100.0 * everywhere.mesh_rms.unwrap()
         );
-        assert!(said.rms < 1.6 * rms && rms < 1.6 * said.rms, "{}", scene.name);
+        found_alike.push(said.rms < 1.6 * rms && rms < 1.6 * said.rms);
     }
+    assert!(found_alike.iter().all(|alike| *alike), "{found_alike:?}");
 }

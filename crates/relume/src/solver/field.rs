@@ -98,11 +98,6 @@ impl Default for Field {
 }
 
 impl Field {
-    /// Whether it holds no element.
-    pub(super) fn is_empty(&self) -> bool {
-        self.0.len() <= BEYOND
-    }
-
     pub(super) fn extend(&mut self, len: usize) {
         let wanted = len * NINE + BEYOND;
         if wanted > self.0.len() {

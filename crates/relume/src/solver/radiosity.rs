@@ -1,5 +1,7 @@
 //! The iteration B = M + rho H over the hierarchy.
 
+use std::collections::BTreeMap;
+
 use fearless_simd::dispatch;
 use rayon::prelude::*;
 
@@ -34,6 +36,40 @@ pub enum Stop {
     Residual(f64),
 }
 
+/// What came over links of groups to whom something did: few elements do, since groups are linked with large ones.
+#[derive(Clone, Debug, Default)]
+struct OverGroups(BTreeMap<u32, Linear>);
+
+impl OverGroups {
+    fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    fn get(&self, id: u32) -> Linear {
+        self.0.get(&id).copied().unwrap_or_default()
+    }
+
+    fn set(&mut self, id: u32, value: &Linear) {
+        if *value != Linear::default() {
+            self.0.insert(id, *value);
+        } else if !self.0.is_empty() {
+            self.0.remove(&id);
+        }
+    }
+
+    fn renumber(&mut self, to: &Renumbering) {
+        if !self.0.is_empty() {
+            let old_of = (0..).zip(to.old_of());
+            self.0 = old_of.filter_map(|(id, old)| Some((id, *self.0.get(old)?))).collect();
+        }
+    }
+
+    /// Bytes held, with the room that the tree leaves.
+    fn bytes(&self) -> u64 {
+        (self.0.len() * size_of::<(u32, Linear)>() * 3 / 2) as u64
+    }
+}
+
 /// The solution: 80 bytes an element.
 #[derive(Clone, Debug, Default)]
 pub struct Radiosity {
@@ -41,8 +77,8 @@ pub struct Radiosity {
     radiosity: Field,
     /// What an element's own links bring, without those of its ancestors. Gradients are per metre.
     gathered: Field,
-    /// What of that came over links of groups. Empty where there are none.
-    over_groups: Field,
+    /// What of that came over links of groups.
+    over_groups: OverGroups,
     /// By how much the irradiance of an element may have changed since it was gathered, W/m2.
     pending: Vec<f32>,
     /// By how much the radiosities at and below an element may be off, at most, for what was not pushed down
@@ -112,9 +148,7 @@ impl Radiosity {
     pub fn renumber(&mut self, to: &Renumbering) {
         self.radiosity.renumber(to);
         self.gathered.renumber(to);
-        if !self.over_groups.is_empty() {
-            self.over_groups.renumber(to);
-        }
+        self.over_groups.renumber(to);
         self.trend.renumber(to);
         let numbers = [&mut self.pending, &mut self.owed, &mut self.limits];
         let kept = numbers.into_iter().filter(|v| !v.is_empty());
@@ -125,8 +159,8 @@ impl Radiosity {
 
     /// Gives back room beyond a small reserve.
     pub fn trim(&mut self) {
-        let Radiosity { radiosity, gathered, over_groups, pending, owed, .. } = self;
-        for values in [&mut radiosity.0, &mut gathered.0, &mut over_groups.0, pending, owed] {
+        let Radiosity { radiosity, gathered, pending, owed, .. } = self;
+        for values in [&mut radiosity.0, &mut gathered.0, pending, owed] {
             values.shrink_to(values.len() + values.len() / SLACK);
         }
         self.trend.trim();
@@ -154,10 +188,7 @@ impl Radiosity {
             }
             self.radiosity.set(child, &own);
             self.gathered.set(child, &Linear::default());
-            if !self.over_groups.is_empty() {
-                self.over_groups.extend(child as usize + 1);
-                self.over_groups.set(child, &Linear::default());
-            }
+            self.over_groups.set(child, &Linear::default());
             if let Some(owed) = self.owed.get_mut(child as usize) {
                 *owed = 0.0;
             }
@@ -225,7 +256,7 @@ impl Radiosity {
             });
         }
         self.pending.fill(0.0);
-        self.over_groups = Field::default();
+        self.over_groups = OverGroups::default();
         // A solve that changed most of the scene has given it back.
         self.owed.clear();
         self.owed.resize(self.pending.len(), 0.0);
@@ -399,7 +430,6 @@ impl Radiosity {
             return None;
         }
         let arriving = self.arriving(surfaces);
-        self.over_groups.extend(surfaces.len());
         let now = |id: u32| match (surfaces.groups(), &arriving) {
             (Some(groups), Some(arriving)) => groups.at(arriving, id),
             _ => Linear::default(),
@@ -441,9 +471,6 @@ impl Radiosity {
         self.gathers += receivers.len() as u64;
         receivers.iter().for_each(|&id| self.pending[id as usize] = 0.0);
         let Radiosity { radiosity, gathered, over_groups: kept, owed, constant, .. } = self;
-        if surfaces.groups().is_some() || !kept.is_empty() {
-            kept.extend(surfaces.len());
-        }
         let linear = !*constant;
         found.resize(found.len().max(receivers.len()), Linear::default());
         let level = transport::Simd::detect().level();
@@ -465,9 +492,7 @@ impl Radiosity {
                     own.plus(&groups)
                 }
                 None => {
-                    if !kept.is_empty() {
-                        kept.set(id, &Linear::default());
-                    }
+                    kept.set(id, &Linear::default());
                     *own
                 }
             };

@@ -451,15 +451,30 @@ mod tests {
 
     /// Visibility of each facet of the first of two ends by all lines to the middles of the facets of the other, with what
     /// it weighs: below the wall's edge at a height of 0.1 m they are clear.
-    fn by_all_lines(forest: &Forest, [a, b]: [ElementId; 2]) -> Vec<(f64, f64)> {
-        let leaves = |id| forest.groups().leaves_of(forest.group(id).unwrap());
-        let middle = |id| forest.group(id).unwrap().centre;
+    fn by_all_lines(
+        (forest, view): (&Forest, &WorldView),
+        [a, b]: [ElementId; 2],
+    ) -> Vec<(f64, f64)> {
+        let group = |id| forest.group(id).unwrap();
+        let pose =
+            |id| group(id).body.map_or(Pose::IDENTITY, |b| view.poses()[b.0 as usize].unwrap());
+        let middle = |id| pose(id).point(group(id).centre);
+        let leaves = |id| -> Vec<GroupLeaf> {
+            let pose = pose(id);
+            let place = |leaf: &GroupLeaf| GroupLeaf {
+                centre: pose.point(leaf.centre),
+                normal: pose.direction(leaf.normal),
+                ..*leaf
+            };
+            forest.groups().leaves_of(group(id)).iter().map(place).collect()
+        };
+        let sources = leaves(b);
         let of = |leaf: &GroupLeaf, to: DVec3| {
             leaf.area_m2 * factor(leaf.centre, leaf.normal, to, to.distance_squared(leaf.centre))
         };
         let of_leaf = |p: &GroupLeaf| {
             let (mut clear, mut all) = (0.0, 0.0);
-            for q in leaves(b) {
+            for q in &sources {
                 let (weight, d) = (of(q, middle(a)), q.centre - p.centre);
                 let height = p.centre.y - d.y * p.centre.x / d.x;
                 all += weight;
@@ -480,7 +495,7 @@ mod tests {
             GroupSight { forest: &forest, view: &view, common: None, candidates: &candidates };
         let seen = sight.by_facets(&end(a), &end(b), 7);
         for (side, ends) in [[a, b], [b, a]].into_iter().enumerate() {
-            let want = by_all_lines(&forest, ends);
+            let want = by_all_lines((&forest, &view), ends);
             let weight: f64 = want.iter().map(|w| w.1).sum();
             let mean_of = |f: &dyn Fn(usize) -> f64| {
                 (0..want.len()).map(|k| want[k].1 * f(k)).sum::<f64>() / weight

@@ -87,7 +87,13 @@ pub(crate) struct Outcome {
 pub(crate) fn apart(name: &str, seed: u64, limit: Duration) -> Outcome {
     let this = std::env::current_exe().expect("a test has a path");
     let mut child = Command::new(this)
-        .args(["--ignored", "--exact", "survey::one_scene", "--nocapture", "--test-threads=1"])
+        .args([
+            "--ignored",
+            "--exact",
+            "outside::survey::one_scene",
+            "--nocapture",
+            "--test-threads=1",
+        ])
         .env("RELUME_SCENE", format!("{name} {seed}"))
         .env("RELUME_QUIET", "1")
         .env("RAYON_NUM_THREADS", "1")

@@ -2,7 +2,9 @@
 //!
 //! Two ends a and b at a distance R between their middles exchange, without occlusion,
 //!
-//!     X = P_a P_b / (pi R^2),    P_a = sum_i A_i f_i,    f_i = max(0, n_i . d_i) R^2 / |d_i|^3,
+//! ```text
+//! X = P_a P_b / (pi R^2),    P_a = sum_i A_i f_i,    f_i = max(0, n_i . d_i) R^2 / |d_i|^3,
+//! ```
 //!
 //! where d_i leads from the middle of facet i to the middle of the other end: every facet is read at its own place and with its
 //! own normal, and each facet i of a exchanges V A_i f_i A_j f_j / (pi R^2) with facet j of b. So whole and parts agree, both ways.

@@ -449,7 +449,8 @@ impl Session {
         let fixed = self.bed.seed.memory_bytes() + self.bed.seed.shared_bytes();
         let mut memory = Memory { fixed, ..Memory::default() };
         if let Some(s) = &self.solved {
-            memory.pairs = s.tree.memory_bytes() + s.links.pool_bytes() + s.groups.memory_bytes();
+            let of_groups = s.groups.memory_bytes() + s.radiosity.group_bytes();
+            memory.pairs = s.tree.memory_bytes() + s.links.pool_bytes() + of_groups;
             memory.elements =
                 s.forest.memory_bytes() + s.radiosity.memory_bytes() + s.links.span_bytes();
             memory.fixed += s.coarse.memory_bytes();

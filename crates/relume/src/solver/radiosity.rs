@@ -582,15 +582,16 @@ impl Radiosity {
         });
     }
 
-    /// Bytes held.
+    /// Bytes held, without [`Radiosity::group_bytes`].
     pub fn memory_bytes(&self) -> u64 {
         let single = self.pending.capacity() + self.owed.capacity() + self.limits.capacity();
         let single = (single * size_of::<f32>()) as u64;
-        self.radiosity.bytes()
-            + self.gathered.bytes()
-            + self.over_groups.bytes()
-            + single
-            + self.trend.bytes()
+        self.radiosity.bytes() + self.gathered.bytes() + single + self.trend.bytes()
+    }
+
+    /// Bytes held for what came over links of groups.
+    pub fn group_bytes(&self) -> u64 {
+        self.over_groups.bytes()
     }
 }
 

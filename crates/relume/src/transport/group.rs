@@ -312,6 +312,7 @@ mod tests {
 
     use glam::DQuat;
 
+    use super::sight::FacetSight;
     use super::*;
     use crate::scene::SceneBuilder;
 
@@ -495,20 +496,26 @@ mod tests {
         let candidates = GroupSight::between(&forest, &view, a, b);
         let sight =
             GroupSight { forest: &forest, view: &view, common: None, candidates: &candidates };
-        let seen = sight.by_facets(&end(a), &end(b), 7);
+        // Rays of one pair are few and follow a fixed pattern: sixteen pairs of the same ends.
+        let pairs: Vec<_> = (0..16).map(|key| sight.by_facets(&end(a), &end(b), key)).collect();
+        let over_pairs = |of: &dyn Fn(&FacetSight) -> f64| pairs.iter().map(of).sum::<f64>() / 16.0;
+        let seen = over_pairs(&|pair| pair.mean);
         for (side, ends) in [[a, b], [b, a]].into_iter().enumerate() {
             let want = by_all_lines((&forest, &view), ends);
             let weight: f64 = want.iter().map(|w| w.1).sum();
             let mean_of = |f: &dyn Fn(usize) -> f64| {
                 (0..want.len()).map(|k| want[k].1 * f(k)).sum::<f64>() / weight
             };
-            let found = |k: usize| f64::from(seen.of_facets[side][k]);
+            let found = |k: usize| over_pairs(&|pair| f64::from(pair.of_facets[side][k]));
             let mean = mean_of(&|k| want[k].0);
             let off = mean_of(&|k| (found(k) - want[k].0).powi(2)).sqrt();
-            let shared = mean_of(&|k| (seen.mean - want[k].0).powi(2)).sqrt();
-            println!("{side}: {off:.3}, all alike {shared:.3}; mean {:.3} of {mean:.3}", seen.mean);
-            assert!((seen.mean - mean).abs() < 0.05 && (mean_of(&found) - mean).abs() < 0.05);
-            assert!(off < 0.2 && shared > 0.25, "{off} {shared}");
+            let shared = mean_of(&|k| (seen - want[k].0).powi(2)).sqrt();
+            let most = pairs.iter().map(|pair| (pair.mean - mean).abs()).fold(0.0, f64::max);
+            println!(
+                "{side}: {off:.3}, all alike {shared:.3}; mean {seen:.3} of {mean:.3}, most off by {most:.3}"
+            );
+            assert!((seen - mean).abs() < 0.05 && (mean_of(&found) - mean).abs() < 0.05);
+            assert!(most < 0.15 && off < 0.2 && shared > 0.25, "{most} {off} {shared}");
         }
     }
 

@@ -93,7 +93,7 @@ pub use scene::{
     outside,
 };
 pub use session::{
-    Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Frame,
+    Accuracy, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Frame,
     FrameReport, Grouping, Hash, Leaf, Log, LogError, Memory, Mesh, Open, Options, Oracle,
     PairCounts, Removed, RowSumError, Seconds, Sensor, Session, SessionError, Snapshot, Update,
     Watch,

@@ -16,7 +16,7 @@ use crate::scene::PatchId;
 use super::gather::{Look, Purpose, Sensor, Source, at_share, spread};
 use super::{Leaf, Session, Solved};
 
-/// Errors of a solution, relative to the irradiance at each of some points that are spread over all lit surfaces.
+/// Errors of a solution, relative to the irradiance (sum of the channels) at each of some points: 1. Estimated, not bounded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Accuracy {
     /// Number of points.
@@ -118,7 +118,7 @@ impl Accuracy {
 }
 
 impl Found {
-    /// Variance of [`mean_square`] of a sensor that has no error, from the scatter of its walks.
+    /// Variance that `mean_square` has of a sensor without error, from the scatter of its walks.
     fn variance_of_square(&self) -> f64 {
         let mean = self.sensor.iter().sum::<f64>() / WALKS as f64;
         let variance =

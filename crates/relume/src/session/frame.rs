@@ -70,6 +70,11 @@ impl<'a> Frame<'a> {
         self.session.accuracy(points)
     }
 
+    /// Errors of what sensors read, estimated at each of them as by [`Frame::accuracy`]; where no light arrives, there is none.
+    pub fn accuracy_at(&self, sensors: &[Sensor]) -> Accuracy {
+        self.session.accuracy_at(sensors)
+    }
+
     /// The link events of this frame, if [`super::Options::events`] asks for them.
     pub fn events(&self) -> Vec<Event> {
         self.session.events()

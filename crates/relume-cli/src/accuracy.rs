@@ -37,7 +37,8 @@ impl Estimates {
         let Some((frame, found)) = self.worst.filter(|(_, found)| found.points > 0) else {
             return String::new();
         };
-        let Accuracy { points, rms, resolved, largest, largest_at: [x, y, z], mesh_rms } = found;
+        let Accuracy { points, rms, resolved, largest, largest_at: [x, y, z], mesh_rms, .. } =
+            found;
         let percent = |error: f64| match error < resolved {
             true => format!("less than {:.2} %", 100.0 * resolved),
             false => format!("about {:.2} %", 100.0 * error),

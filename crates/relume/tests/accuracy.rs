@@ -95,3 +95,38 @@ fn a_solution_knows_its_own_error() {
     }
     assert!(found_alike.iter().all(|alike| *alike), "{found_alike:?}");
 }
+
+/// A closed room of 5 x 4 x 3 m in which every surface emits 1 W/m2 and reflects 0.8: with blocks that stand 0.3 m apart, all
+/// of it has irradiance 5.
+fn furnace() -> Scene {
+    let mut b = SceneBuilder::new("furnace");
+    let all = b.material("all", [0.8; 3], [1.0; 3]);
+    let node = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.cuboid_inward(node, "room", all, DVec3::ZERO, v(5.0, 4.0, 3.0));
+    for k in 0..5 {
+        let x = 0.8 + 0.7 * f64::from(k);
+        b.cuboid(node, &format!("block {k}"), all, v(x, 1.0, 0.5), v(x + 0.4, 3.0, 2.0));
+    }
+    b.build().unwrap()
+}
+
+#[test]
+fn what_is_reflected_again_and_again_is_followed() {
+    let scene = Arc::new(furnace());
+    let mut random = Random::of_part(9, 0);
+    let walls = |_: usize| Sensor {
+        at: v(random.between(0.1, 4.9), random.between(0.1, 3.9), 0.0),
+        normal: DVec3::Z,
+    };
+    let sensors: Vec<Sensor> = (0..256).map(walls).collect();
+    for tolerance in [0.9, 0.3] {
+        let mut session = Session::new(Arc::clone(&scene), at_tolerance(tolerance)).unwrap();
+        session.step(0, 0.0).unwrap();
+        let count = sensors.len() as f64;
+        let off =
+            session.irradiances_at(&sensors).iter().map(|e| e[0] / 5.0 - 1.0).sum::<f64>() / count;
+        let said = session.accuracy_at(&sensors).mean;
+        println!("furnace at {tolerance}: {:+.2} % off, said {:+.2} %", 100.0 * off, 100.0 * said);
+        assert!((said - off).abs() < 0.007, "{said} of {off}");
+    }
+}

@@ -26,6 +26,8 @@ pub struct Accuracy {
     pub rms: f64,
     /// Root mean square error that these points and walks can tell from none: of what is below, `rms` says nothing.
     pub resolved: f64,
+    /// Mean of these errors, with its sign: positive where the solution is too bright.
+    pub mean: f64,
     /// Largest of these errors, with its sign: positive where the solution is too bright.
     pub largest: f64,
     /// Where that is, metres.
@@ -110,6 +112,7 @@ impl Accuracy {
             points: found.len() as u32,
             rms: rms(&sensors),
             resolved,
+            mean: mean_of(&found.iter().map(mean).collect::<Vec<f64>>()),
             largest: worst.map_or(0.0, mean),
             largest_at: worst.map_or([0.0; 3], |f| f.at.to_array()),
             mesh_rms: (!mesh.is_empty()).then(|| rms(&mesh)),
@@ -196,10 +199,10 @@ impl Meter<'_> {
         }
         let read = all(look(Purpose::Sensor).irradiance());
         let (mut sensor, mut mesh) = ([0.0; WALKS], place.mesh.map(|_| [0.0; WALKS]));
+        // Relative to what leaves say: a divisor that walks scatter would bend their mean.
+        let scale = all(by_lines);
         for walk in 0..WALKS {
             let right = all(by_lines) + all(self.error_of_sources(&sources, k * WALKS + walk));
-            // Where the solution is much too bright a single walk may say that less than nothing arrives.
-            let scale = right.max(0.25 * all(by_lines));
             sensor[walk] = (read - right) / scale;
             if let (Some(mesh), Some(said)) = (&mut mesh, place.mesh) {
                 mesh[walk] = (said - right) / scale;

@@ -112,8 +112,29 @@ fn instants(frames: &[u32]) -> impl Iterator<Item = u32> + '_ {
 
 /// An error if nothing in a scene ever emits.
 pub(crate) fn required(scene: &Scene) -> Result<(), Failure> {
+    match how_to_light(scene) {
+        None => Ok(()),
+        Some(help) => {
+            let what = format!("{}, so there is nothing to solve", nothing_emits(scene));
+            Err(Failure::new(what).help(help))
+        }
+    }
+}
+
+/// A warning that all readings are 0 if nothing in a scene ever emits.
+pub(crate) fn warning(scene: &Scene) -> Option<String> {
+    let help = how_to_light(scene)?;
+    Some(format!("warning: {}, so every irradiance is 0: {help}", nothing_emits(scene)))
+}
+
+fn nothing_emits(scene: &Scene) -> String {
+    format!("nothing in {} emits light", output::name(&scene.name))
+}
+
+/// What to do where nothing in a scene ever emits.
+fn how_to_light(scene: &Scene) -> Option<String> {
     if scene.emits() {
-        return Ok(());
+        return None;
     }
     let mut used: Vec<usize> = scene.patches.iter().map(|p| p.material.0 as usize).collect();
     used.sort_unstable();
@@ -123,15 +144,11 @@ pub(crate) fn required(scene: &Scene) -> Result<(), Failure> {
     if used.len() > NAMED {
         names.push("... (`relume info` lists all)".to_owned());
     }
-    let what = format!(
-        "nothing in {} emits light, so there is nothing to solve",
-        output::name(&scene.name)
-    );
-    Err(Failure::new(what).help(format_args!(
+    Some(format!(
         "light it with --sky uniform=1, or make a material shine with --emit MATERIAL=RADIANCE (W/m2/sr), such as one \
          of {}; or add a light or an emitting material to the file",
         names.join(", ")
-    )))
+    ))
 }
 
 #[cfg(test)]

@@ -22,7 +22,8 @@ pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
     let started = now();
     let sensors = sensors::read(&args.sensors)?;
     let clip = Clip::of_file(&args.scene, &args.clip, TOLERANCE)?;
-    light::required(&clip.scene)?;
+    // Readings in the dark are right: a lamp may be switched off in one file of many.
+    light::warning(&clip.scene).iter().for_each(|line| clip.say(line));
     let riders = riders(&clip.scene, &args.sensors, &sensors)?;
     let hidden = inside(&clip, &riders, &args.sensors)?;
     clip.warn();

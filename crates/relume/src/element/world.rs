@@ -36,6 +36,23 @@ pub struct OccluderPolygon<'a> {
     pub corners: &'a [DVec3],
 }
 
+impl OccluderPolygon<'_> {
+    /// Distance of a point from the polygon, m.
+    pub fn distance(&self, p: DVec3) -> f64 {
+        let foot = p - self.plane.normal * self.plane.distance(p);
+        if self.edges.iter().all(|edge| edge.distance(foot) >= 0.0) {
+            return self.plane.distance(p).abs();
+        }
+        let to_edge = |k: usize| {
+            let (from, to) = (self.corners[k], self.corners[(k + 1) % self.corners.len()]);
+            let along = to - from;
+            let share = (p - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
+            (p - (from + along * share.clamp(0.0, 1.0))).length()
+        };
+        (0..self.corners.len()).map(to_edge).fold(f64::INFINITY, f64::min)
+    }
+}
+
 /// Everything about the present poses that pairs need: derived, and dropped at any time.
 #[derive(Clone, Debug)]
 pub struct WorldView {

@@ -394,6 +394,13 @@ impl Placed<'_> {
             area: if self.forest.is_distant(id) { 0.0 } else { area },
             reference_area: self.reference_area(brightness, id),
             light: brightness.of(self.forest, id),
+            own_area: area,
+            surface_area: match self.forest.is_distant(id) {
+                true => {
+                    2.0 * std::f64::consts::PI * (place_a.centre - place_b.centre).length_squared()
+                }
+                false => self.forest.area_m2(self.forest.patch_root(self.patch_of(id))),
+            },
         };
         let distant = self.forest.is_distant(a) || self.forest.is_distant(b);
         let mut x = match in_contact {
@@ -664,11 +671,15 @@ impl Placed<'_> {
                         area: e.area,
                         reference_area: self.reference_area(brightness, element),
                         light: brightness.of(self.forest, element),
+                        own_area: 0.0,
+                        surface_area: 0.0,
                     },
                     End {
                         area: 0.0,
                         reference_area: f64::INFINITY,
                         light: brightness.of(self.forest, light),
+                        own_area: 0.0,
+                        surface_area: 0.0,
                     },
                 );
                 let ends = (&ends.0, &ends.1);

@@ -80,6 +80,9 @@ pub struct BlockerSizes {
     pub least_m2: f64,
     /// Area of all blockers, m2.
     pub all_m2: f64,
+    /// For each end, how far an edge of a blocker moves over the other end, at most, in units of how far the point on
+    /// this one moves that it is seen from: the ratio of the blocker's distances from the two centres.
+    pub leverage: (f64, f64),
 }
 
 impl BlockerSizes {
@@ -88,6 +91,7 @@ impl BlockerSizes {
         lamps_m: (f64::INFINITY, f64::INFINITY),
         least_m2: f64::INFINITY,
         all_m2: f64::INFINITY,
+        leverage: (0.0, 0.0),
     };
 }
 
@@ -279,7 +283,24 @@ impl<'a> Shaft<'a> {
             lamps_m: self.lamp_widths_m(blockers),
             least_m2: blockers.iter().map(area).fold(f64::INFINITY, f64::min),
             all_m2: blockers.iter().map(area).sum(),
+            leverage: self.leverage(blockers),
         }
+    }
+
+    /// For each end the largest ratio of a blocker's distance from the other end's centre to that from its own.
+    fn leverage(&self, blockers: &[PatchId]) -> (f64, f64) {
+        let mut most = (0.0_f64, 0.0_f64);
+        for &patch in blockers {
+            let (own, a, b) = self.seen_by(Some(self.view.patch(patch).body));
+            let polygon = match own {
+                true => self.view.occluder_in_body(patch),
+                false => self.view.occluder(patch),
+            };
+            let from = |e: &WorldElement| polygon.distance(e.centre).max(f64::MIN_POSITIVE);
+            let (from_a, from_b) = (from(a), from(b));
+            most = (most.0.max(from_b / from_a), most.1.max(from_a / from_b));
+        }
+        most
     }
 
     /// Whether both ends lie in one plane and touch.

@@ -9,7 +9,7 @@ use relume::session::{Closure, Energy, Grouping, Options, Sensor, Session};
 use relume_judge::path::{self, Site};
 use relume_judge::rows;
 
-use crate::outside::case::{Case, Mover, v};
+use crate::outside::case::{Case, Mover, cuboid_sides, v};
 use crate::outside::verdict::{Table, overlap_is_said};
 
 /// A closed room of 4 x 3 x 2.5 m, `r-x0` to `r-z1`.
@@ -290,14 +290,59 @@ fn light_beside_a_small_device_is_within_the_tolerance() {
     let case = device_in_a_hall();
     // As found, 1.9, 1.2 and 0.3 %.
     for tolerance in [0.1, 0.02, 0.005] {
-        let mut session = session(&case, tolerance, true);
-        session.step(0, 0.0).unwrap();
-        let found = session.irradiances_at(&case.world_sensors());
-        let off = |(found, right): (&[f64; 3], &f64)| (found[0] / right - 1.0).powi(2);
-        let mean = found.iter().zip(&right).map(off).sum::<f64>() / right.len() as f64;
-        let rms = mean.sqrt();
-        println!("{rms:.4} at {tolerance}");
-        assert!(rms <= tolerance, "{rms} at {tolerance}: {found:?}");
+        let rms = rms_off(&case, &right, tolerance);
+        assert!(rms <= tolerance, "{rms} at {tolerance}");
+    }
+}
+
+/// RMS of the relative errors of irradiance at a case's sensors.
+fn rms_off(case: &Case, right: &[f64], tolerance: f64) -> f64 {
+    let mut session = session(case, tolerance, true);
+    session.step(0, 0.0).unwrap();
+    let found = session.irradiances_at(&case.world_sensors());
+    let off = |(found, right): (&[f64; 3], &f64)| (found[0] / right - 1.0).powi(2);
+    let rms = (found.iter().zip(right).map(off).sum::<f64>() / right.len() as f64).sqrt();
+    println!("{rms:.4} at {tolerance}");
+    rms
+}
+
+/// Three houses in a row, 1.2 m apart, on a plain under a luminous ceiling of 80 m; y is up.
+fn lanes_between_houses() -> Case {
+    let mut case = Case::new(0.02);
+    let square = |y: f64, x: f64, z: f64| [v(-x, y, -z), v(-x, y, z), v(x, y, z), v(x, y, -z)];
+    case.panel("ground", &square(0.0, 20.0, 12.0), false);
+    for (k, height) in [7.0, 11.0, 9.0].into_iter().enumerate() {
+        let x = -9.6 + 7.2 * k as f64;
+        for (side, corners) in cuboid_sides(v(x, 0.0, -4.0), v(x + 6.0, height, 4.0)) {
+            if side != "y0" {
+                case.panel(&format!("house {k} {side}"), &corners, false);
+            }
+        }
+    }
+    let mut above = square(30.0, 40.0, 40.0);
+    above.reverse();
+    let sky = case.panel("sky", &above, false);
+    (sky.reflectance, sky.exitance) = (0.0, 3.0 * PI);
+    for (x, normal) in [(-3.6, 1.0), (-2.4, -1.0), (3.6, 1.0), (4.8, -1.0)] {
+        for (y, z) in [(1.5, 0.7), (4.0, -2.2), (6.2, 2.9)] {
+            case.sensors.push(Sensor { at: v(x + 1e-5 * normal, y, z), normal: v(normal, 0., 0.) });
+        }
+    }
+    case
+}
+
+#[test]
+fn walls_of_narrow_lanes_are_within_the_tolerance() {
+    // Path tracing, +-0.18 %.
+    let right = [
+        0.375_71, 0.692_83, 1.331_3, 0.394_57, 0.785_56, 2.354_6, 0.338_29, 0.580_09, 1.056_0,
+        0.334_13, 0.561_38, 0.972_94,
+    ];
+    let case = lanes_between_houses();
+    // As found, 4.9, 3.7 and 1.5 %; 13 and 6.1 % at the last two where no links count as hidden alike.
+    for tolerance in [0.1, 0.05, 0.02] {
+        let rms = rms_off(&case, &right, tolerance);
+        assert!(rms <= tolerance, "{rms} at {tolerance}");
     }
 }
 

@@ -512,21 +512,21 @@ impl Run<'_> {
         self.links = entry.links;
         self.energy = entry.energy;
         self.suspects = entry.suspects.clone();
-        entry.accuracy = self.estimates.of(&self.session, frame, None);
+        entry.accuracy = self.estimates.of(clip::solved(&self.session), frame, None);
         if let Some(path) = self.job.picture_path(frame) {
             self.draw(frame, &path)?;
         }
         let mut finished = self.finished();
         finished.report.add(&entry)?;
         if let Some(table) = &mut finished.events {
-            table.add(frame, &self.session.events());
+            table.add(frame, &clip::solved(&self.session).events());
         }
         Ok(())
     }
 
     fn draw(&mut self, frame: u32, path: &Path) -> Result<(), Failure> {
         let Some((_, flags)) = &self.job.picture else { return Ok(()) };
-        let snapshot = clip::snapshot(&self.session, flags);
+        let snapshot = clip::snapshot(clip::solved(&self.session), flags);
         if self.exposure_is_open() {
             self.choose_exposure(frame, &snapshot)?;
         }
@@ -581,7 +581,7 @@ impl Run<'_> {
             .step(frame, frames::time_of(frame, fps))
             .map_err(|error| self.session_failure(error))?;
         let Some((_, flags)) = &self.job.picture else { return Ok(()) };
-        let snapshot = clip::snapshot(&session, flags);
+        let snapshot = clip::snapshot(clip::solved(&session), flags);
         self.choose_exposure(frame, &snapshot)
     }
 

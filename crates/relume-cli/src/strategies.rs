@@ -14,7 +14,7 @@ use crate::figures::{mean, ratio, standard_deviation, time, times, whole};
 use crate::interrupt;
 use crate::output;
 use crate::progress::Progress;
-use crate::sequence::{Sequence, Stepping};
+use crate::sequence::{Sequence, Stepping, solved};
 
 /// Name of the format.
 const SCHEMA: &str = "relume-strategies/1";
@@ -142,8 +142,8 @@ impl<Q: Sequence> Comparison<'_, Q> {
                 hashes[at] = report.hash;
             }
             for at in 0..count {
-                let missed = missed(&self.sessions[at], &self.sessions[REINSPECT]);
-                let error = radiosity_error(&self.sessions[at], &self.sessions[SCRATCH]);
+                let missed = missed(solved(&self.sessions[at]), solved(&self.sessions[REINSPECT]));
+                let error = radiosity_error(solved(&self.sessions[at]), solved(&self.sessions[SCRATCH]));
                 let cell = &mut cells[at];
                 (cell.missed_states, cell.missed_occlusions) = (missed.states, missed.occlusions);
                 (cell.rms_error, cell.max_error) = (error.rms, error.max);

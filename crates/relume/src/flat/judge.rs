@@ -78,7 +78,7 @@ impl PlaneView {
 }
 
 /// The forest of the plane placed at one instant, with what decides.
-pub(super) struct FlatPlaced<'a> {
+pub(crate) struct FlatPlaced<'a> {
     pub(super) scene: &'a FlatScene,
     pub(super) forest: &'a mut FlatForest,
     pub(super) now: &'a PlaneView,

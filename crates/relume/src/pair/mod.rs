@@ -29,6 +29,6 @@ pub use tree::{
 pub(crate) use outlook::{Moves, Outlook};
 
 pub use update::{
-    Changes, Edit, EventKind, Held, Hierarchy, Judge, Judgement, LinkEvent, OutOfMemory, Record,
-    Stale, Verdict, Work, update,
+    Changes, Edit, EventKind, Held, Hierarchy, Judge, Judgement, LinkEvent, OutOfMemory, Pairs,
+    Record, Scope, Stale, Verdict, Work, update,
 };

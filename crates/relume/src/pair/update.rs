@@ -295,21 +295,38 @@ const CHUNK: usize = 128;
 /// Pairs judged before their results are applied.
 const BLOCK: usize = 1 << 15;
 
-/// Brings `tree`, with the hash over its links, up to date.
-///
-/// Edits and events are recorded if `record` says so. `fresh` are pairs (ascending) that an update with the same
-/// [`Judge::stale`] has refined already: all of their children are looked at. `may_go_on` is asked
-/// after each block with the tree, the number of elements and the scratch memory in bytes.
+/// A pair tree with the hash over its links.
+pub struct Pairs<'a> {
+    /// The tree.
+    pub tree: &'a mut PairTree,
+    /// The hash.
+    pub hash: &'a mut PairHash,
+}
+
+/// What an update is about.
+pub struct Scope<'a> {
+    /// What may stand between any two elements.
+    pub candidates: &'a [u32],
+    /// What is written down.
+    pub record: Record,
+    /// Pairs (ascending) that an update with the same [`Judge::stale`] has refined already: all of their children are
+    /// looked at.
+    pub fresh: &'a [PairId],
+    /// Asked after each block with the tree, the number of elements and the scratch memory in bytes.
+    pub may_go_on: &'a dyn Fn(&PairTree, usize, u64) -> bool,
+}
+
+/// Brings a tree, with the hash over its links, up to date.
 ///
 /// # Errors
-/// [`OutOfMemory`] as soon as `may_go_on` says no; the tree is of no use then.
+/// [`OutOfMemory`] as soon as `may_go_on` says no: what was looked at until then is up to date, the rest is as it was, and
+/// pairs may be left unjudged.
 pub fn update<J: Judge>(
-    (tree, hash): (&mut PairTree, &mut PairHash),
+    Pairs { tree, hash }: Pairs<'_>,
     judge: &mut J,
-    root_candidates: &[u32],
-    (record, fresh): (Record, &[PairId]),
-    may_go_on: &dyn Fn(&PairTree, usize, u64) -> bool,
+    scope: &Scope<'_>,
 ) -> Result<Changes, OutOfMemory> {
+    let &Scope { candidates: root_candidates, record, fresh, may_go_on } = scope;
     let mut editor =
         Editor { tree, hash, judge, record, changes: Changes::default(), next: Wave::default() };
     let list = editor.next.push_candidates(root_candidates);

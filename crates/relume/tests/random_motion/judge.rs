@@ -59,7 +59,7 @@ fn follow_unguarded(recipe: &Recipe) -> Result<Seen, String> {
         let mut cold = Session::new(Arc::clone(&scene), recipe.options()).unwrap();
         let two = cold.step(k as u32, time_s).map_err(|e| e.to_string())?;
         let drift =
-            agree(&scene, (&one, &warm.snapshot()), (&two, &cold.snapshot())).map_err(|e| {
+            agree(&scene, (&one, &warm.frame().unwrap().solution()), (&two, &cold.frame().unwrap().solution())).map_err(|e| {
                 format!("step {k} to {time_s} s: {e}{}", first_differences(&warm, &cold))
             })?;
         if k % 5 == 4 {

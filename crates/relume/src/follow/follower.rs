@@ -494,6 +494,7 @@ impl<S: Space> Failed<S> {
         }
         state.break_promise();
         state.ticks = Ticks::default();
+        state.space.stop();
         // A solution that did not settle is no guess.
         state.is_dim = !matches!(why, Why::OutOfMemory | Why::Cancelled);
         Some(state)

@@ -71,6 +71,8 @@ pub(crate) trait Space: Sized + Send {
     fn is_at(&self, goal: &Self::Goal<'_>) -> bool;
     /// Takes over the goal's promises where nothing else differs. Whether bodies move as they promised before.
     fn stay(&mut self, goal: &Self::Goal<'_>) -> bool;
+    /// Is told that a frame was left half-way: what is kept with a pair may be of either of its instants.
+    fn stop(&mut self) {}
     /// Whether nothing but the clip moves anything since the last frame, so that links may be extrapolated on.
     fn goes_on(&self, goal: &Self::Goal<'_>) -> bool;
 

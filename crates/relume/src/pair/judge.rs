@@ -114,7 +114,7 @@ impl Judge for Placed<'_> {
     }
 
     fn withstands(&self, a: ElementId, b: ElementId, margin: Margin) -> Option<Margin> {
-        margin.after(&self.since?.growth(self.forest, a, b))
+        margin.after(&self.since?.growth(self.forest, a, b)?)
     }
 
     fn stale(&self, a: ElementId, b: ElementId, certified: bool) -> Stale {

@@ -72,6 +72,8 @@ pub struct SpaceState {
     pub(crate) sound_world: World,
     /// Facets of which another part is covered than when they were solved, ascending.
     pub(crate) touched: Vec<ElementId>,
+    /// Whether a frame was left half-way.
+    is_stopped: bool,
 }
 
 /// What was before a frame.
@@ -104,6 +106,7 @@ impl Space for SpaceState {
             coarse: Coarse::default(),
             sound_world: world.clone(),
             touched: Vec::new(),
+            is_stopped: false,
         }
     }
 
@@ -115,6 +118,10 @@ impl Space for SpaceState {
         self.scene = Arc::clone(&goal.bed.scene);
         let held = std::mem::replace(&mut self.held, goal.held.clone());
         held.promises_as(goal.held)
+    }
+
+    fn stop(&mut self) {
+        self.is_stopped = true;
     }
 
     fn goes_on(&self, goal: &Goal<'_>) -> bool {
@@ -132,7 +139,8 @@ impl Space for SpaceState {
     }
 
     fn since<'m>(&self, _: &Goal<'_>, was: &'m Was) -> Since<'m> {
-        Since::new(&self.scene, &self.forest, &was.view, &self.view)
+        let since = Since::new(&self.scene, &self.forest, &was.view, &self.view);
+        if self.is_stopped { since.after_a_stop() } else { since }
     }
 
     fn ahead(&self, goal: &Goal<'_>, was: &Was, update: Update, clocked: Clocked<'_>) -> Ahead {
@@ -292,7 +300,7 @@ impl Space for SpaceState {
     }
 
     fn finish(&mut self, is_settled: bool) {
-        self.touched = Vec::new();
+        (self.touched, self.is_stopped) = (Vec::new(), false);
         if is_settled {
             self.sound_world = self.world.clone();
         }

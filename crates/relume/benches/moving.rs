@@ -129,7 +129,12 @@ impl<'a> Errors<'a> {
         let frames = (0..sequence.frames).step_by(sequence.sampled as usize);
         let options = fixed(Oracle::Error, REFERENCE);
         let references = frames
-            .map(|frame| (frame, cells(&cold(scene, &options, frame, &pool).session.frame().unwrap().solution())))
+            .map(|frame| {
+                (
+                    frame,
+                    cells(&cold(scene, &options, frame, &pool).session.frame().unwrap().solution()),
+                )
+            })
             .collect();
         Errors { scene, pool, references }
     }

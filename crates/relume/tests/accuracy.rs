@@ -123,8 +123,14 @@ fn what_is_reflected_again_and_again_is_followed() {
         let mut session = Session::new(Arc::clone(&scene), at_tolerance(tolerance)).unwrap();
         session.step(0, 0.0).unwrap();
         let count = sensors.len() as f64;
-        let off =
-            session.frame().unwrap().irradiances_at(&sensors).iter().map(|e| e[0] / 5.0 - 1.0).sum::<f64>() / count;
+        let off = session
+            .frame()
+            .unwrap()
+            .irradiances_at(&sensors)
+            .iter()
+            .map(|e| e[0] / 5.0 - 1.0)
+            .sum::<f64>()
+            / count;
         let said = session.frame().unwrap().accuracy_at(&sensors).mean;
         println!("furnace at {tolerance}: {:+.2} % off, said {:+.2} %", 100.0 * off, 100.0 * said);
         assert!((said - off).abs() < 0.007, "{said} of {off}");

@@ -280,7 +280,10 @@ fn a_point_to_a_polygon() {
         println!("parallel {a} {b} {c}: {e:.9} exact {f:.9}");
         assert!((e / f - 1.0).abs() < 1e-6, "{a} {b} {c}: {e} {f}");
         assert_eq!(session.frame().unwrap().irradiance_at(DVec3::ZERO, -DVec3::Z), [0.0; 3]);
-        assert_eq!(session.frame().unwrap().irradiance_at(v(0.0, 0.0, c * 1.5), -DVec3::Z), [0.0; 3]);
+        assert_eq!(
+            session.frame().unwrap().irradiance_at(v(0.0, 0.0, c * 1.5), -DVec3::Z),
+            [0.0; 3]
+        );
     }
     for (a, b, c) in [(1.0, 1.0, 1.0), (2.0, 0.3, 0.1), (1.0, 4.0, 0.01)] {
         let upright = [v(c, 0.0, 0.0), v(c, 0.0, a), v(c, b, a), v(c, b, 0.0)];

@@ -57,7 +57,8 @@ fn any_number_of_threads_gives_the_same_bits() {
             pool.install(|| {
                 let mut s = session(&scene, &options);
                 let frames = [step(&mut s, 1), step(&mut s, 3)];
-                let probe = s.frame().unwrap().irradiance_at(common::v(0.31, 0.0, 0.42), glam::DVec3::Y);
+                let probe =
+                    s.frame().unwrap().irradiance_at(common::v(0.31, 0.0, 0.42), glam::DVec3::Y);
                 (frames, probe.map(f64::to_bits))
             })
         };
@@ -103,7 +104,10 @@ fn there_and_back_again_is_where_it_was() {
         }
         let before = bits(&s.frame().unwrap().solution(), &there[0].0);
         let again = s.step(0, TIMES[0]).unwrap();
-        assert!(bits(&s.frame().unwrap().solution(), &there[0].0) == before, "{name}: standing still");
+        assert!(
+            bits(&s.frame().unwrap().solution(), &there[0].0) == before,
+            "{name}: standing still"
+        );
         assert_eq!((again.examined, again.sweeps), (0, 0), "{name}: standing still is work");
     }
 }

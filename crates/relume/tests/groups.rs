@@ -300,7 +300,10 @@ fn a_small_mover_among_groups_has_few_receivers_gathered() {
         let report = warm.step(frame as u32, time_s).unwrap();
         let (of_cold, want) = built(&scene, &options, time_s);
         assert_eq!(state(&report), state(&want), "at {time_s}");
-        assert!(radiosity_gap(warm.solved().unwrap(), of_cold.solved().unwrap()).is_ok(), "at {time_s}");
+        assert!(
+            radiosity_gap(warm.solved().unwrap(), of_cold.solved().unwrap()).is_ok(),
+            "at {time_s}"
+        );
         println!("{time_s}: {} gathered of {}", report.gathers, report.elements);
         assert!(frame == 0 || report.gathers < report.elements / 4, "{report:?}");
     }

@@ -161,14 +161,19 @@ fn commands_leave_the_last_solution() {
     let was = seen(session.solve().unwrap());
     let mesh = session.frame().unwrap().snapshot();
     let mut r = Random(5);
-    let commands =
-        [insertion(&mut r), Command::Remove(BodyId(4)), Command::Remove(BodyId(3)), insertion(&mut r)];
+    let commands = [
+        insertion(&mut r),
+        Command::Remove(BodyId(4)),
+        Command::Remove(BodyId(3)),
+        insertion(&mut r),
+    ];
     for command in commands {
         session.apply(command).unwrap();
         assert_eq!(seen(session.frame().unwrap()), was);
         assert_eq!(session.frame().unwrap().snapshot(), mesh);
     }
-    let bad = NewBody::new("bad").with_mesh("bad", relume::MaterialId(99), &[[0.0; 3]; 3], &[[0, 1, 2]]);
+    let bad =
+        NewBody::new("bad").with_mesh("bad", relume::MaterialId(99), &[[0.0; 3]; 3], &[[0, 1, 2]]);
     assert!(session.apply(Command::Insert(bad)).is_err());
     assert!(session.apply(Command::hide(BodyId(77))).is_err());
     assert_eq!(seen(session.frame().unwrap()), was);

@@ -8,8 +8,18 @@ use std::path::{Path, PathBuf};
 
 /// The rooms of the engine, from the ground up. A room may use those before it.
 const ROOMS: [&str; 12] = [
-    "geometry", "scene", "element", "transport", "event", "pair", "solver", "follow", "space", "read",
-    "session", "flat",
+    "geometry",
+    "scene",
+    "element",
+    "transport",
+    "event",
+    "pair",
+    "solver",
+    "follow",
+    "space",
+    "read",
+    "session",
+    "flat",
 ];
 
 /// What the phases of a frame must not know, though it is above them: where things are is asked of a space.

@@ -117,7 +117,11 @@ fn irradiance_on_a_plane_follows_the_closed_form() {
                 let want = exact(p) * I[c] / I[0];
                 assert!((e[c] - want).abs() <= 1e-9 * want, "{name} at {p}: {} {want}", e[c]);
             }
-            assert_eq!(session.frame().unwrap().irradiance_at(p, -DVec3::Z), [0.0; 3], "{name} from below");
+            assert_eq!(
+                session.frame().unwrap().irradiance_at(p, -DVec3::Z),
+                [0.0; 3],
+                "{name} from below"
+            );
         }
         let off = mesh_error(&session, exact);
         println!("{name}: mesh {off:.1e} RMS of the mean irradiance, {} links", report.links);
@@ -255,7 +259,10 @@ fn a_body_that_is_absent_casts_no_shadow_and_carries_nothing() {
     let before = session.step(0, 0.0).unwrap();
     let points = [v(0.0, 0.0, 0.0), v(0.1, 0.3, 0.0), v(-0.7, 0.8, 0.0)];
     for p in points {
-        let (e, want) = (session.frame().unwrap().irradiance_at(p, DVec3::Z), empty.frame().unwrap().irradiance_at(p, DVec3::Z));
+        let (e, want) = (
+            session.frame().unwrap().irradiance_at(p, DVec3::Z),
+            empty.frame().unwrap().irradiance_at(p, DVec3::Z),
+        );
         assert!((e[0] / want[0] - 1.0).abs() < 1e-5, "{e:?} {want:?}");
     }
     let visitor = patches_of(session.scene(), "visitor");

@@ -108,7 +108,8 @@ fn what_was_summed_before_leaves_no_trace() {
         let found = kept.factors(warm.frame().unwrap());
         let mut cold = session(&joined.scene);
         cold.step(0, time_s).unwrap();
-        let anew = PartFactors::new(&scene, &joined, grouping.clone()).factors(cold.frame().unwrap());
+        let anew =
+            PartFactors::new(&scene, &joined, grouping.clone()).factors(cold.frame().unwrap());
         assert!(found == anew, "at {time_s} s");
     }
 }
@@ -119,7 +120,8 @@ fn cells_in_one_group_are_as_the_whole_wall() {
     let joined = scene.joined();
     let mut session = session(&joined.scene);
     session.step(0, 0.4).unwrap();
-    let by_body = PartFactors::new(&scene, &joined, Grouping::by_body(&scene)).factors(session.frame().unwrap());
+    let by_body = PartFactors::new(&scene, &joined, Grouping::by_body(&scene))
+        .factors(session.frame().unwrap());
     let whole = session.frame().unwrap().factors(&Grouping::by_body(&joined.scene));
     for row in 0..2 {
         for ((to, one), (_, other)) in by_body.row(row).zip(whole.row(row)) {

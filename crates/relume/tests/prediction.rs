@@ -53,7 +53,11 @@ fn certificates_miss_nothing_and_spare_work() {
         let updates = [Update::Certificate, Update::Reinspect];
         let seen = follow(&options, updates, 47, |frame, [(one, a), (two, b)]| {
             assert_eq!(one.hash, two.hash, "{name}, frame {frame}");
-            assert_eq!(missed(a.solved().unwrap(), b.solved().unwrap()), Missed::default(), "{name}, frame {frame}");
+            assert_eq!(
+                missed(a.solved().unwrap(), b.solved().unwrap()),
+                Missed::default(),
+                "{name}, frame {frame}"
+            );
             assert_eq!((one.changed, one.segments), (two.changed, two.segments));
             assert_eq!(two.followed + two.certified + two.extrapolated, 0);
             [one.examined, two.examined, one.followed, one.certified, one.changed]
@@ -119,7 +123,12 @@ fn a_smaller_error_asked_for_is_a_smaller_error() {
 fn once_all_is_at_rest_nothing_is_lost() {
     let options = form_factor_oracle(0.05, 1e-3);
     let last = follow(&options, [SEVEN, Update::Reinspect], 70, |_, [(one, a), (two, b)]| {
-        (one.hash == two.hash, missed(a.solved().unwrap(), b.solved().unwrap()), one.extrapolated, one.examined)
+        (
+            one.hash == two.hash,
+            missed(a.solved().unwrap(), b.solved().unwrap()),
+            one.extrapolated,
+            one.examined,
+        )
     });
     assert!(!last[30].0, "the test means nothing if nothing is extrapolated");
     let (same, missed, extrapolated, examined) = last[last.len() - 1];

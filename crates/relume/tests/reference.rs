@@ -108,8 +108,10 @@ fn at_sensors(tolerance: f64, frames: &[u32]) -> (Misses, Misses) {
         let report = session.step(frame, f64::from(frame) / 24.0).unwrap();
         let snapshot = session.frame().unwrap().solution();
         let here: Vec<Sensor> = sensors().into_iter().filter(|s| s.frame == frame).collect();
-        let values: Vec<[f64; 3]> =
-            here.par_iter().map(|s| session.frame().unwrap().irradiance_at(s.at, s.normal)).collect();
+        let values: Vec<[f64; 3]> = here
+            .par_iter()
+            .map(|s| session.frame().unwrap().irradiance_at(s.at, s.normal))
+            .collect();
         let (mut g, mut m) = (Misses::default(), Misses::default());
         for (s, e) in here.iter().zip(values) {
             let (leaf, p) = leaf_at(&snapshot, s.at, s.normal).expect("sensors lie on surfaces");

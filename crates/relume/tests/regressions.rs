@@ -36,7 +36,8 @@ fn brightest(session: &Session, surface: &str) -> f64 {
 
 /// Largest difference of radiosities over a named surface, first channel.
 fn apart(one: &Session, two: &Session, surface: &str) -> f64 {
-    let [one, two] = [one, two].map(|s| (s.frame().unwrap().solution(), common::patches_of(s.scene(), surface)));
+    let [one, two] =
+        [one, two].map(|s| (s.frame().unwrap().solution(), common::patches_of(s.scene(), surface)));
     let leaves = |s: &(relume::session::Snapshot, Vec<relume::scene::PatchId>)| -> Vec<f64> {
         let of = s.1.iter().flat_map(|&p| s.0.leaves_of(p));
         of.map(|l| f64::from(l.radiosity[0])).collect()

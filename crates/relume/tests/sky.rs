@@ -158,7 +158,9 @@ fn the_sun_shines_aslant_and_its_shadows_are_soft() {
     let edge = 3.0 - height / elevation.tan();
     let width = height / (elevation - radius).tan() - height / (elevation + radius).tan();
     // In the east the sun: shadow is west of the wall, from x = 3 down to the edge.
-    let at = |x: f64| session.frame().unwrap().irradiance_at(v(x, 0.0, 0.0), UP)[0] / (500.0 * elevation.sin());
+    let at = |x: f64| {
+        session.frame().unwrap().irradiance_at(v(x, 0.0, 0.0), UP)[0] / (500.0 * elevation.sin())
+    };
     close(at(edge - 0.6 * width), 1.0, 2e-3);
     assert!(at(edge + 0.6 * width) < 1e-6);
     // Of a disc the share above a chord at height h of its radius.
@@ -433,14 +435,22 @@ fn a_picture_lights_from_all_round_and_its_brightest_pixel_is_a_lamp() {
     let (towards, solid) = pixel(at.0, at.1);
     let lamp = (f64::from(radiance) - 0.5) * solid;
     assert!(towards.x > 0.5 && towards.z < -0.1, "{towards}");
-    close(session.frame().unwrap().irradiance_at(DVec3::ZERO, UP)[0], 0.5 * PI + lamp * towards.y, 5e-3);
+    close(
+        session.frame().unwrap().irradiance_at(DVec3::ZERO, UP)[0],
+        0.5 * PI + lamp * towards.y,
+        5e-3,
+    );
     let east = session.frame().unwrap().irradiance_at(v(5.0, 1.0, 0.0), DVec3::X);
     close(east[0], 0.5 * PI + lamp * towards.x, 5e-3);
     close(mean_of(&session, "wall"), east[0], 5e-3);
     // Turned by a quarter to the left, what was in the north-east is in the north-west.
     let session = solved(floor(1.0, wall), outside(90.0), 0.01);
     close(session.frame().unwrap().irradiance_at(v(5.0, 1.0, 0.0), DVec3::X)[2], 2.0 * PI, 5e-3);
-    close(session.frame().unwrap().irradiance_at(v(5.0, 1.0, 0.0), -DVec3::Z)[0], 0.5 * PI + lamp * towards.x, 5e-3);
+    close(
+        session.frame().unwrap().irradiance_at(v(5.0, 1.0, 0.0), -DVec3::Z)[0],
+        0.5 * PI + lamp * towards.x,
+        5e-3,
+    );
 }
 
 #[test]
@@ -512,6 +522,7 @@ fn what_is_outside_has_no_place_in_the_scene() {
     let energy = report.energy.unwrap();
     assert!((energy.absorbed_w / energy.emitted_w - 1.0).abs() < 1e-3, "{energy:?}");
     assert!(energy.escaped_w.abs() < 1e-3 * energy.emitted_w, "{energy:?}");
-    let sky_leaves = |p: u32| session.frame().unwrap().solution().leaves_of(relume::scene::PatchId(p)).len();
+    let sky_leaves =
+        |p: u32| session.frame().unwrap().solution().leaves_of(relume::scene::PatchId(p)).len();
     assert_eq!(sky_leaves(scene.patches.len() as u32), 0);
 }

@@ -248,7 +248,10 @@ fn comes_and_goes(scene: &Arc<Scene>) {
         assert_eq!(changed_elsewhere(&session, "slider", [&empty, &after]), 0, "{name}");
         let slider = scene.bodies.iter().position(|b| b.name == "slider").unwrap();
         if scene.pose(BodyId(slider as u32), 2.0).is_none() {
-            assert!(empty == after && session.frame().unwrap().pairs().1.counts() == elements, "{name}");
+            assert!(
+                empty == after && session.frame().unwrap().pairs().1.counts() == elements,
+                "{name}"
+            );
         }
     }
 }

@@ -96,8 +96,11 @@ fn screen() -> Drawing {
     for frame in 0..5 {
         session.step(frame, f64::from(frame));
         let mut sheet = Sheet::new(part, 128.0, 14.0);
-        let links: Vec<FlatLink> =
-            solved(&session).links().into_iter().filter(|l| walls_of(solved(&session), l) == (0, 1)).collect();
+        let links: Vec<FlatLink> = solved(&session)
+            .links()
+            .into_iter()
+            .filter(|l| walls_of(solved(&session), l) == (0, 1))
+            .collect();
         sheet.links(solved(&session), &links, LINK);
         sheet.walls(solved(&session).view());
         let (_, forest) = solved(&session).pairs();
@@ -128,8 +131,11 @@ fn approach() -> Drawing {
         left.walls(solved(&session).view());
         left.hierarchy(&solved(&session).elements());
         let mut right = Sheet::new(part, 130.0, 24.0);
-        let links: Vec<FlatLink> =
-            solved(&session).links().into_iter().filter(|l| walls_of(solved(&session), l).1 == 2).collect();
+        let links: Vec<FlatLink> = solved(&session)
+            .links()
+            .into_iter()
+            .filter(|l| walls_of(solved(&session), l).1 == 2)
+            .collect();
         right.links(solved(&session), &links, LINK);
         right.walls(solved(&session).view());
         right.ticks(&solved(&session).elements());

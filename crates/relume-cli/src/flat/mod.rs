@@ -8,7 +8,9 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-use relume::flat::{FlatFrame, FlatOptions, FlatScene, FlatSession, SvgError, Wall, parse, parse_svg};
+use relume::flat::{
+    FlatFrame, FlatOptions, FlatScene, FlatSession, SvgError, Wall, parse, parse_svg,
+};
 use relume::session::FrameReport;
 use relume_picture::drawing::Pen;
 use relume_picture::export::write_atomically;

@@ -159,9 +159,8 @@ impl Space for PlaneState {
 
     fn dynamic_links(&self, goal: &FlatGoal<'_>, tree: &PairTree) -> u64 {
         let Some(from) = goal.from else { return 0 };
-        let has_moved = |body: BodyIndex| {
-            from.poses()[body.0 as usize] != self.view.poses()[body.0 as usize]
-        };
+        let has_moved =
+            |body: BodyIndex| from.poses()[body.0 as usize] != self.view.poses()[body.0 as usize];
         let is_dynamic = |link: &Link| {
             let bodies = [link.a, link.b].map(|id| self.forest.body(id).expect("has a body"));
             bodies[0] != bodies[1] && bodies.into_iter().any(has_moved)

@@ -117,7 +117,8 @@ impl<S: Space> Follower<S> {
         goal: &S::Goal<'_>,
         order: &Order<'_>,
     ) -> Result<Self, Box<Failed<S>>> {
-        let last = last.filter(|last| order.update != Update::Scratch && last.leads_on(goal, order));
+        let last =
+            last.filter(|last| order.update != Update::Scratch && last.leads_on(goal, order));
         match last {
             Some(last) if last.is_at(goal) => Ok(last.stay(goal, &order.label)),
             // On a thread of the pool: entering it anew for every small task would cost more.

@@ -547,6 +547,20 @@ fn look_at<J: Judge>(
         }
         _ => {}
     }
+    judge_again(tree, judge, item, stale, (candidates, narrowed), &unaffected)
+}
+
+/// Judges a pair of which something changed; `unaffected` is its certificate where nothing but the light did.
+fn judge_again<J: Judge>(
+    tree: &PairTree,
+    judge: &J,
+    item: &Item,
+    stale: Stale,
+    (candidates, narrowed): (&[u32], &mut Vec<u32>),
+    unaffected: &dyn Fn() -> Option<Tick>,
+) -> Look {
+    let ((a, b), state) = (tree.ends(item.pair), tree.state(item.pair));
+    let start = narrowed.len();
     let candidates = if stale == Stale::Followed { &[] } else { item.list.of(candidates) };
     // What is extrapolated is not what an evaluation would find.
     let lit_anew = stale == Stale::Brightness && judge.lookahead().is_none();
@@ -561,29 +575,40 @@ fn look_at<J: Judge>(
         found.margin = found.margin.on_this_side();
     }
     let refined = matches!(found.verdict, Verdict::Refine(_) | Verdict::RefineSelf);
-    let may_be_clear = match refined {
+    let is_clear = match refined {
         true => stale == Stale::Moved && judge.may_be_clear(a, b, &narrowed[start..]),
         false => found.segments == 0,
     };
+    let may_be_clear = is_clear && !candidates.is_empty();
     if !refined {
         narrowed.truncate(start);
     }
-    let due = match (found.verdict, stale) {
-        (Verdict::Cull(_), _) => Some(judge.foresee(a, b, Finding::Culled)),
-        (_, Stale::Followed) => None,
-        // It is met again, perhaps still in the state that it had.
-        (Verdict::Hold, _) => Some(0),
-        (_, Stale::Brightness) => unaffected(),
-        (_, Stale::Moved) if may_be_clear && !candidates.is_empty() => {
-            Some(judge.foresee(a, b, Finding::Clear))
-        }
-        _ => Some(0),
+    let due = match stale == Stale::Brightness {
+        true if !matches!(found.verdict, Verdict::Cull(_) | Verdict::Hold) => unaffected(),
+        _ => certificate(judge, (a, b), (found.verdict, stale), may_be_clear),
     };
     let list = match stale {
         Stale::Followed => Below::Own(List::CLEAR),
         _ => Below::of(item.list, start, narrowed),
     };
     Look::Judged(found, stale, list, due)
+}
+
+/// Until when what was found of a pair cannot change; `None` where the pair keeps the certificate that it has.
+fn certificate<J: Judge>(
+    judge: &J,
+    (a, b): (ElementId, ElementId),
+    found: (Verdict, Stale),
+    may_be_clear: bool,
+) -> Option<Tick> {
+    match found {
+        (Verdict::Cull(_), _) => Some(judge.foresee(a, b, Finding::Culled)),
+        (_, Stale::Followed) => None,
+        // It is met again, perhaps still in the state that it had.
+        (Verdict::Hold, _) => Some(0),
+        (_, Stale::Moved) if may_be_clear => Some(judge.foresee(a, b, Finding::Clear)),
+        _ => Some(0),
+    }
 }
 
 /// What becomes of a dynamic pair that is not due; `None` if the light on it changed so much that it is

@@ -66,8 +66,7 @@ fn accuracy_of(found: &[Found]) -> Accuracy {
     let mean_of = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
     let sensors = squares(&|f| Some(f.sensor));
     let scatter: Vec<f64> = found.iter().map(|f| f.variance_of_square()).collect();
-    let resolved =
-        (2.0 * scatter.iter().sum::<f64>().sqrt() / found.len().max(1) as f64).sqrt();
+    let resolved = (2.0 * scatter.iter().sum::<f64>().sqrt() / found.len().max(1) as f64).sqrt();
     let mesh = squares(&|f| f.mesh);
     let rms = |squares: &[f64]| mean_of(squares).max(0.0).sqrt();
     let mean = |f: &Found| f.sensor.iter().sum::<f64>() / WALKS as f64;
@@ -187,7 +186,8 @@ impl Meter<'_> {
             let sensor = self.sensor(patch, at);
             let look = Look::new(self.solved, &sensor, Purpose::Listing);
             let (arrives, next) = look.by_source();
-            let e = WorldElement::new(&self.solved.space.view, &self.solved.space.forest, leaf, false);
+            let e =
+                WorldElement::new(&self.solved.space.view, &self.solved.space.forest, leaf, false);
             let said = look.radiosity_at(&e, leaf, at);
             let (scene, world) = (&self.solved.space.scene, &self.solved.space.world);
             let patch = &scene.patches[patch.0 as usize];

@@ -28,7 +28,8 @@ pub struct Event {
 
 /// The events of the last step, with names.
 pub(super) fn named(solved: &Solved) -> Vec<Event> {
-    let whole = |facet| name_of(&solved.space.scene, &solved.space.forest, ElementKey { facet, path: 1 });
+    let whole =
+        |facet| name_of(&solved.space.scene, &solved.space.forest, ElementKey { facet, path: 1 });
     with_names(&solved.events, &whole)
 }
 

@@ -133,11 +133,7 @@ struct Near {
 }
 
 impl<'a> Look<'a> {
-    pub(super) fn new(
-        solved: &'a Solved,
-        sensor: &Sensor,
-        purpose: Purpose,
-    ) -> Look<'a> {
+    pub(super) fn new(solved: &'a Solved, sensor: &Sensor, purpose: Purpose) -> Look<'a> {
         let slack_m = SENSOR_ROUNDING * solved.space.view.fixed_box(Forest::ROOT).diagonal();
         Look {
             solved,

@@ -96,8 +96,7 @@ impl Solution for Solved {
 
     fn reflectance_max(&self) -> f64 {
         let SpaceState { scene, world, .. } = &self.space;
-        let all =
-            scene.patches.iter().flat_map(|patch| world.reflectance(scene, patch));
+        let all = scene.patches.iter().flat_map(|patch| world.reflectance(scene, patch));
         all.fold(0.0, f64::max)
     }
 

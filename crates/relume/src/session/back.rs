@@ -54,13 +54,19 @@ impl Session {
                 (self.bed, self.is_planted, self.starts_anew) = (bed, false, true);
                 (self.edited, self.displaced) = (back.edited, back.displaced);
                 let goal = self.goal(&back.world, &back.held, None);
-                let found = Follower::found_again(None, &goal, self.order(FrameReport::default()), back.said);
+                let found = Follower::found_again(
+                    None,
+                    &goal,
+                    self.order(FrameReport::default()),
+                    back.said,
+                );
                 self.bed.scene = scene;
                 return found;
             }
         };
         let goal = self.goal(&world, &back.held, None);
-        let found = Follower::found_again(state, &goal, self.order(FrameReport::default()), back.said);
+        let found =
+            Follower::found_again(state, &goal, self.order(FrameReport::default()), back.said);
         if let Some(scene) = remains {
             let gone = scene.bodies.len() as u32..self.bed.scene.bodies.len() as u32;
             self.edited = Some(Edited { gone: gone.map(BodyId).collect(), fresh: BTreeSet::new() });

@@ -25,9 +25,9 @@ pub use crate::follow::{
     Watch,
 };
 pub use crate::read::{
-    Closure, Difference, ElementName, Event, EventKind, Factors, Frame, Grouping, Hash, Leaf, Mesh, Missed,
-    Open, PartFactors, RadiosityError, RadiosityGap, Sensor, Snapshot, Solution, Which, compare,
-    missed, radiosity_error, radiosity_gap,
+    Closure, Difference, ElementName, Event, EventKind, Factors, Frame, Grouping, Hash, Leaf, Mesh,
+    Missed, Open, PartFactors, RadiosityError, RadiosityGap, Sensor, Snapshot, Solution, Which,
+    compare, missed, radiosity_error, radiosity_gap,
 };
 
 use replant::{Edited, Start};
@@ -190,7 +190,8 @@ impl Session {
         let back = self.solved.as_ref().map(|solved| self.way_back(solved));
         let Start { last, remains } = self.follow_hands();
         let world = self.world();
-        let came_from = self.came_from.take().map(|from_s| self.bed.scene.at_but(from_s, &self.held));
+        let came_from =
+            self.came_from.take().map(|from_s| self.bed.scene.at_but(from_s, &self.held));
         let last_world = last.as_ref().map(|last| last.space.world.clone());
         let from = came_from.as_ref().or(last_world.as_ref());
         let goal = self.goal(&world, &self.held, from);
@@ -209,7 +210,8 @@ impl Session {
             }
             Err(failed) => {
                 let error = self.error_of(&failed, frame);
-                self.solved = back.and_then(|back| self.go_back(*failed, back, last_world, remains));
+                self.solved =
+                    back.and_then(|back| self.go_back(*failed, back, last_world, remains));
                 Err(error)
             }
         }

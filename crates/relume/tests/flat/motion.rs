@@ -127,10 +127,15 @@ fn check_frames(seed: u64, bodies: usize, frames: u32, (pace, coarse): (f64, f64
         assert_eq!(of(two), of(built), "{place}");
         assert_eq!(of(one), of(built), "with certificates, {place}");
         // No event later than it is due.
-        assert_eq!(missed(certain.solved().unwrap(), warm.solved().unwrap()), Missed::default(), "{place}");
+        assert_eq!(
+            missed(certain.solved().unwrap(), warm.solved().unwrap()),
+            Missed::default(),
+            "{place}"
+        );
         assert_eq!((one.changed, one.segments), (two.changed, two.segments), "{place}");
         for followed in [&certain, &warm] {
-            radiosity_gap(followed.solved().unwrap(), cold.solved().unwrap()).unwrap_or_else(|e| panic!("{place}: {e}"));
+            radiosity_gap(followed.solved().unwrap(), cold.solved().unwrap())
+                .unwrap_or_else(|e| panic!("{place}: {e}"));
         }
         walk += Walk {
             events: warm.frame().unwrap().link_events().len() as u64,
@@ -346,7 +351,13 @@ fn a_hidden_link_is_kept_and_restored() {
     let visibility = |s: &FlatSession| {
         let (_, forest) = s.frame().unwrap().pairs();
         let of = |id| forest.wall(id).0.0;
-        let link = s.frame().unwrap().links().into_iter().find(|l| of(l.a) + of(l.b) == 1).expect("it is kept");
+        let link = s
+            .frame()
+            .unwrap()
+            .links()
+            .into_iter()
+            .find(|l| of(l.a) + of(l.b) == 1)
+            .expect("it is kept");
         link.carried.visibility()
     };
     session.step(0, 0.0);
@@ -382,7 +393,12 @@ fn extrapolated_links_stay_close() {
         followed.step(frame, time_s);
         extrapolated += line.step(frame, time_s).extrapolated;
         let sum = |s: &FlatSession| -> f64 {
-            s.frame().unwrap().links().iter().map(|l| f64::from(l.carried.exchange_area_past_occluders_m2())).sum()
+            s.frame()
+                .unwrap()
+                .links()
+                .iter()
+                .map(|l| f64::from(l.carried.exchange_area_past_occluders_m2()))
+                .sum()
         };
         let (exact, guess) = (sum(&followed), sum(&line));
         assert!((exact - guess).abs() < 0.05 * exact, "frame {frame}: {exact} {guess}");

@@ -121,7 +121,10 @@ impl Movers {
         };
         Movers {
             moves: bodies().map(|body| scene.moves(body)).collect(),
-            roots: bodies().filter(is_there).map(|body| solved.space.forest.body_root(body)).collect(),
+            roots: bodies()
+                .filter(is_there)
+                .map(|body| solved.space.forest.body_root(body))
+                .collect(),
         }
     }
 

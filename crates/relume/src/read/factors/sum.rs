@@ -1,5 +1,7 @@
 //! Sums over links that do not depend on their order.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::pair::Link;
@@ -208,18 +210,7 @@ pub(super) fn mirrored(
     room: Room,
 ) -> Factors {
     let groups = area_m2.len();
-    let mut offsets = vec![0; groups + 1];
-    for (row, entries) in upper.iter().enumerate() {
-        for &(column, _) in entries {
-            offsets[row + 1] += 1;
-            if column as usize != row {
-                offsets[column as usize + 1] += 1;
-            }
-        }
-    }
-    for row in 1..=groups {
-        offsets[row] += offsets[row - 1];
-    }
+    let offsets = row_offsets(groups, upper);
     // Every entry is written below.
     let Room { mut columns, mut exchange_m2 } = room;
     columns.resize(offsets[groups], 0);
@@ -237,29 +228,55 @@ pub(super) fn mirrored(
     tasks.into_par_iter().for_each(|(rows, columns, values)| {
         let start = offsets[rows.start];
         let mut next: Vec<usize> = offsets[rows.clone()].iter().map(|o| o - start).collect();
-        let mut put = |row: usize, column: usize, whole: u64| {
+        for_each_entry(upper, rows.clone(), &mut |row, column, whole| {
             let next = &mut next[row - rows.start];
             (columns[*next], values[*next]) = (column as u32, fixed.area_m2(whole));
             *next += 1;
-        };
-        // Row by row, so that columns ascend: what is left of the diagonal comes from rows above.
-        for (row, entries) in upper[..rows.end].iter().enumerate() {
-            let of_tasks = entries.partition_point(|e| (e.0 as usize) < rows.start);
-            for &(column, whole) in &entries[of_tasks..] {
-                let column = column as usize;
-                if column >= rows.end {
-                    break;
-                }
-                if column != row {
-                    put(column, row, whole);
-                }
-            }
-            if rows.contains(&row) {
-                entries.iter().for_each(|&(column, whole)| put(row, column as usize, whole));
-            }
-        }
+        });
     });
     let inverse = |a: &f64| if *a > 0.0 { 1.0 / a } else { 0.0 };
     let left = area_m2.iter().map(inverse).collect();
     Factors { area_m2, offsets, columns, exchange_m2, left, right: vec![1.0; groups] }
+}
+
+/// Where the entries of each row begin in a symmetric matrix whose upper triangle is given, and where the last ends.
+fn row_offsets(groups: usize, upper: &[Vec<(u32, u64)>]) -> Vec<usize> {
+    let mut offsets = vec![0; groups + 1];
+    for (row, entries) in upper.iter().enumerate() {
+        for &(column, _) in entries {
+            offsets[row + 1] += 1;
+            if column as usize != row {
+                offsets[column as usize + 1] += 1;
+            }
+        }
+    }
+    for row in 1..=groups {
+        offsets[row] += offsets[row - 1];
+    }
+    offsets
+}
+
+/// The entries (row, column, value) of some rows of a symmetric matrix whose upper triangle is given; in each row columns
+/// ascend.
+fn for_each_entry(
+    upper: &[Vec<(u32, u64)>],
+    rows: Range<usize>,
+    put: &mut dyn FnMut(usize, usize, u64),
+) {
+    // Row by row: what is left of the diagonal comes from rows above.
+    for (row, entries) in upper[..rows.end].iter().enumerate() {
+        let of_tasks = entries.partition_point(|e| (e.0 as usize) < rows.start);
+        for &(column, whole) in &entries[of_tasks..] {
+            let column = column as usize;
+            if column >= rows.end {
+                break;
+            }
+            if column != row {
+                put(column, row, whole);
+            }
+        }
+        if rows.contains(&row) {
+            entries.iter().for_each(|&(column, whole)| put(row, column as usize, whole));
+        }
+    }
 }

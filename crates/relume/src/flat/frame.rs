@@ -8,9 +8,9 @@ use crate::pair::{Carried, Link, LinkEvent, PairTree};
 use crate::read::{ElementName, Event, Solution, with_names};
 
 use super::forest::FlatForest;
-use super::judge::PlaneView;
 use super::plane::Segment;
 use super::state::{FlatSolved, PlaneState};
+use super::view::PlaneView;
 
 /// A link of the plane; it carries light both ways.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -23,10 +23,10 @@ mod strings;
 mod surfaces;
 mod svg;
 mod text;
+mod view;
 
 pub use forest::FlatForest;
 pub use frame::{FlatElement, FlatFrame, FlatLink};
-pub use judge::PlaneView;
 pub use options::{FlatOptions, OptionError};
 pub use plane::{PlanePose, Segment};
 pub use scene::{Body, BodyIndex, FlatScene, Key, Material, Motion, SceneError, Wall, WallIndex};
@@ -36,3 +36,4 @@ pub use state::FlatSolved;
 pub use strings::{Shaft, exchange, visible_exchange};
 pub use svg::{SvgError, parse_svg};
 pub use text::{TextError, parse};
+pub use view::PlaneView;

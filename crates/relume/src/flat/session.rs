@@ -7,10 +7,10 @@ use crate::pair::OutOfMemory;
 
 use super::forest::FlatForest;
 use super::frame::FlatFrame;
-use super::judge::PlaneView;
 use super::options::{FlatOptions, OptionError};
 use super::scene::FlatScene;
 use super::state::{FlatGoal, FlatSolved};
+use super::view::PlaneView;
 
 /// One scene in the plane being solved, frame by frame.
 pub struct FlatSession {

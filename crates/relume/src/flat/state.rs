@@ -10,10 +10,11 @@ use crate::pair::{Link, PairTree};
 use crate::solver::Radiosity;
 
 use super::forest::FlatForest;
-use super::judge::{FlatPlaced, PlaneView};
+use super::judge::FlatPlaced;
 use super::options::FlatOptions;
 use super::scene::{BodyIndex, FlatScene};
 use super::surfaces::LitPlane;
+use super::view::PlaneView;
 
 /// A solved state of a scene in the plane.
 pub type FlatSolved = Follower<PlaneState>;

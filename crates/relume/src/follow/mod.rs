@@ -8,6 +8,7 @@ mod budget;
 mod clock;
 mod follower;
 mod links;
+mod phases;
 mod report;
 mod space;
 mod tally;
@@ -15,8 +16,9 @@ mod update;
 mod watch;
 
 pub(crate) use ahead::{Ahead, Clocked, Void};
-pub(crate) use follower::{Failed, Order, Said, Why};
+pub(crate) use follower::{Said, Why};
 pub(crate) use links::{Receivers, directions, set_pairs};
+pub(crate) use phases::{Failed, Order};
 pub(crate) use space::{Balance, Level, Motion, Space};
 pub(crate) use tally::balance_of;
 

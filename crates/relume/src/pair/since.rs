@@ -4,7 +4,7 @@ use crate::element::{ElementId, Forest, Kind, WorldElement, WorldView};
 use crate::scene::{BodyId, LightKind, PatchId, Scene};
 use crate::transport::Shaft;
 
-use super::judge::{BoxShaft, LightPlace, body_of};
+use super::ends::{BoxShaft, LightPlace, body_of};
 use super::margin::{Growth, Shift};
 use super::update::Stale;
 

@@ -15,8 +15,8 @@ use crate::event::{History, Lookahead, Sample, Tick};
 
 use super::hash::{PairHash, pair_key};
 use super::margin::Margin;
-use super::oracle::Side;
 use super::outlook::Finding;
+use super::side::Side;
 use super::tree::{Carried, CullReason, PairId, PairTree, State};
 
 /// What is decided on a pair.

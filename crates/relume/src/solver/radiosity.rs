@@ -13,11 +13,13 @@ use super::gather::gather_some;
 use super::groups::Arriving;
 use super::jump::Jump;
 use super::links::Links;
+use super::place::Place;
 use super::push::{push, row_sums};
 use super::settle::{Below, News, Settled};
-use super::surfaces::{Place, Surfaces, for_each_below};
+use super::surfaces::{Surfaces, for_each_below};
 use super::trend::Trend;
-use super::work::{Batch, Dirty, PENDING_SHARE, Way, Work};
+use super::way::{Batch, Way};
+use super::work::{Dirty, PENDING_SHARE, Work};
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]

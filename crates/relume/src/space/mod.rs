@@ -6,6 +6,7 @@ mod bed;
 mod coarse;
 mod emission;
 mod groups;
+mod phases;
 mod promise;
 mod state;
 mod surfaces;
@@ -13,7 +14,9 @@ mod tally;
 
 pub(crate) use bed::Bed;
 pub(crate) use groups::{Before, group_links};
-pub(crate) use state::{Goal, SpaceState, Tuning};
+pub(crate) use phases::Goal;
+pub use state::SpaceState;
+pub(crate) use state::Tuning;
 pub(crate) use surfaces::place_of;
 pub(crate) use tally::row_sums_of;
 

@@ -17,8 +17,9 @@ impl Watch {
         self.bytes.store(bytes, Ordering::Relaxed);
     }
 
-    /// Calls off the step under way, or the next one if none is: within some milliseconds it ends with
-    /// [`SessionError::Cancelled`](super::SessionError::Cancelled).
+    /// Calls off the step under way, or the next one if none is: within some milliseconds it goes back to the last solution,
+    /// which takes as long as a frame at most if there is one, and ends with
+    /// [`SessionError::Cancelled`](crate::SessionError::Cancelled).
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }

@@ -68,7 +68,12 @@ impl FlatSession {
             Err(failed) => {
                 let back = back.and_then(|(view, said)| {
                     let order = self.order(FrameReport::default());
-                    Follower::found_again(failed.to_go_back(), &self.goal(&view, None), order, said)
+                    Follower::found_again(
+                        failed.into_way_back(),
+                        &self.goal(&view, None),
+                        order,
+                        said,
+                    )
                 });
                 self.solved = back;
                 Err(OutOfMemory)

@@ -420,7 +420,7 @@ impl<S: Space> Failed<S> {
     ///
     /// What a frame may have changed of a pair lies between its two instants, so a frame the other way finds it, however
     /// far the first one came: the links are those of before, bit for bit.
-    pub(crate) fn to_go_back(self) -> Option<Follower<S>> {
+    pub(crate) fn into_way_back(self) -> Option<Follower<S>> {
         let Failed { mut state, is_cold, why } = self;
         if is_cold || !state.is_settled() {
             return None;

@@ -45,7 +45,7 @@ impl Session {
         last_world: Option<World>,
         remains: Option<Arc<Scene>>,
     ) -> Option<Solved> {
-        let (state, world) = match (failed.to_go_back(), last_world) {
+        let (state, world) = match (failed.into_way_back(), last_world) {
             (Some(state), Some(world)) => (Some(state), world),
             _ => {
                 let scene = Arc::clone(&back.scene);

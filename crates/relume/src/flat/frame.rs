@@ -91,7 +91,7 @@ impl<'a> FlatFrame<'a> {
         self.solved.radiosity.radiosity(id.0)
     }
 
-    /// The events that led here, with names, if [`FlatOptions::events`] asks for them.
+    /// The events that led here, with names, if [`FlatOptions::events`](super::FlatOptions::events) asks for them.
     pub fn events(&self) -> Vec<Event> {
         with_names(&self.solved.events, &|facet| self.solved.space.facet_name(ElementId(facet)))
     }

@@ -1,7 +1,7 @@
 //! Following a space from one instant to another: the phases of a frame.
 //!
 //! A [`Follower`] is a solved state, and its methods are the phases that bring it to another instant; what they ask of where
-//! things are they ask of its [`Space`]. Must not know polygons, segments, scenes or files.
+//! things are they ask of its `Space`. Must not know polygons, segments, scenes or files.
 
 mod ahead;
 mod budget;

@@ -26,7 +26,7 @@ pub enum Sky {
         irradiance: f64,
     },
     /// Clear to hazy skies by turbidity, with their colours (Preetham, Shirley and Smits 1999); it needs the sun's
-    /// direction. Luminance becomes radiance by [`LUMENS_PER_WATT`].
+    /// direction. Luminance becomes radiance by [`LUMENS_PER_WATT`](super::LUMENS_PER_WATT).
     Turbid {
         /// 2 (very clear) to 10 (hazy).
         turbidity: f64,

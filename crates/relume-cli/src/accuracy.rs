@@ -1,6 +1,6 @@
 //! How good a run's frames are, estimated and said.
 
-use relume::session::{Accuracy, Sensor, Session};
+use relume::session::{Accuracy, Frame, Sensor};
 
 /// The estimates of a run, if any are wanted, and the worst of them.
 #[derive(Debug)]
@@ -17,14 +17,14 @@ impl Estimates {
     /// Estimates the error of the frame just solved: at an even share of the sensors, or else at points spread over what is lit.
     pub(crate) fn of(
         &mut self,
-        session: &Session,
+        solved: Frame<'_>,
         frame: u32,
         sensors: Option<&[Sensor]>,
     ) -> Option<Accuracy> {
         let points = self.points?;
         let found = match sensors {
-            None => session.accuracy(points),
-            Some(sensors) => session.accuracy_at(&some(sensors, points)),
+            None => solved.accuracy(points),
+            Some(sensors) => solved.accuracy_at(&some(sensors, points)),
         };
         if self.worst.is_none_or(|(_, worst)| found.rms > worst.rms) {
             self.worst = Some((frame, found));

@@ -284,12 +284,14 @@ impl<'a> Drawing<'a> {
     fn draw(&mut self, session: &Session, time_s: f64) -> Result<f64, Failure> {
         let view = self.views.at_time(&self.clip.scene, time_s)?;
         let flags = self.flags;
-        let automatic = || Exposure::automatic(&clip::snapshot(session, flags), &view);
+        let automatic =
+            || Exposure::automatic(&clip::snapshot(clip::solved(session), flags), &view);
         let exposure = *self.exposure.get_or_insert_with(automatic);
         let shading = self.flags.shading.unwrap_or(self.clip.shading);
         let settings = clip::picture_settings(self.flags, shading, exposure);
         let started = now();
-        let image = picture::render(&clip::snapshot(session, flags), &view, &settings);
+        let image =
+            picture::render(&clip::snapshot(clip::solved(session), flags), &view, &settings);
         let seconds = started.elapsed().as_secs_f64();
         drop(image);
         Ok(seconds)

@@ -8,7 +8,7 @@ use std::time::Instant;
 use glam::DVec3;
 use indicatif::HumanBytes;
 use relume::scene::Scene;
-use relume::session::{Options, Oracle, Session, SessionError, Snapshot};
+use relume::session::{Frame, Options, Oracle, Session, SessionError, Snapshot};
 use relume_picture::picture::{self, Exposure, Settings};
 
 use crate::args::{
@@ -270,8 +270,13 @@ pub(crate) fn step_failure(error: SessionError, kept: &str) -> Failure {
 }
 
 /// The solution as pictures are to show it.
-pub(crate) fn snapshot(session: &Session, flags: &PictureFlags) -> Snapshot {
-    if flags.reconstruct { session.reconstruction() } else { session.snapshot() }
+pub(crate) fn snapshot(frame: Frame<'_>, flags: &PictureFlags) -> Snapshot {
+    if flags.reconstruct { frame.reconstruction() } else { frame.solution() }
+}
+
+/// What a session has solved last.
+pub(crate) fn solved(session: &Session) -> Frame<'_> {
+    session.frame().expect("a step leaves a solution")
 }
 
 /// How a picture is drawn.

@@ -10,7 +10,7 @@ use relume_picture::export::{self, Npz, WholeFile, probe, write_atomically};
 use serde::Serialize;
 
 use crate::args::{By, ClosureFlag, FactorFormat, FactorsArgs};
-use crate::clip::{Clip, TOLERANCE, now, step_failure};
+use crate::clip::{Clip, TOLERANCE, now, solved, step_failure};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::notes;
@@ -241,7 +241,7 @@ fn frames(
         let report =
             session.step(frame, clip.time_of(frame)).map_err(|error| step_failure(error, ""))?;
         let summing = now();
-        let mut factors = sums.factors(&session);
+        let mut factors = sums.factors(solved(&session));
         let (row_sums, escapes) = row_sums(&factors, things);
         factors.close(closure(args.closure)).map_err(|open| not_closed(frame, &open, things))?;
         let seconds_summing = summing.elapsed().as_secs_f64();

@@ -14,7 +14,7 @@ use relume_picture::picture::{self, Exposure, Outlines, View, Viewpoint};
 
 use crate::args::{DemoScene, Figure, FigureArgs, PictureFlags, Size, UpdateChoice, UpdateFlag};
 use crate::bench::{self, Plan};
-use crate::clip::{Clip, picture_settings, step_failure};
+use crate::clip::{Clip, picture_settings, solved, step_failure};
 use crate::failure::Failure;
 use crate::figures::{Row, time, times};
 use crate::flat::draw::{BLACK, GREY, PINK, table};
@@ -113,7 +113,7 @@ fn columns(clip: &Clip, update: UpdateChoice, shown: &[u32]) -> Result<[Vec<Draw
         memory::at(format_args!("frame {frame}"));
         session.step(frame, time_s).map_err(|error| step_failure(error, ""))?;
         let view = camera.at(&clip.scene, time_s).map_err(Failure::new)?;
-        let snapshot = session.snapshot();
+        let snapshot = solved(&session).solution();
         let exposure = *exposure.get_or_insert_with(|| Exposure::automatic(&snapshot, &view));
         if shown.contains(&frame) {
             let settings = picture_settings(&flags(PICTURE), clip.shading, exposure);
@@ -143,7 +143,7 @@ fn lamps(scene: &Scene) -> BTreeSet<BodyId> {
 
 /// Corners of an element in the world.
 fn corners(session: &Session, id: ElementId, time_s: f64) -> Vec<DVec3> {
-    let (scene, (_, forest)) = (session.scene(), session.pairs());
+    let (scene, (_, forest)) = (session.scene(), solved(session).pairs());
     let patch = &scene.patches[forest.patch(id).expect("elements have patches").0 as usize];
     let pose = scene.pose(patch.body, time_s).expect("nothing vanishes in these scenes");
     let shape = forest.shape(id);
@@ -153,7 +153,7 @@ fn corners(session: &Session, id: ElementId, time_s: f64) -> Vec<DVec3> {
 /// The elements with links to the light that face the view and are in sight, over the outlines of all
 /// surfaces; the light is pink.
 fn elements_at_the_light(session: &Session, view: &View, time_s: f64) -> Drawing {
-    let (scene, (tree, forest)) = (session.scene(), session.pairs());
+    let (scene, (tree, forest)) = (session.scene(), solved(session).pairs());
     let lamps = lamps(scene);
     let body =
         |id| forest.patch(id).map(|p: relume::scene::PatchId| scene.patches[p.0 as usize].body);

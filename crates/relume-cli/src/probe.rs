@@ -4,11 +4,11 @@ use std::io::Write;
 use std::path::Path;
 
 use relume::scene::{BodyId, Scene};
-use relume::session::{Sensor, Session};
+use relume::session::{Frame, Sensor, Session};
 
 use crate::accuracy::Estimates;
 use crate::args::ProbeArgs;
-use crate::clip::{Clip, TOLERANCE, now, step_failure};
+use crate::clip::{Clip, TOLERANCE, now, solved, step_failure};
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::light;
@@ -195,9 +195,9 @@ fn frames(
         links = session.step(frame, time_s).map_err(|error| step_failure(error, ""))?.links;
         let here: Vec<(&Rider<'_>, Sensor)> =
             riders.iter().filter_map(|r| Some((r, r.at(&clip.scene, time_s)?))).collect();
-        let found = irradiances(session, &here, args, frame)?;
+        let found = irradiances(solved(session), &here, args, frame)?;
         let sensors: Vec<Sensor> = here.iter().map(|(_, sensor)| *sensor).collect();
-        estimates.of(session, frame, Some(&sensors));
+        estimates.of(solved(session), frame, Some(&sensors));
         for ((rider, sensor), e) in here.iter().zip(found) {
             let mut row = vec![frame.to_string(), rider.entry.name.clone()];
             let place = sensor.at.to_array().into_iter().chain(sensor.normal.to_array());
@@ -215,16 +215,16 @@ fn frames(
 }
 
 fn irradiances(
-    session: &Session,
+    solved: Frame<'_>,
     here: &[(&Rider<'_>, Sensor)],
     args: &ProbeArgs,
     frame: u32,
 ) -> Result<Vec<[f64; 3]>, Failure> {
     let sensors: Vec<Sensor> = here.iter().map(|(_, sensor)| *sensor).collect();
     if !args.interpolate {
-        return Ok(session.irradiances_at(&sensors));
+        return Ok(solved.irradiances_at(&sensors));
     }
-    let snapshot = session.snapshot();
+    let snapshot = solved.solution();
     let read = |(rider, sensor): &(&Rider<'_>, Sensor)| {
         snapshot.irradiance_at(sensor.at, sensor.normal).ok_or_else(|| {
             let what = format!(

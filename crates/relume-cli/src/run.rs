@@ -113,25 +113,7 @@ impl Job {
                 "give the directory of the earlier run with -o, or its report with --report",
             ));
         }
-        let (clip, views) = match &self.picture {
-            Some((_, flags)) => {
-                let at_least = flags.view.frames_at_least();
-                let read =
-                    Clip::for_pictures(&self.scene, &self.solve.clip, self.tolerance, at_least)?;
-                light::for_pictures(read, &flags.view)?
-            }
-            None => {
-                let read = Clip::of_file(&self.scene, &self.solve.clip, self.tolerance)?;
-                light::required(&read.scene).map(|()| (read, None))?
-            }
-        };
-        clip.warn();
-        clip.warn_of(self.solve.update);
-        let clip = clip.without_dark_sides();
-        let views = match (views, &self.picture) {
-            (None, Some((_, flags))) => Some(Viewing::new(&clip.scene, &flags.view)?),
-            (views, _) => views,
-        };
+        let (clip, views) = self.open_clip()?;
         if let Some((_, flags)) = &self.picture {
             // Not only after the first frame.
             ask_for_picture(flags)?;
@@ -163,30 +145,7 @@ impl Job {
             }
             _ => None,
         };
-        let events = self.solve.events.as_ref().map(|_| EventTable::new());
-        let options = clip.options(self.solve.update, true)?;
-        let session = clip.session_with(Options { events: events.is_some(), ..options })?;
-        let size = Size::of(&clip, session.options());
-        if !self.quiet() {
-            let rough = if self.picture.is_some() { ", or rough pictures: --preview" } else { "" };
-            progress.suspend(|| size.warn(&clip, pending.len(), rough));
-        }
-        progress.watch(session.watch(), size.pairs());
-        let paths = (self.report_paths(), self.solve.events.clone());
-        let finished = Arc::new(Mutex::new(Finished { report, events, paths }));
-        let keep = Arc::clone(&finished);
-        interrupt::keep_with(move || interrupt::locked(&keep).write());
-        let mut run = Run {
-            job: &self,
-            session,
-            views,
-            finished,
-            progress,
-            links: 0,
-            energy: None,
-            suspects: Vec::new(),
-            estimates: Estimates::new(self.solve.accuracy),
-        };
+        let mut run = self.begin(&clip, views, report, progress, pending.len())?;
         let outcome = run.frames((wanted, &pending), &mut meanwhile);
         run.progress.clear();
         // Also where a frame failed: what was finished stays.
@@ -201,6 +160,65 @@ impl Job {
             }
             Outcome::Done => self.summary(wanted, &pending, &run, started.elapsed()),
         }
+    }
+
+    /// The clip, without what shows nothing, and what pictures of it look at.
+    fn open_clip(&self) -> Result<(Clip, Option<Viewing>), Failure> {
+        let (clip, views) = match &self.picture {
+            Some((_, flags)) => {
+                let at_least = flags.view.frames_at_least();
+                let read =
+                    Clip::for_pictures(&self.scene, &self.solve.clip, self.tolerance, at_least)?;
+                light::for_pictures(read, &flags.view)?
+            }
+            None => {
+                let read = Clip::of_file(&self.scene, &self.solve.clip, self.tolerance)?;
+                light::required(&read.scene).map(|()| (read, None))?
+            }
+        };
+        clip.warn();
+        clip.warn_of(self.solve.update);
+        let clip = clip.without_dark_sides();
+        let views = match (views, &self.picture) {
+            (None, Some((_, flags))) => Some(Viewing::new(&clip.scene, &flags.view)?),
+            (views, _) => views,
+        };
+        Ok((clip, views))
+    }
+
+    /// A session that has solved nothing yet, with what a run needs besides; what it finishes is kept if it is interrupted.
+    fn begin(
+        &self,
+        clip: &Clip,
+        views: Option<Viewing>,
+        report: Report,
+        progress: Progress,
+        pending: usize,
+    ) -> Result<Run<'_>, Failure> {
+        let events = self.solve.events.as_ref().map(|_| EventTable::new());
+        let options = clip.options(self.solve.update, true)?;
+        let session = clip.session_with(Options { events: events.is_some(), ..options })?;
+        let size = Size::of(clip, session.options());
+        if !self.quiet() {
+            let rough = if self.picture.is_some() { ", or rough pictures: --preview" } else { "" };
+            progress.suspend(|| size.warn(clip, pending, rough));
+        }
+        progress.watch(session.watch(), size.pairs());
+        let paths = (self.report_paths(), self.solve.events.clone());
+        let finished = Arc::new(Mutex::new(Finished { report, events, paths }));
+        let keep = Arc::clone(&finished);
+        interrupt::keep_with(move || interrupt::locked(&keep).write());
+        Ok(Run {
+            job: self,
+            session,
+            views,
+            finished,
+            progress,
+            links: 0,
+            energy: None,
+            suspects: Vec::new(),
+            estimates: Estimates::new(self.solve.accuracy),
+        })
     }
 
     fn quiet(&self) -> bool {
@@ -512,21 +530,21 @@ impl Run<'_> {
         self.links = entry.links;
         self.energy = entry.energy;
         self.suspects = entry.suspects.clone();
-        entry.accuracy = self.estimates.of(&self.session, frame, None);
+        entry.accuracy = self.estimates.of(clip::solved(&self.session), frame, None);
         if let Some(path) = self.job.picture_path(frame) {
             self.draw(frame, &path)?;
         }
         let mut finished = self.finished();
         finished.report.add(&entry)?;
         if let Some(table) = &mut finished.events {
-            table.add(frame, &self.session.events());
+            table.add(frame, &clip::solved(&self.session).events());
         }
         Ok(())
     }
 
     fn draw(&mut self, frame: u32, path: &Path) -> Result<(), Failure> {
         let Some((_, flags)) = &self.job.picture else { return Ok(()) };
-        let snapshot = clip::snapshot(&self.session, flags);
+        let snapshot = clip::snapshot(clip::solved(&self.session), flags);
         if self.exposure_is_open() {
             self.choose_exposure(frame, &snapshot)?;
         }
@@ -581,7 +599,7 @@ impl Run<'_> {
             .step(frame, frames::time_of(frame, fps))
             .map_err(|error| self.session_failure(error))?;
         let Some((_, flags)) = &self.job.picture else { return Ok(()) };
-        let snapshot = clip::snapshot(&session, flags);
+        let snapshot = clip::snapshot(clip::solved(&session), flags);
         self.choose_exposure(frame, &snapshot)
     }
 

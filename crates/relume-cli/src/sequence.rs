@@ -2,9 +2,10 @@
 //! comparison ask of it. Knows nothing of scenes.
 
 use relume::element::ElementId;
-use relume::flat::{FlatOptions, FlatSession};
+use relume::flat::{FlatFrame, FlatOptions, FlatSession, FlatSolved};
 use relume::pair::OutOfMemory;
 use relume::session::{FrameReport, Memory, Session, Solution};
+use relume::space::Solved;
 
 use crate::args::UpdateChoice;
 use crate::clip::{Clip, step_failure};
@@ -12,7 +13,12 @@ use crate::failure::Failure;
 use crate::memory;
 
 /// A session that goes from frame to frame.
-pub(crate) trait Stepping: Solution {
+pub(crate) trait Stepping {
+    /// What its frames leave.
+    type Solved: Solution;
+
+    /// The last solution, if there is one.
+    fn solved(&self) -> Option<&Self::Solved>;
     /// Brings the solution to a time; `frame` labels the report. `beside_bytes` are held by others under
     /// the same limit.
     fn go(&mut self, frame: u32, time_s: f64, beside_bytes: u64) -> Result<FrameReport, Failure>;
@@ -28,7 +34,18 @@ pub(crate) trait Stepping: Solution {
     }
 }
 
+/// What a session has solved last.
+pub(crate) fn solved<S: Stepping>(session: &S) -> &S::Solved {
+    session.solved().expect("a step leaves a solution")
+}
+
 impl Stepping for Session {
+    type Solved = Solved;
+
+    fn solved(&self) -> Option<&Solved> {
+        Session::solved(self)
+    }
+
     fn go(&mut self, frame: u32, time_s: f64, beside_bytes: u64) -> Result<FrameReport, Failure> {
         self.set_max_memory_bytes(memory::left_beside(beside_bytes));
         self.step(frame, time_s).map_err(|error| step_failure(error, ""))
@@ -44,6 +61,12 @@ impl Stepping for Session {
 }
 
 impl Stepping for FlatSession {
+    type Solved = FlatSolved;
+
+    fn solved(&self) -> Option<&FlatSolved> {
+        FlatSession::solved(self)
+    }
+
     fn go(&mut self, frame: u32, time_s: f64, beside_bytes: u64) -> Result<FrameReport, Failure> {
         let limit = memory::left_beside(beside_bytes);
         let report = self
@@ -54,7 +77,7 @@ impl Stepping for FlatSession {
         let unbalanced = report.energy.map_or(0.0, |energy| energy.unbalanced());
         let lost = unbalanced.is_nan() || unbalanced > UNBALANCED_MAX;
         if report.residual.is_nan() || report.residual > most || lost {
-            return Err(unsettled(self, &report));
+            return Err(unsettled(self.frame(), &report));
         }
         Ok(report)
     }
@@ -72,11 +95,14 @@ impl Stepping for FlatSession {
 const UNBALANCED_MAX: f64 = 0.1;
 
 /// Light that grows from sweep to sweep: between bright walls that cross or lie on each other.
-fn unsettled(session: &FlatSession, report: &FrameReport) -> Failure {
-    let (_, forest) = session.pairs();
-    let size = |facet: &ElementId| session.radiosity(*facet).into_iter().fold(0.0, f32::max);
-    let brightest = forest.facets().iter().max_by(|a, b| size(a).total_cmp(&size(b)));
-    let name = brightest.map_or_else(String::new, |&facet| session.name(facet).short());
+fn unsettled(frame: Option<FlatFrame<'_>>, report: &FrameReport) -> Failure {
+    let brightest = |frame: FlatFrame<'_>| {
+        let size = |facet: &ElementId| frame.radiosity(*facet).into_iter().fold(0.0, f32::max);
+        let facets = frame.pairs().1.facets().iter();
+        let found = facets.max_by(|a, b| size(a).total_cmp(&size(b)))?;
+        Some(frame.name(*found).short())
+    };
+    let name = frame.and_then(brightest).unwrap_or_default();
     Failure::new(format_args!(
         "frame {}: the light does not settle (residual {:.1e} after {} sweeps, {:.0} % of what is emitted unaccounted for); it is brightest at `{name}`",
         report.frame, report.residual, report.sweeps, 100.0 * report.energy.map_or(0.0, |e| e.unbalanced())

@@ -14,7 +14,7 @@ use crate::figures::{mean, ratio, standard_deviation, time, times, whole};
 use crate::interrupt;
 use crate::output;
 use crate::progress::Progress;
-use crate::sequence::{Sequence, Stepping};
+use crate::sequence::{Sequence, Stepping, solved};
 
 /// Name of the format.
 const SCHEMA: &str = "relume-strategies/1";
@@ -142,8 +142,9 @@ impl<Q: Sequence> Comparison<'_, Q> {
                 hashes[at] = report.hash;
             }
             for at in 0..count {
-                let missed = missed(&self.sessions[at], &self.sessions[REINSPECT]);
-                let error = radiosity_error(&self.sessions[at], &self.sessions[SCRATCH]);
+                let missed = missed(solved(&self.sessions[at]), solved(&self.sessions[REINSPECT]));
+                let error =
+                    radiosity_error(solved(&self.sessions[at]), solved(&self.sessions[SCRATCH]));
                 let cell = &mut cells[at];
                 (cell.missed_states, cell.missed_occlusions) = (missed.states, missed.occlusions);
                 (cell.rms_error, cell.max_error) = (error.rms, error.max);
@@ -190,23 +191,7 @@ impl<Q: Sequence> Comparison<'_, Q> {
             "RMS error",
             "largest"
         );
-        for r in &rows {
-            let _ = writeln!(
-                out,
-                "{:<26}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>8}{:>9.3}%{:>9.2}%",
-                r.update,
-                time(r.mean_s),
-                time(r.standard_deviation_s),
-                time(r.links_mean_s),
-                whole(r.examined),
-                whole(r.followed),
-                whole(r.segments),
-                whole(r.missed_states + r.missed_occlusions),
-                r.equal_frames,
-                100.0 * r.rms_error,
-                100.0 * r.max_error
-            );
-        }
+        rows.iter().for_each(|row| out += &line(row));
         let _ = writeln!(
             out,
             "\nframe 1 took {} from scratch; changed pairs a frame: {}",
@@ -214,22 +199,7 @@ impl<Q: Sequence> Comparison<'_, Q> {
             whole(rows[REINSPECT].changed)
         );
         let by = &rows[REINSPECT];
-        for r in rows.iter().skip(REINSPECT + 1) {
-            let fewer = |one: f64, two: f64| match two > 0.0 {
-                true => times(one / two),
-                false => "-".into(),
-            };
-            let _ = writeln!(
-                out,
-                "{:<26}against reinspect: {} fewer judged, {} fewer segments, {} quicker links, {} \
-                 quicker in all",
-                r.update,
-                fewer(by.examined, r.examined),
-                fewer(by.segments, r.segments),
-                times(ratio(by.links_mean_s, r.links_mean_s)),
-                times(ratio(by.mean_s, r.mean_s))
-            );
-        }
+        rows.iter().skip(REINSPECT + 1).for_each(|row| out += &against(row, by));
         out
     }
 
@@ -288,4 +258,38 @@ fn row(update: String, cells: &[Cell]) -> Row {
         rms_error: mean(&of(&|c| c.rms_error * c.rms_error)).sqrt(),
         max_error: cells.iter().map(|c| c.max_error).fold(0.0, f64::max),
     }
+}
+
+/// A row of the table.
+fn line(r: &Row) -> String {
+    format!(
+        "{:<26}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>8}{:>9.3}%{:>9.2}%\n",
+        r.update,
+        time(r.mean_s),
+        time(r.standard_deviation_s),
+        time(r.links_mean_s),
+        whole(r.examined),
+        whole(r.followed),
+        whole(r.segments),
+        whole(r.missed_states + r.missed_occlusions),
+        r.equal_frames,
+        100.0 * r.rms_error,
+        100.0 * r.max_error
+    )
+}
+
+/// What a strategy spares against another.
+fn against(r: &Row, by: &Row) -> String {
+    let fewer = |one: f64, two: f64| match two > 0.0 {
+        true => times(one / two),
+        false => "-".into(),
+    };
+    format!(
+        "{:<26}against reinspect: {} fewer judged, {} fewer segments, {} quicker links, {} quicker in all\n",
+        r.update,
+        fewer(by.examined, r.examined),
+        fewer(by.segments, r.segments),
+        times(ratio(by.links_mean_s, r.links_mean_s)),
+        times(ratio(by.mean_s, r.mean_s))
+    )
 }

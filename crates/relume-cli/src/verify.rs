@@ -1,6 +1,6 @@
 //! `relume verify`: frame by frame, the links that followed the motion against links built anew.
 
-use relume::session::{Difference, FrameReport, RadiosityGap, Solution, compare, radiosity_gap};
+use relume::session::{Difference, FrameReport, RadiosityGap, compare, radiosity_gap};
 
 use crate::args::{UpdateChoice, UpdateFlag, VerifyArgs};
 use crate::clip::Clip;
@@ -8,7 +8,7 @@ use crate::failure::Failure;
 use crate::interrupt;
 use crate::output::{self, count, counted};
 use crate::progress::Progress;
-use crate::sequence::{Sequence, Stepping};
+use crate::sequence::{Sequence, Stepping, solved};
 
 /// What the two solutions are called in messages.
 const ONE: &str = "incrementally";
@@ -85,7 +85,8 @@ impl<S: Stepping> Sides<S> {
 
 /// How near the radiosities of two solutions that agree come to their bound; else the first
 /// difference.
-fn agree<S: Solution>(warm: &S, cold: &S) -> Result<RadiosityGap, Difference> {
+fn agree<S: Stepping>(warm: &S, cold: &S) -> Result<RadiosityGap, Difference> {
+    let (warm, cold) = (solved(warm), solved(cold));
     match compare(warm, cold) {
         Some(difference) => Err(difference),
         None => radiosity_gap(warm, cold),

@@ -30,7 +30,7 @@ fn seen(outside: Outside) -> Image {
         tone: Tone::Clip,
         ..Settings::default()
     };
-    render(&session.snapshot(), &view, &settings)
+    render(&session.frame().unwrap().solution(), &view, &settings)
 }
 
 fn at(image: &Image, x: usize, y: usize) -> [u8; 3] {

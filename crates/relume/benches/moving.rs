@@ -129,7 +129,12 @@ impl<'a> Errors<'a> {
         let frames = (0..sequence.frames).step_by(sequence.sampled as usize);
         let options = fixed(Oracle::Error, REFERENCE);
         let references = frames
-            .map(|frame| (frame, cells(&cold(scene, &options, frame, &pool).session.snapshot())))
+            .map(|frame| {
+                (
+                    frame,
+                    cells(&cold(scene, &options, frame, &pool).session.frame().unwrap().solution()),
+                )
+            })
             .collect();
         Errors { scene, pool, references }
     }
@@ -141,7 +146,7 @@ impl<'a> Errors<'a> {
         let mut worst = (PatchId(0), 0.0);
         for (frame, reference) in &self.references {
             let built = cold(self.scene, &fixed(oracle, tolerance), *frame, &self.pool);
-            let found = cells(&built.session.snapshot());
+            let found = cells(&built.session.frame().unwrap().solution());
             for (norm, (_, _, against)) in NORMS.iter().enumerate() {
                 squares[norm] += found[norm].error(&reference[norm], *against).powi(2);
             }
@@ -340,11 +345,11 @@ fn moving_box() {
         let own = fixed(Oracle::Error, tolerance);
         let cold = cold(&scene, &own, 0, &pool);
         let (mut session, report) = (cold.session, cold.report);
-        let error = patch_means_error(&session.snapshot(), &rows);
+        let error = patch_means_error(&session.frame().unwrap().solution(), &rows);
         let frame = |frame| {
             let start = Instant::now();
             step(&mut session, frame, &pool);
-            pool.install(|| session.snapshot());
+            pool.install(|| session.frame().unwrap().solution());
             start.elapsed().as_secs_f64()
         };
         let [low, middle, high] = quartiles((1..BOX_FRAMES).map(frame)).map(|s| 1e3 * s);

@@ -70,19 +70,25 @@
 pub mod element; // the element forest: clusters, patches and their quadtrees
 #[doc(hidden)]
 pub mod event; // what the known motion allows within the coming time, and until when
-pub mod flat;
+pub mod flat; // the plane: another space for the same pairs, events, solver and frames
+#[doc(hidden)]
+pub mod follow; // the phases of a frame, in any space
 #[doc(hidden)]
 pub mod geometry; // polygons, bounds, shafts, rigid motion: pure functions
 #[doc(hidden)]
 pub mod pair; // the pair tree, oracles and verdicts
 #[doc(hidden)]
+pub mod read; // what is read from a solution
+#[doc(hidden)]
 pub mod scene; // files in; bodies, patches, materials, motion, and worlds made of them
 #[doc(hidden)]
-pub mod session; // owns all state; runs the phases of a frame; frames and snapshots out
+pub mod session; // owns all state; commands in, frames out
 #[doc(hidden)]
 pub mod solver; // gather, push, pull, residual
 #[doc(hidden)]
-pub mod transport; // exchange area and visibility of two elements: pure queries // the plane: another space for the same pairs, events and solver
+pub mod space; // polygons, their light and their places, as followers see them
+#[doc(hidden)]
+pub mod transport; // exchange area and visibility of two elements: pure queries
 
 pub use geometry::Pose;
 pub use glam;

@@ -70,9 +70,9 @@ fn a_solution_knows_its_own_error() {
         let sensors: Vec<Sensor> = chosen.iter().map(|&k| sensors[k]).collect();
         let mut session = Session::new(Arc::clone(&scene), at_tolerance(tolerance)).unwrap();
         session.step(0, 0.0).unwrap();
-        let said = session.accuracy_at(&sensors);
-        let everywhere = session.accuracy(32);
-        let found = session.irradiances_at(&sensors);
+        let said = session.frame().unwrap().accuracy_at(&sensors);
+        let everywhere = session.frame().unwrap().accuracy(32);
+        let found = session.frame().unwrap().irradiances_at(&sensors);
         let square = |(e, &k): (&[f64; 3], &usize)| {
             let right = all(truth[k].irradiance);
             let noise: f64 = truth[k].standard_error.iter().map(|s| s * s).sum();
@@ -123,9 +123,15 @@ fn what_is_reflected_again_and_again_is_followed() {
         let mut session = Session::new(Arc::clone(&scene), at_tolerance(tolerance)).unwrap();
         session.step(0, 0.0).unwrap();
         let count = sensors.len() as f64;
-        let off =
-            session.irradiances_at(&sensors).iter().map(|e| e[0] / 5.0 - 1.0).sum::<f64>() / count;
-        let said = session.accuracy_at(&sensors).mean;
+        let off = session
+            .frame()
+            .unwrap()
+            .irradiances_at(&sensors)
+            .iter()
+            .map(|e| e[0] / 5.0 - 1.0)
+            .sum::<f64>()
+            / count;
+        let said = session.frame().unwrap().accuracy_at(&sensors).mean;
         println!("furnace at {tolerance}: {:+.2} % off, said {:+.2} %", 100.0 * off, 100.0 * said);
         assert!((said - off).abs() < 0.007, "{said} of {off}");
     }

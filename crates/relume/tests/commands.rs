@@ -11,7 +11,7 @@ use relume::{
 };
 
 /// A cube about the origin, seen from outside or from inside.
-fn cube(half: f64, inward: bool) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+pub(crate) fn cube(half: f64, inward: bool) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let corner = |k: u32| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { half } else { -half });
     let sides: [[u32; 4]; 6] =
         [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
@@ -21,7 +21,7 @@ fn cube(half: f64, inward: bool) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
 }
 
 /// A room with a lamp, two crates and a bulb, all of them still.
-fn room() -> Scene {
+pub(crate) fn room() -> Scene {
     let mut b = SceneBuilder::new("room");
     let grey = b.material("grey", [0.5; 3], [0.0; 3]);
     let red = b.material("red", [0.7, 0.2, 0.1], [0.0; 3]);
@@ -40,7 +40,7 @@ fn room() -> Scene {
 }
 
 /// A room full of small crates: enough for groups of patches.
-fn clutter() -> Scene {
+pub(crate) fn clutter() -> Scene {
     let mut b = SceneBuilder::new("clutter");
     let grey = b.material("grey", [0.5; 3], [0.0; 3]);
     let red = b.material("red", [0.7, 0.2, 0.1], [0.0; 3]);
@@ -61,14 +61,14 @@ fn clutter() -> Scene {
 }
 
 /// The first poses: nothing inside anything else.
-fn start(session: &mut Session) {
+pub(crate) fn start(session: &mut Session) {
     for (body, at) in [(1, v(0.0, 0.0, 0.8)), (2, v(-0.4, 0.3, -0.6)), (3, v(0.5, -0.3, 0.0))] {
         session.apply(Command::set_pose(BodyId(body), Pose::translation(at))).unwrap();
     }
 }
 
 /// A session that is given the world of another one at once.
-fn cold(session: &Session) -> Session {
+pub(crate) fn cold(session: &Session) -> Session {
     let mut cold = Session::new(Arc::clone(session.scene()), session.options().clone()).unwrap();
     let held = session.held();
     let mut apply = |command| drop(cold.apply(command).unwrap());
@@ -82,7 +82,7 @@ fn cold(session: &Session) -> Session {
 }
 
 /// Asserts that a session is where one is that starts from its world.
-fn check(session: &mut Session, why: &str) {
+pub(crate) fn check(session: &mut Session, why: &str) {
     let mut other = cold(session);
     assert_eq!(session.world(), other.world(), "{why}");
     let (rho, options) = (0.95, session.options().clone());
@@ -104,7 +104,7 @@ fn check(session: &mut Session, why: &str) {
 }
 
 /// A command drawn at random, of any kind that does not change the scene.
-fn draw(r: &mut Random, scene: &Scene) -> Command {
+pub(crate) fn draw(r: &mut Random, scene: &Scene) -> Command {
     let one_of = |r: &mut Random, n: usize| (r.unit() * n as f64) as u32 % n as u32;
     let body = BodyId(1 + one_of(r, scene.bodies.len() - 1));
     let material = MaterialId(one_of(r, scene.materials.len()));
@@ -134,7 +134,7 @@ fn draw(r: &mut Random, scene: &Scene) -> Command {
     }
 }
 
-fn insertion(r: &mut Random) -> Command {
+pub(crate) fn insertion(r: &mut Random) -> Command {
     let (corners, triangles) = cube(0.02 + 0.1 * r.unit(), false);
     let shift = [0; 3].map(|_| r.between(-0.8, 0.8));
     let corners: Vec<[f64; 3]> =
@@ -143,7 +143,7 @@ fn insertion(r: &mut Random) -> Command {
     Command::Insert(NewBody::new("new").with_mesh("new", material, &corners, &triangles))
 }
 
-fn kinds() -> [Options; 2] {
+pub(crate) fn kinds() -> [Options; 2] {
     [at_tolerance(0.4), form_factor_oracle(0.2, 0.02)]
 }
 

@@ -35,10 +35,13 @@ fn equal_links_by_different_ways_are_equal() {
         let scratch = Options { update: Update::Scratch, ..options.clone() };
         let warm = at(&scene, &options, &[0.0, 0.9, 0.4, 0.5]);
         let cold = at(&scene, &scratch, &[0.5]);
-        assert_eq!(compare(&warm, &cold), None);
-        let gap = radiosity_gap(&warm, &cold).unwrap();
+        assert_eq!(compare(warm.solved().unwrap(), cold.solved().unwrap()), None);
+        let gap = radiosity_gap(warm.solved().unwrap(), cold.solved().unwrap()).unwrap();
         assert!(gap.bound_w_m2 > 0.0 && gap.share() <= 1.0, "{gap:?}");
-        assert_eq!(radiosity_gap(&cold, &cold).unwrap().difference_w_m2, 0.0);
+        assert_eq!(
+            radiosity_gap(cold.solved().unwrap(), cold.solved().unwrap()).unwrap().difference_w_m2,
+            0.0
+        );
     }
 }
 
@@ -47,7 +50,10 @@ fn another_time_is_another_exchange_area_of_a_link_with_a_moved_end() {
     let scene = Arc::new(lit_room());
     // So coarse that both times have the same links.
     let options = form_factor_oracle(0.9, 10.0);
-    let found = compare(&at(&scene, &options, &[0.0]), &at(&scene, &options, &[0.03]));
+    let found = compare(
+        at(&scene, &options, &[0.0]).solved().unwrap(),
+        at(&scene, &options, &[0.03]).solved().unwrap(),
+    );
     let found = says(
         found,
         &[
@@ -74,8 +80,12 @@ fn another_tolerance_is_a_link_that_exists_in_one_only() {
     let scene = Arc::new(lit_room());
     let (fine, coarse) =
         (at(&scene, &at_tolerance(0.1), &[0.0]), at(&scene, &at_tolerance(0.3), &[0.0]));
-    let found = says(compare(&fine, &coarse), &["exists in the ", "only, with X = "]);
-    let back = compare(&coarse, &fine).expect("they differ that way round too");
+    let found = says(
+        compare(fine.solved().unwrap(), coarse.solved().unwrap()),
+        &["exists in the ", "only, with X = "],
+    );
+    let back = compare(coarse.solved().unwrap(), fine.solved().unwrap())
+        .expect("they differ that way round too");
     let (Difference::OneOnly { which, ends, .. }, Difference::OneOnly { which: other, .. }) =
         (&found, &back)
     else {
@@ -92,11 +102,16 @@ fn another_tolerance_is_a_link_that_exists_in_one_only() {
 fn elements_are_named_by_patch_and_path() {
     let scene = Arc::new(lit_room());
     let options = form_factor_oracle(0.02, 1e-3);
-    let found = compare(&at(&scene, &options, &[0.0]), &at(&scene, &options, &[0.2]));
+    let found = compare(
+        at(&scene, &options, &[0.0]).solved().unwrap(),
+        at(&scene, &options, &[0.2]).solved().unwrap(),
+    );
     // The rester has six sides.
     says(found, &["surface `rester` of body `rester`, patch ", " and surface `lamp`"]);
-    let found =
-        compare(&at(&scene, &at_tolerance(0.1), &[0.0]), &at(&scene, &at_tolerance(0.3), &[0.0]));
+    let found = compare(
+        at(&scene, &at_tolerance(0.1), &[0.0]).solved().unwrap(),
+        at(&scene, &at_tolerance(0.3), &[0.0]).solved().unwrap(),
+    );
     says(found, &[", element "]);
 }
 
@@ -122,9 +137,9 @@ fn radiosities_are_compared_though_all_links_are_equal() {
     let (one, two) = (lamp_over_plate(0.5, 8), lamp_over_plate(0.51, 8));
     let (one, two) = (at(&one, &options, &[0.0]), at(&two, &options, &[0.0]));
     let words = ["the radiosity of surface `plate`", ", facet ", "W/m2", "the residuals allow"];
-    let found = says(compare(&one, &two), &words);
+    let found = says(compare(one.solved().unwrap(), two.solved().unwrap()), &words);
     assert!(matches!(found, Difference::Radiosity { .. }));
-    assert_eq!(radiosity_gap(&one, &two), Err(found));
+    assert_eq!(radiosity_gap(one.solved().unwrap(), two.solved().unwrap()), Err(found));
 }
 
 #[test]
@@ -132,6 +147,6 @@ fn other_scenes_are_not_compared() {
     let options = form_factor_oracle(0.5, 1.0);
     let one = at(&lamp_over_plate(0.5, 4), &options, &[0.0]);
     let two = at(&lamp_over_plate(0.5, 8), &options, &[0.0]);
-    assert_eq!(compare(&one, &two), Some(Difference::Scene));
-    assert_eq!(radiosity_gap(&one, &two), Err(Difference::Scene));
+    assert_eq!(compare(one.solved().unwrap(), two.solved().unwrap()), Some(Difference::Scene));
+    assert_eq!(radiosity_gap(one.solved().unwrap(), two.solved().unwrap()), Err(Difference::Scene));
 }

@@ -28,7 +28,7 @@ fn room(size: DVec3, fill: impl Fn(&mut SceneBuilder, MaterialId)) -> Arc<Scene>
 fn found(scene: &Arc<Scene>, tolerance: f64, sensors: &[Sensor]) -> Vec<f64> {
     let mut session = Session::new(Arc::clone(scene), at_tolerance(tolerance)).unwrap();
     session.step(0, 0.0).unwrap();
-    session.irradiances_at(sensors).into_iter().map(|e| e[0]).collect()
+    session.frame().unwrap().irradiances_at(sensors).into_iter().map(|e| e[0]).collect()
 }
 
 /// What the judge finds there.

@@ -61,7 +61,7 @@ fn light_outside_of_shells_stays_as_it_is_and_inside_there_is_none() {
     let (left, _) = solved(room(true).without_dark_sides(), &[0.3]);
     let up = |at: DVec3| Sensor { at, normal: DVec3::Y };
     for at in [v(0.3, 1e-4, 0.4), v(0.7, 0.3001, 0.7), v(0.1, 0.5, 0.9), v(0.95, 1e-4, 0.95)] {
-        let [a, b] = [&whole, &left].map(|s| s.irradiances_at(&[up(at)])[0]);
+        let [a, b] = [&whole, &left].map(|s| s.frame().unwrap().irradiances_at(&[up(at)])[0]);
         for c in 0..3 {
             assert!((a[c] / b[c] - 1.0).abs() < 0.02, "{at}: {a:?} {b:?}");
         }
@@ -72,7 +72,7 @@ fn light_outside_of_shells_stays_as_it_is_and_inside_there_is_none() {
     for at in inside {
         for normal in [DVec3::Y, DVec3::NEG_Y, DVec3::X] {
             let sensor = Sensor { at, normal };
-            let found = left.irradiances_at(&[sensor])[0];
+            let found = left.frame().unwrap().irradiances_at(&[sensor])[0];
             // To rounding: cracks between shadows of neighbouring faces.
             assert!(found.iter().all(|&e| e < 1e-8), "{sensor:?} {found:?}");
         }

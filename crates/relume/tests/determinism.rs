@@ -17,7 +17,7 @@ fn session(scene: &Arc<Scene>, options: &Options) -> Session {
 
 fn step(session: &mut Session, frame: usize) -> (String, Vec<u64>) {
     let report = session.step(frame as u32, TIMES[frame]).unwrap();
-    (report.hash.clone(), bits(&session.snapshot(), &report))
+    (report.hash.clone(), bits(&session.frame().unwrap().solution(), &report))
 }
 
 /// Every number of a snapshot, and every counter and balance of a report but times and `moved`
@@ -57,7 +57,8 @@ fn any_number_of_threads_gives_the_same_bits() {
             pool.install(|| {
                 let mut s = session(&scene, &options);
                 let frames = [step(&mut s, 1), step(&mut s, 3)];
-                let probe = s.irradiance_at(common::v(0.31, 0.0, 0.42), glam::DVec3::Y);
+                let probe =
+                    s.frame().unwrap().irradiance_at(common::v(0.31, 0.0, 0.42), glam::DVec3::Y);
                 (frames, probe.map(f64::to_bits))
             })
         };
@@ -89,7 +90,7 @@ fn agree(one: &(FrameReport, Snapshot), two: &(FrameReport, Snapshot), what: &st
 
 fn frame(session: &mut Session, k: usize) -> (FrameReport, Snapshot) {
     let report = session.step(k as u32, TIMES[k]).unwrap();
-    (report, session.snapshot())
+    (report, session.frame().unwrap().solution())
 }
 
 #[test]
@@ -101,9 +102,12 @@ fn there_and_back_again_is_where_it_was() {
         for k in (0..TIMES.len()).rev() {
             agree(&frame(&mut s, k), &there[k], &format!("{name}, frame {k} on the way back"));
         }
-        let before = bits(&s.snapshot(), &there[0].0);
+        let before = bits(&s.frame().unwrap().solution(), &there[0].0);
         let again = s.step(0, TIMES[0]).unwrap();
-        assert!(bits(&s.snapshot(), &there[0].0) == before, "{name}: standing still");
+        assert!(
+            bits(&s.frame().unwrap().solution(), &there[0].0) == before,
+            "{name}: standing still"
+        );
         assert_eq!((again.examined, again.sweeps), (0, 0), "{name}: standing still is work");
     }
 }

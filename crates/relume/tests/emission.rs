@@ -38,7 +38,7 @@ const FORM_FACTOR: Oracle = Oracle::FormFactor { epsilon: 0.05, min_area_m2: 0.0
 
 /// Mean radiosity of every patch.
 fn means(session: &Session) -> Vec<[f64; 3]> {
-    let snapshot = session.snapshot();
+    let snapshot = session.frame().unwrap().solution();
     let of_patch = |k: usize| {
         let leaves = snapshot.leaves_of(relume::scene::PatchId(k as u32));
         let (mut sum, mut area) = ([0.0; 3], 0.0);
@@ -165,10 +165,10 @@ fn what_is_solved_after_a_lamp_changed_can_be_reconstructed() {
     let mut session = Session::new(scene.clone(), options(Oracle::Error)).unwrap();
     for frame in 0..4 {
         session.step(frame, f64::from(frame)).unwrap();
-        let warm = session.reconstruction();
+        let warm = session.frame().unwrap().reconstruction();
         let mut cold = Session::new(scene.clone(), options(Oracle::Error)).unwrap();
         cold.step(frame, f64::from(frame)).unwrap();
-        let cold = cold.reconstruction();
+        let cold = cold.frame().unwrap().reconstruction();
         for (one, two) in warm.leaves.iter().zip(&cold.leaves) {
             assert!(
                 (one.radiosity[0] - two.radiosity[0]).abs() <= 0.01 * two.radiosity[0].max(0.1)

@@ -30,7 +30,7 @@ fn factors_between_patches_are_exact_to_a_thousandth_where_bodies_hide_each_othe
     let patches = scene.patches.len() as u32;
     let mut session = Session::new(Arc::clone(&scene), Options::default()).unwrap();
     session.step(0, 0.0).unwrap();
-    let (tree, forest) = session.pairs();
+    let (tree, forest) = session.frame().unwrap().pairs();
     let polygons = judged::polygons(&scene, 0.0);
     let mut factors = vec![0.0; (patches * patches) as usize];
     for link in tree.links() {
@@ -66,7 +66,7 @@ fn rows_of(name: &str, tolerance: f64, frames: &[u32]) -> f64 {
     let mut worst = 0.0_f64;
     for &frame in frames {
         session.step(frame, f64::from(frame) / 24.0).unwrap();
-        let factors = session.factors(&Grouping::by_patch(&scene));
+        let factors = session.frame().unwrap().factors(&Grouping::by_patch(&scene));
         let rows = (0..factors.len() as u32).map(|patch| (factors.row_sum(patch) - 1.0).abs());
         // The ceiling of the animated room sees the black back of its lamp.
         worst = rows.filter(|off| *off < 0.05).fold(worst, f64::max);

@@ -57,7 +57,7 @@ impl std::fmt::Display for Off {
 
 /// Compares the radiosities of all patches that `counts` lets through.
 fn off(session: &Session, counts: impl Fn(&str, DVec3) -> bool) -> Off {
-    off_in(&session.snapshot(), counts)
+    off_in(&session.frame().unwrap().solution(), counts)
 }
 
 fn off_in(snapshot: &Snapshot, counts: impl Fn(&str, DVec3) -> bool) -> Off {
@@ -135,7 +135,7 @@ fn every_leaf_is_within_a_thousandth_when_it_is_reconstructed() {
     let mut session = Session::new(Arc::new(furnace(0.2)), Options::default()).unwrap();
     for frame in 0..=8 {
         session.step(frame, f64::from(frame) / 8.0).unwrap();
-        let o = off_in(&session.reconstruction(), everything);
+        let o = off_in(&session.frame().unwrap().reconstruction(), everything);
         println!("reconstructed frame {frame}: {o}");
         assert!(o.max < 1e-3 && o.rms < 1e-4, "frame {frame}: {o:?}");
         assert!(o.patch < 5e-4 && o.mean.abs() < 5e-5, "frame {frame}: {o:?}");

@@ -24,7 +24,7 @@ fn session(fill: impl Fn(&mut SceneBuilder)) -> Session {
 
 /// What arrives at the origin from above.
 fn at_the_origin(fill: impl Fn(&mut SceneBuilder)) -> f64 {
-    session(fill).irradiance_at(DVec3::ZERO, DVec3::Z)[0]
+    session(fill).frame().unwrap().irradiance_at(DVec3::ZERO, DVec3::Z)[0]
 }
 
 /// Corners of a regular polygon about the axis at a height.
@@ -101,9 +101,9 @@ fn many_sensors_are_answered_in_their_order_and_alike_one_by_one() {
         Sensor { at: v(f64::from(k) * 0.05 - 1.0, 0.1, 0.0), normal }
     };
     let sensors: Vec<Sensor> = (0..40).map(sensor).collect();
-    let all = session.irradiances_at(&sensors);
+    let all = session.frame().unwrap().irradiances_at(&sensors);
     assert!(all.iter().all(|e| e[0] > 0.0));
     for (s, e) in sensors.iter().zip(all) {
-        assert_eq!(session.irradiance_at(s.at, s.normal), e);
+        assert_eq!(session.frame().unwrap().irradiance_at(s.at, s.normal), e);
     }
 }

@@ -172,7 +172,7 @@ fn follow(seed: u64) {
         assert!(report.link_kinds.unwrap().group_element > 0, "seed {seed}");
         let (of_cold, want) = built(&scene, &options, time_s);
         assert_eq!(state(&report), state(&want), "seed {seed} at {time_s}");
-        let gap = radiosity_gap(&warm, &of_cold);
+        let gap = radiosity_gap(warm.solved().unwrap(), of_cold.solved().unwrap());
         assert!(gap.is_ok(), "seed {seed} at {time_s}: {gap:?}");
         // What comes over groups counts in them, after elements were put together too.
         let rows = [&report, &want].map(|report| report.row_sum_error.unwrap().rms);
@@ -198,7 +198,7 @@ fn heaps_receive_what_they_do_without_groups() {
         let solve = |options: Options| {
             let mut session = Session::new(Arc::clone(&scene), options).unwrap();
             session.step(0, 0.0).unwrap();
-            patch_means(&session.snapshot())
+            patch_means(&session.frame().unwrap().solution())
         };
         let want = solve(Options { groups: false, ..at_tolerance(0.1) });
         let (by_area, by_patch) = difference(&solve(at_tolerance(0.2)), &want);
@@ -240,7 +240,7 @@ fn a_lumpy_body_receives_what_it_does_over_links_of_its_patches() {
     let solve = |options: Options| {
         let mut session = Session::new(Arc::clone(&scene), options).unwrap();
         let report = session.step(0, 0.0).unwrap();
-        (patch_means(&session.snapshot()), report)
+        (patch_means(&session.frame().unwrap().solution()), report)
     };
     let (want, plain) = solve(Options { groups: false, ..at_tolerance(0.05) });
     let (found, grouped) = solve(at_tolerance(0.1));
@@ -283,7 +283,7 @@ fn furnished() -> Scene {
 #[test]
 fn what_stands_under_tables_is_as_dark_as_without_groups() {
     let scene = Arc::new(furnished());
-    let means = |options| patch_means(&built(&scene, &options, 0.0).0.snapshot());
+    let means = |options| patch_means(&built(&scene, &options, 0.0).0.frame().unwrap().solution());
     let want = means(Options { groups: false, ..at_tolerance(0.05) });
     let (by_area, by_patch) = difference(&means(at_tolerance(0.1)), &want);
     println!("{by_area:.4} by area, {by_patch:.4} by patch");
@@ -300,7 +300,10 @@ fn a_small_mover_among_groups_has_few_receivers_gathered() {
         let report = warm.step(frame as u32, time_s).unwrap();
         let (of_cold, want) = built(&scene, &options, time_s);
         assert_eq!(state(&report), state(&want), "at {time_s}");
-        assert!(radiosity_gap(&warm, &of_cold).is_ok(), "at {time_s}");
+        assert!(
+            radiosity_gap(warm.solved().unwrap(), of_cold.solved().unwrap()).is_ok(),
+            "at {time_s}"
+        );
         println!("{time_s}: {} gathered of {}", report.gathers, report.elements);
         assert!(frame == 0 || report.gathers < report.elements / 4, "{report:?}");
     }
@@ -320,7 +323,7 @@ fn a_furnace_is_uniform_with_groups() {
     for (frame, time_s) in [0.0, 0.3].into_iter().enumerate() {
         let report = session.step(frame as u32, time_s).unwrap();
         assert!(report.link_kinds.unwrap().group_element > 0);
-        let means = patch_means(&session.snapshot());
+        let means = patch_means(&session.frame().unwrap().solution());
         let area: f64 = means.iter().map(|m| m.0).sum();
         // B = M + rho H = 2, so H = 2.
         let off: f64 = means.iter().map(|m| m.0 * (m.1 / 2.0 - 1.0).powi(2)).sum::<f64>() / area;

@@ -19,7 +19,7 @@ fn check(name: &str, scene: &Scene, options: Options, row_slack: f64) -> Audit {
         a.coverage, a.local_coverage, a.areas, a.visibility, a.row_sum, a.row_excess, report.links
     );
     a.check(row_slack);
-    let counted = session.pairs().0.links().count() as u64;
+    let counted = session.frame().unwrap().pairs().0.links().count() as u64;
     assert_eq!((report.links, report.pairs.active), (counted, counted));
     a
 }
@@ -128,7 +128,7 @@ fn a_plain_room_read_leaf_by_leaf_keeps_every_tolerance() {
     for tolerance in [0.05, 0.02, 0.01, 0.005] {
         let (session, report) = solved(scene.clone(), at_tolerance(tolerance));
         let (mut squares, mut area, mut max) = (0.0, 0.0, 0.0_f64);
-        for leaf in &session.reconstruction().leaves {
+        for leaf in &session.frame().unwrap().reconstruction().leaves {
             // Exitance 1 and reflectance 1/2: everything receives 2.
             let off = f64::from(leaf.irradiance[0]) / 2.0 - 1.0;
             squares += leaf_area(leaf) * off * off;

@@ -7,8 +7,23 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms of the engine, from the ground up. A room may use those before it.
-const ROOMS: [&str; 9] =
-    ["geometry", "scene", "element", "transport", "event", "pair", "solver", "session", "flat"];
+const ROOMS: [&str; 12] = [
+    "geometry",
+    "scene",
+    "element",
+    "transport",
+    "event",
+    "pair",
+    "solver",
+    "follow",
+    "space",
+    "read",
+    "session",
+    "flat",
+];
+
+/// What the phases of a frame must not know, though it is above them: where things are is asked of a space.
+const NOT_OF_FRAMES: [&str; 3] = ["geometry", "scene", "transport"];
 
 /// The crates from the ground up, with the names they have in source text.
 const CRATES: [(&str, &str); 3] =
@@ -132,6 +147,19 @@ fn each_room_uses_only_rooms_above_it() {
     }
     assert!(rooms_seen >= 3, "the engine's source was not found");
     assert!(wrong.is_empty(), "rooms out of order:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_phases_of_a_frame_know_no_space() {
+    let follow = crates_dir().join("relume/src/follow");
+    let files = sources(&follow);
+    assert!(files.len() > 5, "the phases were not found");
+    for file in files {
+        let text = fs::read_to_string(&file).unwrap();
+        for (line, name) in rooms_used(&text) {
+            assert!(!NOT_OF_FRAMES.contains(&&*name), "{}:{line} uses {name}", file.display());
+        }
+    }
 }
 
 #[test]

@@ -50,7 +50,7 @@ fn shade() -> Quad {
 
 /// Flux that arrives on a surface by its leaves, W, first channel.
 fn flux(session: &Session, surface: &str) -> f64 {
-    let snapshot = session.snapshot();
+    let snapshot = session.frame().unwrap().solution();
     let ids = patches_of(session.scene(), surface);
     let leaves = ids.iter().flat_map(|&p| snapshot.leaves_of(p));
     leaves.map(|l| leaf_area(l) * f64::from(l.irradiance[0])).sum()
@@ -59,7 +59,7 @@ fn flux(session: &Session, surface: &str) -> f64 {
 /// Irradiance of the mesh against a closed form at the leaves' own points, relative to the mean:
 /// area-weighted RMS.
 fn mesh_error(session: &Session, exact: impl Fn(DVec3) -> f64) -> f64 {
-    let snapshot = session.snapshot();
+    let snapshot = session.frame().unwrap().solution();
     let floor = patches_of(session.scene(), "floor")[0];
     let mean = flux(session, "floor") / area_of(session.scene(), "floor");
     let mut errors = Vec::new();
@@ -112,12 +112,16 @@ fn irradiance_on_a_plane_follows_the_closed_form() {
         let exact = |p| on_floor(kind, at, along, p);
         let (session, report) = solved(lit_floor(kind, at, along, false), Options::default());
         for p in [v(0.0, 0.0, 0.0), v(0.9, 0.9, 0.0), v(-0.4, 0.3, 0.0), v(0.1, -0.8, 0.0)] {
-            let e = session.irradiance_at(p, DVec3::Z);
+            let e = session.frame().unwrap().irradiance_at(p, DVec3::Z);
             for c in 0..3 {
                 let want = exact(p) * I[c] / I[0];
                 assert!((e[c] - want).abs() <= 1e-9 * want, "{name} at {p}: {} {want}", e[c]);
             }
-            assert_eq!(session.irradiance_at(p, -DVec3::Z), [0.0; 3], "{name} from below");
+            assert_eq!(
+                session.frame().unwrap().irradiance_at(p, -DVec3::Z),
+                [0.0; 3],
+                "{name} from below"
+            );
         }
         let off = mesh_error(&session, exact);
         println!("{name}: mesh {off:.1e} RMS of the mean irradiance, {} links", report.links);
@@ -166,7 +170,7 @@ fn a_shadow_has_its_edge_where_it_belongs() {
             LightKind::Directional => p + along / -along.z * p.z,
             _ => at + (p - at) * (at.z / (at.z - p.z)),
         };
-        let e = |p: DVec3| session.irradiance_at(thrown(p), DVec3::Z)[0];
+        let e = |p: DVec3| session.frame().unwrap().irradiance_at(thrown(p), DVec3::Z)[0];
         for edge in [v(0.3, 0.1, 1.0), v(-0.3, -0.1, 1.0), v(0.1, 0.3, 1.0), v(0.0, -0.3, 1.0)] {
             let out = (v(edge.x, edge.y, 0.0) / 0.3).trunc() * 1e-4;
             assert_eq!(e(edge - out), 0.0, "{name}: inside at {edge}");
@@ -255,20 +259,23 @@ fn a_body_that_is_absent_casts_no_shadow_and_carries_nothing() {
     let before = session.step(0, 0.0).unwrap();
     let points = [v(0.0, 0.0, 0.0), v(0.1, 0.3, 0.0), v(-0.7, 0.8, 0.0)];
     for p in points {
-        let (e, want) = (session.irradiance_at(p, DVec3::Z), empty.irradiance_at(p, DVec3::Z));
+        let (e, want) = (
+            session.frame().unwrap().irradiance_at(p, DVec3::Z),
+            empty.frame().unwrap().irradiance_at(p, DVec3::Z),
+        );
         assert!((e[0] / want[0] - 1.0).abs() < 1e-5, "{e:?} {want:?}");
     }
     let visitor = patches_of(session.scene(), "visitor");
     let leaves = |s: &Session| {
-        let snapshot = s.snapshot();
+        let snapshot = s.frame().unwrap().solution();
         visitor.iter().map(|&p| snapshot.leaves_of(p).len()).sum::<usize>()
     };
     assert_eq!(leaves(&session), 0);
     // The area of the scene, which errors are weighed by, is another.
     assert!(before.links.abs_diff(bare.links) < bare.links / 5, "{} {}", before.links, bare.links);
     assert!((flux(&session, "floor") / flux(&empty, "floor") - 1.0).abs() < 1e-5);
-    for end in session.pairs().0.links().flat_map(|l| [l.a, l.b]) {
-        let patch = session.pairs().1.patch(end);
+    for end in session.frame().unwrap().pairs().0.links().flat_map(|l| [l.a, l.b]) {
+        let patch = session.frame().unwrap().pairs().1.patch(end);
         assert!(patch.is_none_or(|p| !visitor.contains(&p)), "a link on an absent body");
     }
 
@@ -276,8 +283,8 @@ fn a_body_that_is_absent_casts_no_shadow_and_carries_nothing() {
     assert!(leaves(&session) >= 6);
     assert!(during.links > before.links);
     assert_eq!(during.moved, ["visitor"]);
-    let shade = session.irradiance_at(points[0], DVec3::Z)[0];
-    assert!(shade < 0.7 * empty.irradiance_at(points[0], DVec3::Z)[0], "{shade}");
+    let shade = session.frame().unwrap().irradiance_at(points[0], DVec3::Z)[0];
+    assert!(shade < 0.7 * empty.frame().unwrap().irradiance_at(points[0], DVec3::Z)[0], "{shade}");
 
     let after = session.step(2, 2.0).unwrap();
     assert_eq!(after.hash, before.hash);

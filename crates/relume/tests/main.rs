@@ -18,6 +18,7 @@ mod gather;
 mod groups;
 mod import;
 mod incremental;
+mod kept;
 mod laws;
 mod layers;
 mod lights;

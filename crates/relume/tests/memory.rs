@@ -30,7 +30,7 @@ struct Worst {
 
 impl Worst {
     fn see(&mut self, session: &Session) {
-        let (memory, (tree, forest)) = (session.memory(), session.pairs());
+        let (memory, (tree, forest)) = (session.memory(), session.frame().unwrap().pairs());
         let links = tree.counts().active;
         assert!(links > 8_000, "{links} links: what a scene needs once would count");
         self.pair = self.pair.max(memory.pairs as f64 / tree.len() as f64);

@@ -64,7 +64,7 @@ fn rows_sum_to_one_and_entries_are_right_at_every_place_of_the_box() {
     for frame in 0..=4 {
         let time_s = f64::from(frame) / 4.0;
         session.step(frame, time_s).unwrap();
-        let f = sums.factors(&session);
+        let f = sums.factors(session.frame().unwrap());
         let offs = (0..f.len() as u32).map(|row| ((f.row_sum(row) - 1.0).abs(), row));
         let (worst, row) = offs.fold((0.0, 0), |m, o| if o.0 > m.0 { o } else { m });
         let name = &grouping.names[row as usize];
@@ -105,10 +105,11 @@ fn what_was_summed_before_leaves_no_trace() {
     let mut warm = session(&joined.scene);
     for (frame, time_s) in [0.0, 0.1, 0.11, 0.9, 0.3, 0.3, 0.0].into_iter().enumerate() {
         warm.step(frame as u32, time_s).unwrap();
-        let found = kept.factors(&warm);
+        let found = kept.factors(warm.frame().unwrap());
         let mut cold = session(&joined.scene);
         cold.step(0, time_s).unwrap();
-        let anew = PartFactors::new(&scene, &joined, grouping.clone()).factors(&cold);
+        let anew =
+            PartFactors::new(&scene, &joined, grouping.clone()).factors(cold.frame().unwrap());
         assert!(found == anew, "at {time_s} s");
     }
 }
@@ -119,8 +120,9 @@ fn cells_in_one_group_are_as_the_whole_wall() {
     let joined = scene.joined();
     let mut session = session(&joined.scene);
     session.step(0, 0.4).unwrap();
-    let by_body = PartFactors::new(&scene, &joined, Grouping::by_body(&scene)).factors(&session);
-    let whole = session.factors(&Grouping::by_body(&joined.scene));
+    let by_body = PartFactors::new(&scene, &joined, Grouping::by_body(&scene))
+        .factors(session.frame().unwrap());
+    let whole = session.frame().unwrap().factors(&Grouping::by_body(&joined.scene));
     for row in 0..2 {
         for ((to, one), (_, other)) in by_body.row(row).zip(whole.row(row)) {
             assert!((one - other).abs() < 1e-9, "{row} to {to}: {one} {other}");
@@ -131,7 +133,7 @@ fn cells_in_one_group_are_as_the_whole_wall() {
     let wall = |k: usize| (k / (CELLS[0] * CELLS[0])).min(6) as u32;
     by_wall.names = (0..7).map(|k| format!("{k}")).collect();
     by_wall.of_patch = (0..scene.patches.len()).map(|k| Some(wall(k))).collect();
-    let walls = PartFactors::new(&scene, &joined, by_wall).factors(&session);
+    let walls = PartFactors::new(&scene, &joined, by_wall).factors(session.frame().unwrap());
     for row in 0..7 {
         assert!((walls.row_sum(row) - 1.0).abs() < 1e-3, "{row}: {}", walls.row_sum(row));
     }
@@ -159,7 +161,7 @@ fn a_body_that_is_absent_leaves_room() {
     let mut session = Session::new(Arc::new(joined.scene.clone()), options).unwrap();
     for time_s in [0.0, 1.0, 0.5] {
         session.step(0, time_s).unwrap();
-        let f = sums.factors(&session);
+        let f = sums.factors(session.frame().unwrap());
         let there = f.area_m2.iter().filter(|a| **a > 0.0).count();
         assert_eq!(there, if time_s < 1.0 { 96 } else { 192 });
         for row in (0..f.len() as u32).filter(|&g| f.area_m2[g as usize] > 0.0) {

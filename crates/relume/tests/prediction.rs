@@ -53,7 +53,11 @@ fn certificates_miss_nothing_and_spare_work() {
         let updates = [Update::Certificate, Update::Reinspect];
         let seen = follow(&options, updates, 47, |frame, [(one, a), (two, b)]| {
             assert_eq!(one.hash, two.hash, "{name}, frame {frame}");
-            assert_eq!(missed(a, b), Missed::default(), "{name}, frame {frame}");
+            assert_eq!(
+                missed(a.solved().unwrap(), b.solved().unwrap()),
+                Missed::default(),
+                "{name}, frame {frame}"
+            );
             assert_eq!((one.changed, one.segments), (two.changed, two.segments));
             assert_eq!(two.followed + two.certified + two.extrapolated, 0);
             [one.examined, two.examined, one.followed, one.certified, one.changed]
@@ -85,7 +89,7 @@ fn extrapolation_of_one_frame_loses_nothing() {
 fn extrapolation_spares_work_and_says_what_it_loses() {
     for (name, options) in oracles() {
         let seen = follow(&options, [SEVEN, Update::Reinspect], 47, |_, [(one, a), (two, b)]| {
-            let error = radiosity_error(a, b);
+            let error = radiosity_error(a.solved().unwrap(), b.solved().unwrap());
             assert!(error.max >= error.rms);
             (one.examined, two.examined, one.extrapolated, error.rms)
         });
@@ -105,7 +109,7 @@ fn a_smaller_error_asked_for_is_a_smaller_error() {
     let found = [0.1, 0.003].map(|error| {
         let update = Update::Extrapolate { frames: 64, error: Some(error) };
         let seen = follow(&options, [update, Update::Reinspect], 40, |_, [(one, a), (_, b)]| {
-            (one.examined, radiosity_error(a, b).rms)
+            (one.examined, radiosity_error(a.solved().unwrap(), b.solved().unwrap()).rms)
         });
         let judged = seen.iter().map(|s| s.0).sum::<u64>();
         (judged, seen.iter().map(|s| s.1).fold(0.0, f64::max))
@@ -119,7 +123,12 @@ fn a_smaller_error_asked_for_is_a_smaller_error() {
 fn once_all_is_at_rest_nothing_is_lost() {
     let options = form_factor_oracle(0.05, 1e-3);
     let last = follow(&options, [SEVEN, Update::Reinspect], 70, |_, [(one, a), (two, b)]| {
-        (one.hash == two.hash, missed(a, b), one.extrapolated, one.examined)
+        (
+            one.hash == two.hash,
+            missed(a.solved().unwrap(), b.solved().unwrap()),
+            one.extrapolated,
+            one.examined,
+        )
     });
     assert!(!last[30].0, "the test means nothing if nothing is extrapolated");
     let (same, missed, extrapolated, examined) = last[last.len() - 1];
@@ -154,7 +163,7 @@ fn events_are_those_that_are_counted() {
         let options = Options { events: true, ..options };
         let updates = [Update::Certificate, Update::Reinspect];
         let events = follow(&options, updates, 24, |frame, [(report, a), (_, b)]| {
-            let (events, same) = (a.events(), b.events());
+            let (events, same) = (a.frame().unwrap().events(), b.frame().unwrap().events());
             assert_eq!(events, same, "{name}, frame {frame}");
             let count = |kinds: &[EventKind]| {
                 events.iter().filter(|e| kinds.contains(&e.kind)).count() as u64
@@ -191,7 +200,7 @@ fn extrapolated_light_does_not_grow_without_end() {
         Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/cornell_moving_box_and_lamp.glb");
     let scene = Arc::new(import(&path, &ImportOptions::default()).unwrap());
     let mean = |session: &Session| {
-        let snapshot = session.snapshot();
+        let snapshot = session.frame().unwrap().solution();
         let (mut area, mut sum) = (0.0, 0.0);
         for leaf in &snapshot.leaves {
             let a = common::leaf_area(leaf);

@@ -106,10 +106,12 @@ fn at_sensors(tolerance: f64, frames: &[u32]) -> (Misses, Misses) {
     let (mut gathered, mut meshed) = (Misses::default(), Misses::default());
     for &frame in frames {
         let report = session.step(frame, f64::from(frame) / 24.0).unwrap();
-        let snapshot = session.snapshot();
+        let snapshot = session.frame().unwrap().solution();
         let here: Vec<Sensor> = sensors().into_iter().filter(|s| s.frame == frame).collect();
-        let values: Vec<[f64; 3]> =
-            here.par_iter().map(|s| session.irradiance_at(s.at, s.normal)).collect();
+        let values: Vec<[f64; 3]> = here
+            .par_iter()
+            .map(|s| session.frame().unwrap().irradiance_at(s.at, s.normal))
+            .collect();
         let (mut g, mut m) = (Misses::default(), Misses::default());
         for (s, e) in here.iter().zip(values) {
             let (leaf, p) = leaf_at(&snapshot, s.at, s.normal).expect("sensors lie on surfaces");
@@ -215,8 +217,8 @@ fn patch_means_of_the_static_room() {
     // Without bends 1.3, 0.8 and 0.64 %.
     for (tolerance, most) in [(0.1, 0.009), (0.05, 0.007), (0.02, 0.004)] {
         let (session, report) = solved(shipped("room_box_static.glb"), at_tolerance(tolerance));
-        let (off, bias) = patch_means(&session.snapshot());
-        let (anew, slant) = patch_means(&session.reconstruction());
+        let (off, bias) = patch_means(&session.frame().unwrap().solution());
+        let (anew, slant) = patch_means(&session.frame().unwrap().reconstruction());
         println!(
             "static room at {tolerance}: RMS {off:.4}, bias {bias:+.5}; reconstructed {anew:.4}, {slant:+.5}; {} links",
             report.links
@@ -232,7 +234,7 @@ fn patch_means_of_the_static_room() {
 fn the_mean_over_the_static_room_is_exact() {
     // Closed and of uniform reflectance: flux / ((1 - rho) A), whatever the shapes.
     let (session, _) = solved(shipped("room_box_static.glb"), at_tolerance(0.02));
-    let snapshot = session.snapshot();
+    let snapshot = session.frame().unwrap().solution();
     let (mut area, mut flux) = (0.0, 0.0);
     for leaf in &snapshot.leaves {
         area += common::leaf_area(leaf);

@@ -28,7 +28,7 @@ fn same_pairs([warm, cold]: [&Session; 2]) {
 
 /// Largest radiosity of a named surface, first channel.
 fn brightest(session: &Session, surface: &str) -> f64 {
-    let snapshot = session.snapshot();
+    let snapshot = session.frame().unwrap().solution();
     let patches = common::patches_of(session.scene(), surface);
     let leaves = patches.iter().flat_map(|&p| snapshot.leaves_of(p));
     leaves.map(|l| f64::from(l.radiosity[0])).fold(0.0, f64::max)
@@ -36,7 +36,8 @@ fn brightest(session: &Session, surface: &str) -> f64 {
 
 /// Largest difference of radiosities over a named surface, first channel.
 fn apart(one: &Session, two: &Session, surface: &str) -> f64 {
-    let [one, two] = [one, two].map(|s| (s.snapshot(), common::patches_of(s.scene(), surface)));
+    let [one, two] =
+        [one, two].map(|s| (s.frame().unwrap().solution(), common::patches_of(s.scene(), surface)));
     let leaves = |s: &(relume::session::Snapshot, Vec<relume::scene::PatchId>)| -> Vec<f64> {
         let of = s.1.iter().flat_map(|&p| s.0.leaves_of(p));
         of.map(|l| f64::from(l.radiosity[0])).collect()
@@ -242,8 +243,8 @@ fn r8_no_light_leaks_under_a_wall() {
     let dark = |tolerance| {
         let mut session = Session::new(Arc::clone(&scene), at_tolerance(tolerance)).unwrap();
         session.step(0, 0.0).unwrap();
-        let beside = session.irradiance_at(v(3.4, 1.5, 0.0), DVec3::Z)[0];
-        [beside, session.irradiance_at(v(5.5, 1.5, 0.0), DVec3::Z)[0]]
+        let beside = session.frame().unwrap().irradiance_at(v(3.4, 1.5, 0.0), DVec3::Z)[0];
+        [beside, session.frame().unwrap().irradiance_at(v(5.5, 1.5, 0.0), DVec3::Z)[0]]
     };
     let (coarse, fine) = (dark(0.1), dark(0.01));
     for (coarse, fine) in coarse.iter().zip(fine) {

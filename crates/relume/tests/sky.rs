@@ -11,7 +11,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use relume::scene::outside::{Day, Environment, Outside, SUN_DIAMETER_DEG, Sky, Sun, SunPlace};
 use relume::scene::{Scene, SceneBuilder};
-use relume::session::{Sensor, Session, Solution, Update};
+use relume::session::{Sensor, Session, Update};
 use relume_judge::{Random, World};
 
 const UP: DVec3 = DVec3::Y;
@@ -48,7 +48,7 @@ fn solved(scene: Scene, outside: Outside, tolerance: f64) -> Session {
 
 /// The mean irradiance of a surface, as elements have it.
 fn mean_of(session: &Session, surface: &str) -> f64 {
-    let snapshot = session.snapshot();
+    let snapshot = session.frame().unwrap().solution();
     let (mut sum, mut all) = (0.0, 0.0);
     for (k, patch) in (0..).zip(&snapshot.scene.patches) {
         if snapshot.scene.surfaces[patch.surface.0 as usize].name == surface {
@@ -83,7 +83,7 @@ fn a_horizontal_surface_sees_the_whole_sky() {
         let session = solved(floor(2.0, |_| ()), outside, 0.01);
         let share = if matches!(sky, Sky::Uniform(_) | Sky::Overcast { .. }) { 1e-3 } else { 2e-3 };
         close(mean_of(&session, "floor"), exact, share);
-        close(session.irradiance_at(v(0.3, 0.0, 0.1), UP)[0], exact, share);
+        close(session.frame().unwrap().irradiance_at(v(0.3, 0.0, 0.1), UP)[0], exact, share);
     }
 }
 
@@ -129,7 +129,7 @@ fn a_floor_between_two_long_walls_sees_a_strip_of_sky() {
         0.5 * PI * (sine(half - x) + sine(half + x))
     };
     for x in [0.0, 0.3, -0.7, 0.95] {
-        close(session.irradiance_at(v(x, 0.0, 0.2), UP)[0], at(x), 1e-3);
+        close(session.frame().unwrap().irradiance_at(v(x, 0.0, 0.2), UP)[0], at(x), 1e-3);
     }
     let mean = (0..1000).map(|k| at(-1.0 + (f64::from(k) + 0.5) / 500.0)).sum::<f64>() / 1000.0;
     close(mean_of(&session, "floor"), mean, 1e-3);
@@ -158,7 +158,9 @@ fn the_sun_shines_aslant_and_its_shadows_are_soft() {
     let edge = 3.0 - height / elevation.tan();
     let width = height / (elevation - radius).tan() - height / (elevation + radius).tan();
     // In the east the sun: shadow is west of the wall, from x = 3 down to the edge.
-    let at = |x: f64| session.irradiance_at(v(x, 0.0, 0.0), UP)[0] / (500.0 * elevation.sin());
+    let at = |x: f64| {
+        session.frame().unwrap().irradiance_at(v(x, 0.0, 0.0), UP)[0] / (500.0 * elevation.sin())
+    };
     close(at(edge - 0.6 * width), 1.0, 2e-3);
     assert!(at(edge + 0.6 * width) < 1e-6);
     // Of a disc the share above a chord at height h of its radius.
@@ -284,11 +286,11 @@ fn error_of(name: &str, scene: &Scene, outside: &Outside, places: &[Sensor], tol
     for &tolerance in tolerances {
         let outside = Outside { fineness: tolerance, ..outside.clone() };
         let session = solved(scene.clone(), outside, tolerance);
-        let found = session.irradiances_at(places);
+        let found = session.frame().unwrap().irradiances_at(places);
         let off = |(f, e): (&[f64; 3], &(f64, f64))| f[0] / e.0 - 1.0;
         let off: Vec<f64> = found.iter().zip(&exact).map(off).collect();
         let rms = (off.iter().map(|o| o * o).sum::<f64>() / off.len() as f64).sqrt();
-        let report = session.report();
+        let report = session.frame().unwrap().report();
         println!(
             "{name} at {tolerance}: {} facets, {} links, {:.2} s, off by {rms:.4} (noise {:.4}), {}",
             session.scene().patches.len() - scene.patches.len(),
@@ -433,14 +435,22 @@ fn a_picture_lights_from_all_round_and_its_brightest_pixel_is_a_lamp() {
     let (towards, solid) = pixel(at.0, at.1);
     let lamp = (f64::from(radiance) - 0.5) * solid;
     assert!(towards.x > 0.5 && towards.z < -0.1, "{towards}");
-    close(session.irradiance_at(DVec3::ZERO, UP)[0], 0.5 * PI + lamp * towards.y, 5e-3);
-    let east = session.irradiance_at(v(5.0, 1.0, 0.0), DVec3::X);
+    close(
+        session.frame().unwrap().irradiance_at(DVec3::ZERO, UP)[0],
+        0.5 * PI + lamp * towards.y,
+        5e-3,
+    );
+    let east = session.frame().unwrap().irradiance_at(v(5.0, 1.0, 0.0), DVec3::X);
     close(east[0], 0.5 * PI + lamp * towards.x, 5e-3);
     close(mean_of(&session, "wall"), east[0], 5e-3);
     // Turned by a quarter to the left, what was in the north-east is in the north-west.
     let session = solved(floor(1.0, wall), outside(90.0), 0.01);
-    close(session.irradiance_at(v(5.0, 1.0, 0.0), DVec3::X)[2], 2.0 * PI, 5e-3);
-    close(session.irradiance_at(v(5.0, 1.0, 0.0), -DVec3::Z)[0], 0.5 * PI + lamp * towards.x, 5e-3);
+    close(session.frame().unwrap().irradiance_at(v(5.0, 1.0, 0.0), DVec3::X)[2], 2.0 * PI, 5e-3);
+    close(
+        session.frame().unwrap().irradiance_at(v(5.0, 1.0, 0.0), -DVec3::Z)[0],
+        0.5 * PI + lamp * towards.x,
+        5e-3,
+    );
 }
 
 #[test]
@@ -512,6 +522,7 @@ fn what_is_outside_has_no_place_in_the_scene() {
     let energy = report.energy.unwrap();
     assert!((energy.absorbed_w / energy.emitted_w - 1.0).abs() < 1e-3, "{energy:?}");
     assert!(energy.escaped_w.abs() < 1e-3 * energy.emitted_w, "{energy:?}");
-    let sky_leaves = |p: u32| session.snapshot().leaves_of(relume::scene::PatchId(p)).len();
+    let sky_leaves =
+        |p: u32| session.frame().unwrap().solution().leaves_of(relume::scene::PatchId(p)).len();
     assert_eq!(sky_leaves(scene.patches.len() as u32), 0);
 }

@@ -116,7 +116,7 @@ fn counters_say_what_brute_force_finds() {
 
 /// Pairs without an end on the body of which state, X or V differ between two tables.
 fn changed_elsewhere(session: &Session, body: &str, [one, two]: [&Table; 2]) -> usize {
-    let (scene, (_, forest)) = (session.scene(), session.pairs());
+    let (scene, (_, forest)) = (session.scene(), session.frame().unwrap().pairs());
     let on_it = |end: &(u32, u32)| {
         let id = ElementId(end.0);
         let patch = forest.patch(id).map(|p| scene.patches[p.0 as usize].body);
@@ -194,7 +194,7 @@ fn a_second_room_is_left_alone() {
     counts_exactly("one room", &alone.0, &alone.1);
     counts_exactly("two rooms", &both.0, &both.1);
     let far = cold(&with_second_room(true), &options, 0.0);
-    let (tree, forest) = far.pairs();
+    let (tree, forest) = far.frame().unwrap().pairs();
     let scene = far.scene();
     let is_far = |e: ElementId| {
         let patch = forest.patch(e).map(|p| scene.patches[p.0 as usize].body);
@@ -237,7 +237,7 @@ fn a_body_that_appears_and_disappears_leaves_no_trace() {
 fn comes_and_goes(scene: &Arc<Scene>) {
     for (name, options) in both_oracles() {
         let mut session = cold(scene, &options, 0.0);
-        let (empty, elements) = (pairs_of(&session), session.pairs().1.counts());
+        let (empty, elements) = (pairs_of(&session), session.frame().unwrap().pairs().1.counts());
         session.step(1, 1.0).unwrap();
         let there = pairs_of(&session);
         let report = session.step(2, 2.0).unwrap();
@@ -248,7 +248,10 @@ fn comes_and_goes(scene: &Arc<Scene>) {
         assert_eq!(changed_elsewhere(&session, "slider", [&empty, &after]), 0, "{name}");
         let slider = scene.bodies.iter().position(|b| b.name == "slider").unwrap();
         if scene.pose(BodyId(slider as u32), 2.0).is_none() {
-            assert!(empty == after && session.pairs().1.counts() == elements, "{name}");
+            assert!(
+                empty == after && session.frame().unwrap().pairs().1.counts() == elements,
+                "{name}"
+            );
         }
     }
 }
@@ -276,7 +279,7 @@ fn a_light_that_moves_concerns_its_own_pairs() {
     let (report, found) = moved(&scene, &options, [0.0, 1.0]);
     counts_exactly("point light", &report, &found);
     let session = cold(&scene, &options, 1.0);
-    let (tree, forest) = session.pairs();
+    let (tree, forest) = session.frame().unwrap().pairs();
     let lit = (0..)
         .map(PairId)
         .take(tree.len())

@@ -1,7 +1,7 @@
 //! Scenes in the plane as drawings: walls, elements, links. Knows nothing of what a figure is to show.
 
 use glam::DVec2;
-use relume::flat::{FlatElement, FlatLink, FlatScene, FlatSession, PlaneView, Segment};
+use relume::flat::{FlatElement, FlatFrame, FlatLink, FlatScene, PlaneView, Segment};
 use relume::pair::EventKind;
 use relume_picture::drawing::{Colour, Drawing, Pen};
 
@@ -104,12 +104,12 @@ impl Sheet {
     /// Links as they are: fainter where something hides them, dashed where all is hidden.
     pub(super) fn links<'a>(
         &mut self,
-        session: &FlatSession,
+        frame: FlatFrame<'_>,
         links: impl IntoIterator<Item = &'a FlatLink>,
         pen: Pen,
     ) {
-        let (_, forest) = session.pairs();
-        let place = |id| session.view().place(forest, id);
+        let (_, forest) = frame.pairs();
+        let place = |id| frame.view().place(forest, id);
         let mut links: Vec<&FlatLink> = links.into_iter().collect();
         links.sort_by_key(|l| l.carried.visibility);
         for link in links {
@@ -126,9 +126,9 @@ impl Sheet {
     }
 
     /// The links that events befell, in the events' colours.
-    pub(super) fn events(&mut self, session: &FlatSession) {
-        for event in session.link_events() {
-            let (a, b) = (session.place_of(event.ends.0), session.place_of(event.ends.1));
+    pub(super) fn events(&mut self, frame: FlatFrame<'_>) {
+        for event in frame.link_events() {
+            let (a, b) = (frame.place_of(event.ends.0), frame.place_of(event.ends.1));
             self.link(&a, &b, Pen::new(1.4, colour_of(event.kind)));
         }
     }

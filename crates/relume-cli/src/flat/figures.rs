@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 use relume::element::ElementId;
-use relume::flat::{FlatLink, FlatOptions, FlatScene, FlatSession, parse};
+use relume::flat::{FlatFrame, FlatLink, FlatOptions, FlatScene, FlatSession, parse};
 use relume_picture::drawing::{Drawing, Pen, animation};
 use relume_picture::export::write_atomically;
 
@@ -55,9 +55,14 @@ fn session(scene: &Arc<FlatScene>, epsilon: f64, min_length_m: f64) -> FlatSessi
     FlatSession::new(scene.clone(), options).expect("options that ship are right")
 }
 
+/// What a session has solved last.
+fn solved(session: &FlatSession) -> FlatFrame<'_> {
+    session.frame().expect("a step leaves a solution")
+}
+
 /// The walls of both ends of a link, the lower number first.
-fn walls_of(session: &FlatSession, link: &FlatLink) -> (u32, u32) {
-    let (_, forest) = session.pairs();
+fn walls_of(frame: FlatFrame<'_>, link: &FlatLink) -> (u32, u32) {
+    let (_, forest) = frame.pairs();
     let wall = |id: ElementId| forest.wall(id).0.0;
     let (a, b) = (wall(link.a), wall(link.b));
     (a.min(b), a.max(b))
@@ -73,12 +78,12 @@ fn wedge() -> Drawing {
     let (lo, hi) = extent(&scene, std::iter::once(0.0));
     let sheet = || Sheet::new((lo, hi), 330.0, 66.0);
     let mut left = sheet();
-    left.walls(session.view());
-    left.hierarchy(&session.elements());
+    left.walls(solved(&session).view());
+    left.hierarchy(&solved(&session).elements());
     let mut right = sheet();
-    right.links(&session, &session.links(), LINK);
-    right.walls(session.view());
-    right.ticks(&session.elements());
+    right.links(solved(&session), &solved(&session).links(), LINK);
+    right.walls(solved(&session).view());
+    right.ticks(&solved(&session).elements());
     table(&[left.drawing, right.drawing], 2)
 }
 
@@ -91,15 +96,18 @@ fn screen() -> Drawing {
     for frame in 0..5 {
         session.step(frame, f64::from(frame));
         let mut sheet = Sheet::new(part, 128.0, 14.0);
-        let links: Vec<FlatLink> =
-            session.links().into_iter().filter(|l| walls_of(&session, l) == (0, 1)).collect();
-        sheet.links(&session, &links, LINK);
-        sheet.walls(session.view());
-        let (_, forest) = session.pairs();
+        let links: Vec<FlatLink> = solved(&session)
+            .links()
+            .into_iter()
+            .filter(|l| walls_of(solved(&session), l) == (0, 1))
+            .collect();
+        sheet.links(solved(&session), &links, LINK);
+        sheet.walls(solved(&session).view());
+        let (_, forest) = solved(&session).pairs();
         let ends: Vec<_> =
-            session.elements().into_iter().filter(|e| forest.wall(e.id).0.0 < 2).collect();
+            solved(&session).elements().into_iter().filter(|e| forest.wall(e.id).0.0 < 2).collect();
         sheet.ticks(&ends);
-        let three = session.view().poses()[1].origin;
+        let three = solved(&session).view().poses()[1].origin;
         for (at, name) in
             [(DVec2::new(0.5, -0.12), "1"), (DVec2::new(0.5, 1.12), "2"), (three, "3")]
         {
@@ -118,16 +126,19 @@ fn approach() -> Drawing {
     let mut panels = Vec::new();
     for frame in 0..3 {
         session.step(frame, f64::from(frame));
-        let three = session.view().poses()[1].origin;
+        let three = solved(&session).view().poses()[1].origin;
         let mut left = Sheet::new(part, 130.0, 24.0);
-        left.walls(session.view());
-        left.hierarchy(&session.elements());
+        left.walls(solved(&session).view());
+        left.hierarchy(&solved(&session).elements());
         let mut right = Sheet::new(part, 130.0, 24.0);
-        let links: Vec<FlatLink> =
-            session.links().into_iter().filter(|l| walls_of(&session, l).1 == 2).collect();
-        right.links(&session, &links, LINK);
-        right.walls(session.view());
-        right.ticks(&session.elements());
+        let links: Vec<FlatLink> = solved(&session)
+            .links()
+            .into_iter()
+            .filter(|l| walls_of(solved(&session), l).1 == 2)
+            .collect();
+        right.links(solved(&session), &links, LINK);
+        right.walls(solved(&session).view());
+        right.ticks(&solved(&session).elements());
         let below = DVec2::new(0.0, -0.12);
         for (at, name) in [
             (DVec2::new(0.475, 0.0) + below, "1"),
@@ -145,15 +156,15 @@ fn approach() -> Drawing {
 const GUTTER_EPSILON: f64 = 0.2;
 
 /// One frame of figure 0.4.
-fn gutter_at(session: &FlatSession, scale: f64) -> Sheet {
+fn gutter_at(frame: FlatFrame<'_>, scale: f64) -> Sheet {
     let mut sheet = Sheet::new((DVec2::splat(-0.02), DVec2::splat(1.16)), scale, 16.0);
-    let links = session.links();
+    let links = frame.links();
     let (dynamic, still): (Vec<FlatLink>, Vec<FlatLink>) =
-        links.into_iter().partition(|l| walls_of(session, l).1 == 2);
-    sheet.links(session, &still, Pen { opacity: 0.35, ..LINK });
-    sheet.links(session, &dynamic, LINK);
-    sheet.walls(session.view());
-    sheet.ticks(&session.elements());
+        links.into_iter().partition(|l| walls_of(frame, l).1 == 2);
+    sheet.links(frame, &still, Pen { opacity: 0.35, ..LINK });
+    sheet.links(frame, &dynamic, LINK);
+    sheet.walls(frame.view());
+    sheet.ticks(&frame.elements());
     sheet
 }
 
@@ -167,7 +178,7 @@ fn gutter() -> Drawing {
     let mut panels = Vec::new();
     for frame in 0..ROWS * COLUMNS {
         session.step(frame as u32, 5.0 * frame as f64 / last);
-        panels.push(gutter_at(&session, 270.0).drawing);
+        panels.push(gutter_at(solved(&session), 270.0).drawing);
     }
     let row_by_row: Vec<Drawing> =
         (0..ROWS * COLUMNS).map(|k| panels[k % COLUMNS * ROWS + k / COLUMNS].clone()).collect();
@@ -184,13 +195,13 @@ fn gutter_in_motion(dir: &Path) -> Result<Vec<String>, Failure> {
     let mut pictures = Vec::new();
     for frame in 0..FRAMES {
         let report = session.step(frame, at(frame));
-        let mut sheet = gutter_at(&session, 300.0);
-        sheet.events(&session);
+        let mut sheet = gutter_at(solved(&session), 300.0);
+        sheet.events(solved(&session));
         let kinds = [
             (relume::pair::EventKind::Demoted, "demoted", report.demoted),
             (relume::pair::EventKind::Promoted, "promoted", report.promoted),
-            (relume::pair::EventKind::Occluded, "occluded", count(&session, "o")),
-            (relume::pair::EventKind::Revealed, "revealed", count(&session, "r")),
+            (relume::pair::EventKind::Occluded, "occluded", count(solved(&session), "o")),
+            (relume::pair::EventKind::Revealed, "revealed", count(solved(&session), "r")),
         ];
         let height = f64::from(sheet.drawing.height);
         let mut whole = Drawing::new(sheet.drawing.width, sheet.drawing.height + 26);
@@ -212,12 +223,12 @@ fn gutter_in_motion(dir: &Path) -> Result<Vec<String>, Failure> {
 }
 
 /// Links that more (`o`) or less (`r`) stands between now.
-fn count(session: &FlatSession, which: &str) -> u64 {
+fn count(frame: FlatFrame<'_>, which: &str) -> u64 {
     let kind = match which {
         "o" => relume::pair::EventKind::Occluded,
         _ => relume::pair::EventKind::Revealed,
     };
-    session.link_events().iter().filter(|e| e.kind == kind).count() as u64
+    frame.link_events().iter().filter(|e| e.kind == kind).count() as u64
 }
 
 /// Error of the walls' mean radiosities against the number of links, both by powers of ten: of a room
@@ -239,8 +250,8 @@ fn errors(text: &str, constant: bool) -> Vec<[f64; 2]> {
         };
         let mut session = FlatSession::new(scene.clone(), options).expect("they are right");
         let links = session.step(0, 0.0).links;
-        let (_, forest) = session.pairs();
-        let mean = |&f: &ElementId| f64::from(session.radiosity(f)[0]);
+        let (_, forest) = solved(&session).pairs();
+        let mean = |&f: &ElementId| f64::from(solved(&session).radiosity(f)[0]);
         (forest.facets().iter().map(mean).collect::<Vec<f64>>(), links as f64)
     };
     let (reference, _) = means(0.003, false);

@@ -8,7 +8,9 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-use relume::flat::{FlatOptions, FlatScene, FlatSession, SvgError, Wall, parse, parse_svg};
+use relume::flat::{
+    FlatFrame, FlatOptions, FlatScene, FlatSession, SvgError, Wall, parse, parse_svg,
+};
 use relume::session::FrameReport;
 use relume_picture::drawing::Pen;
 use relume_picture::export::write_atomically;
@@ -139,9 +141,10 @@ impl Run<'_> {
                 return Err(Failure::interrupted("interrupted; nothing more is written"));
             }
             reports.push(session.go(frame, self.time_of(frame), 0)?);
-            events.add(frame, &session.events());
+            let solved = session.frame().expect("a step leaves a solution");
+            events.add(frame, &solved.events());
             if let Some(dir) = &self.args.output {
-                write(&dir.join(format!("frame-{frame:04}.svg")), &picture(&session, part, frame))?;
+                write(&dir.join(format!("frame-{frame:04}.svg")), &picture(solved, part, frame))?;
             }
         }
         let report = Report {
@@ -171,7 +174,7 @@ impl Run<'_> {
             (None, Some(_)) => Ok(()),
             (None | Some(FlatPrint::Report), _) => output::print(&text),
             (Some(FlatPrint::Frames), _) => output::print(&lines(&reports)),
-            (Some(FlatPrint::Walls), _) => output::print(&walls(&session)),
+            (Some(FlatPrint::Walls), _) => output::print(&walls(session.frame())),
             (Some(FlatPrint::Events), _) => output::print(events.text()),
         }
     }
@@ -240,12 +243,13 @@ fn lines(reports: &[FrameReport]) -> String {
 }
 
 /// Mean radiosities, red, of undivided elements.
-fn walls(session: &FlatSession) -> String {
-    let (_, forest) = session.pairs();
+fn walls(frame: Option<FlatFrame<'_>>) -> String {
     let mut out = String::new();
+    let Some(frame) = frame else { return out };
+    let (_, forest) = frame.pairs();
     for &facet in forest.facets() {
-        let [red, ..] = session.radiosity(facet);
-        let _ = writeln!(out, "{:<12} {red:.4}", session.name(facet).short());
+        let [red, ..] = frame.radiosity(facet);
+        let _ = writeln!(out, "{:<12} {red:.4}", frame.name(facet).short());
     }
     out
 }
@@ -253,13 +257,13 @@ fn walls(session: &FlatSession) -> String {
 /// Widest side of a picture, pixels.
 const SIDE: f64 = 720.0;
 
-fn picture(session: &FlatSession, part: (glam::DVec2, glam::DVec2), frame: u32) -> String {
+fn picture(solved: FlatFrame<'_>, part: (glam::DVec2, glam::DVec2), frame: u32) -> String {
     let scale = SIDE / (part.1 - part.0).max_element();
     let mut sheet = draw::Sheet::new(part, scale, 36.0);
-    sheet.links(session, &session.links(), Pen { opacity: 0.7, ..Pen::new(0.9, draw::PINK) });
-    sheet.events(session);
-    sheet.walls(session.view());
-    sheet.ticks(&session.elements());
+    sheet.links(solved, &solved.links(), Pen { opacity: 0.7, ..Pen::new(0.9, draw::PINK) });
+    sheet.events(solved);
+    sheet.walls(solved.view());
+    sheet.ticks(&solved.elements());
     sheet.caption(&format!("frame {frame}"));
     sheet.drawing.to_svg()
 }

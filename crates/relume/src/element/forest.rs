@@ -228,6 +228,18 @@ pub struct Counts {
     pub leaves: u64,
 }
 
+/// The children of the root.
+struct Rows {
+    /// Bodies that are there.
+    near: Vec<u32>,
+    /// Bodies that are far away.
+    far: Vec<u32>,
+    /// The node after those of the lights: of what is far away, if anything is.
+    after_lights: u32,
+    /// The node of the first inserted body.
+    first_inserted: u32,
+}
+
 impl Forest {
     /// The fixed part of the forest of a scene, in which no cluster is an end of links.
     pub fn new(scene: &Scene) -> Forest {
@@ -277,64 +289,73 @@ impl Forest {
             counts: Counts::default(),
         };
         forest.push_fixed(Kind::Cluster, NONE, 1);
-        let planted = |distant: bool| -> Vec<u32> {
-            let bodies = (0..).zip(&scene.bodies);
-            let is_wanted = |(k, b): &(u32, &crate::scene::Body)| {
-                !b.patches.is_empty() && b.distant == distant && !scene.is_inserted(BodyId(*k))
-            };
-            bodies.filter(is_wanted).map(|(k, _)| k).collect()
-        };
-        // What is there, the lights, what is far away, and each body that was inserted.
-        let (near, far) = (planted(false), planted(true));
-        let inserted = scene.inserted_bodies();
-        let lights = scene.lights.len() as u32;
-        let first_light = 1 + u32::from(!near.is_empty());
-        let after_lights = first_light + lights;
-        let made_children = after_lights + u32::from(!far.is_empty()) - 1;
-        let children = made_children + inserted.len() as u32;
-        forest.push_fixed(Kind::Light, 0, children);
-        forest.nodes[0].fan = Fan::other(1);
-        forest.fixed_mut().made_children = made_children;
-        forest.fixed_mut().child_counts[0] =
-            u16::try_from(children).expect("fewer than 65,536 lights and inserted bodies");
-        for (light, id) in (first_light..after_lights).enumerate() {
-            forest.fixed_mut().subjects[id as usize] = light as u32;
-            let twins = &mut forest.twins[id as usize];
-            (twins.facet, twins.path) = (id, 1);
-        }
+        let rows = forest.sow(scene);
         let cuts = Cuts::new(scene);
-        if !near.is_empty() {
-            forest.plant_bodies((scene, &cuts, layout), &near, 1);
+        let to = (scene, &cuts, layout);
+        if !rows.near.is_empty() {
+            forest.plant_bodies(to, &rows.near, 1);
         }
         let mut beds = Vec::new();
-        for (at, body) in (made_children + 1..).zip(inserted) {
+        for (at, body) in (rows.first_inserted..).zip(scene.inserted_bodies()) {
             let first = forest.nodes.len() as u32;
-            forest.plant_body((scene, &cuts, layout), body.0, at);
+            forest.plant_body(to, body.0, at);
             let names = scene.names_of(body).expect("it was inserted").clone();
             beds.push(Bed { root: at, below: first..forest.nodes.len() as u32, names });
         }
-        if !far.is_empty() {
+        if !rows.far.is_empty() {
             let first = forest.nodes.len();
-            forest.plant_bodies((scene, &cuts, layout), &far, after_lights);
+            forest.plant_bodies(to, &rows.far, rows.after_lights);
             let mut distant = vec![false; forest.nodes.len()];
-            distant[after_lights as usize] = true;
+            distant[rows.after_lights as usize] = true;
             distant[first..].fill(true);
             forest.fixed_mut().distant = distant;
         }
         if !beds.is_empty() {
             forest.fixed_mut().names = names_in(forest.nodes.len() as u32, &beds);
         }
-        forest.fixed_mut().facets.sort_unstable();
-        let near_facets = forest.facets().partition_point(|facet| !forest.is_distant(*facet));
-        forest.fixed_mut().near_facets = near_facets;
-        forest.fixed_len = forest.nodes.len() as u32;
-        forest.kept_len = forest.fixed_len;
-        forest.sum_areas();
-        forest.fixed_mut().normals = forest.boxes_of_normals(scene);
-        forest.fixed_mut().glows =
-            scene.patches.iter().map(|patch| scene.patch_emits(patch)).collect();
-        forest.fixed_mut().connected_m2 = scene.connected_areas_m2();
+        forest.finish_fixed(scene);
         forest
+    }
+
+    /// Makes the children of the root: what is there, the lights, what is far away, and each body that was inserted.
+    fn sow(&mut self, scene: &Scene) -> Rows {
+        let bodies = |distant: bool| -> Vec<u32> {
+            let bodies = (0..).zip(&scene.bodies);
+            let is_wanted = |(k, b): &(u32, &crate::scene::Body)| {
+                !b.patches.is_empty() && b.distant == distant && !scene.is_inserted(BodyId(*k))
+            };
+            bodies.filter(is_wanted).map(|(k, _)| k).collect()
+        };
+        let (near, far) = (bodies(false), bodies(true));
+        let first_light = 1 + u32::from(!near.is_empty());
+        let after_lights = first_light + scene.lights.len() as u32;
+        let made_children = after_lights + u32::from(!far.is_empty()) - 1;
+        let children = made_children + scene.inserted_bodies().len() as u32;
+        self.push_fixed(Kind::Light, 0, children);
+        self.nodes[0].fan = Fan::other(1);
+        self.fixed_mut().made_children = made_children;
+        self.fixed_mut().child_counts[0] =
+            u16::try_from(children).expect("fewer than 65,536 lights and inserted bodies");
+        for (light, id) in (first_light..after_lights).enumerate() {
+            self.fixed_mut().subjects[id as usize] = light as u32;
+            let twins = &mut self.twins[id as usize];
+            (twins.facet, twins.path) = (id, 1);
+        }
+        Rows { near, far, after_lights, first_inserted: made_children + 1 }
+    }
+
+    /// Works out what is known of the fixed part once all of it is there.
+    fn finish_fixed(&mut self, scene: &Scene) {
+        self.fixed_mut().facets.sort_unstable();
+        let near_facets = self.facets().partition_point(|facet| !self.is_distant(*facet));
+        self.fixed_mut().near_facets = near_facets;
+        self.fixed_len = self.nodes.len() as u32;
+        self.kept_len = self.fixed_len;
+        self.sum_areas();
+        self.fixed_mut().normals = self.boxes_of_normals(scene);
+        self.fixed_mut().glows =
+            scene.patches.iter().map(|patch| scene.patch_emits(patch)).collect();
+        self.fixed_mut().connected_m2 = scene.connected_areas_m2();
     }
 
     fn boxes_of_normals(&self, scene: &Scene) -> Vec<Aabb> {

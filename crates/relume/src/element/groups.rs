@@ -8,7 +8,6 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::forest::{ElementId, Forest, Kind};
-use crate::geometry::Pose;
 use crate::scene::{BodyId, Scene};
 
 /// A patch of at most this share of the scene's area is small: larger ones are ends of links themselves.
@@ -296,25 +295,14 @@ impl Groups {
     }
 }
 
-/// The pose that takes a facet's body to the frame that groups of it are in.
-fn pose_of(scene: &Scene, forest: &Forest, facet: ElementId) -> Pose {
-    let patch = forest.patch(facet).expect("a facet has a patch");
-    let body = scene.patches[patch.0 as usize].body;
-    match scene.moves(body) {
-        true => Pose::IDENTITY,
-        false => scene.pose(body, 0.0).unwrap_or(Pose::IDENTITY),
-    }
-}
-
 fn leaf_of(scene: &Scene, forest: &Forest, facet: ElementId) -> GroupLeaf {
     let patch = forest.patch(facet).expect("a facet has a patch");
     let frame = scene.patches[patch.0 as usize].frame;
-    let pose = pose_of(scene, forest, facet);
     let shape = forest.shape(facet);
     GroupLeaf {
         facet,
-        centre: pose.point(frame.point(shape.centroid())),
-        normal: pose.direction(frame.normal),
+        centre: frame.point(shape.centroid()),
+        normal: frame.normal,
         area_m2: shape.area(),
     }
 }
@@ -322,8 +310,8 @@ fn leaf_of(scene: &Scene, forest: &Forest, facet: ElementId) -> GroupLeaf {
 fn corners_of(scene: &Scene, forest: &Forest, facet: ElementId) -> [DVec3; 4] {
     let patch = forest.patch(facet).expect("a facet has a patch");
     let frame = scene.patches[patch.0 as usize].frame;
-    let pose = pose_of(scene, forest, facet);
-    forest.shape(facet).corners.map(|c| pose.point(frame.point(c)))
+    // A group is in its body's frame, which is the world's where the body rests.
+    forest.shape(facet).corners.map(|c| frame.point(c))
 }
 
 /// Half the diagonal of the box of a node, metres.

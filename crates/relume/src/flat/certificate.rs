@@ -13,9 +13,9 @@ use crate::pair::{Moves, Outlook};
 use crate::scene::{BodyId, Drift};
 
 use super::forest::FlatForest;
-use super::judge::PlaneView;
 use super::plane::{ROUNDING, Segment, in_space};
 use super::scene::{BodyIndex, FlatScene};
+use super::view::PlaneView;
 
 /// A scene in the plane at one instant, with what comes.
 pub(super) struct FlatOutlook<'a> {

@@ -2,9 +2,9 @@
 //!
 //! Surfaces become segments in the plane, elements halves of halves of them, and what two segments
 //! exchange has a closed form, occlusion included (Hottel's crossed strings). Pair tree, verdict
-//! bookkeeping, events, extrapolation, hash and solver are those of space: this room hands them another
-//! [`Hierarchy`](crate::pair::Hierarchy), another [`Judge`](crate::pair::Judge) and other
-//! [`Surfaces`](crate::solver::Surfaces), and knows nothing of glTF, polygons or pictures.
+//! bookkeeping, events, extrapolation, hash, solver and the phases of a frame are those of space: this room hands them
+//! another [`Hierarchy`](crate::pair::Hierarchy), another [`Judge`](crate::pair::Judge), other
+//! [`Surfaces`](crate::solver::Surfaces) and another `Space` to follow, and knows nothing of glTF, polygons or pictures.
 //!
 //! All quantities are per metre of the direction that was integrated out: an "area" is a length, m2 for
 //! each metre of depth.
@@ -12,19 +12,28 @@
 mod certificate;
 mod drift;
 mod forest;
+mod frame;
 mod judge;
+mod options;
 mod plane;
 mod scene;
 mod session;
+mod state;
 mod strings;
+mod surfaces;
 mod svg;
 mod text;
+mod view;
 
 pub use forest::FlatForest;
-pub use judge::PlaneView;
+pub use frame::{FlatElement, FlatFrame, FlatLink};
+pub use options::{FlatOptions, OptionError};
 pub use plane::{PlanePose, Segment};
 pub use scene::{Body, BodyIndex, FlatScene, Key, Material, Motion, SceneError, Wall, WallIndex};
-pub use session::{FlatElement, FlatLink, FlatOptions, FlatSession, OptionError};
+pub use session::FlatSession;
+#[doc(hidden)]
+pub use state::FlatSolved;
 pub use strings::{Shaft, exchange, visible_exchange};
 pub use svg::{SvgError, parse_svg};
 pub use text::{TextError, parse};
+pub use view::PlaneView;

@@ -12,7 +12,7 @@ pub use bounds::{Aabb, ShaftOfBoxes, shaft_meets_box};
 pub use convex::{ConvexPolygon, Plane, polygon_area, split_convex};
 pub use cut::{Segment, cut_along, segment_within};
 pub use pose::Pose;
-pub use region::{Moments, common, difference, within_outlines};
+pub use region::{Moments, common, difference, part_in_front, within_outlines};
 
 /// How far apart equal areas may be for rounding, relative: files hold corners in single precision.
 const AREA_ROUNDING: f64 = 1e-6;

@@ -1,5 +1,7 @@
 //! Regions of a plane as disjoint convex polygons: common parts, differences, moments, and outlines filled.
 
+use std::ops::{Add, Mul, Sub};
+
 use glam::DVec2;
 
 use super::{Segment, polygon_area};
@@ -152,11 +154,19 @@ fn edges(polygon: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
 
 /// The part of a convex polygon on the left of a line through `a`.
 fn left_of(polygon: &[DVec2], a: DVec2, along: DVec2) -> Vec<DVec2> {
-    let side = |p: DVec2| along.perp_dot(p - a);
+    part_in_front(polygon, |p| along.perp_dot(p - a))
+}
+
+/// The part of a convex polygon, in the plane or in space, where a linear function of the place is not negative; empty if it
+/// is negative everywhere. Exact up to rounding.
+pub fn part_in_front<P>(polygon: &[P], height: impl Fn(P) -> f64) -> Vec<P>
+where
+    P: Copy + Add<Output = P> + Sub<Output = P> + Mul<f64, Output = P>,
+{
     let mut out = Vec::with_capacity(polygon.len() + 1);
     for (k, &p) in polygon.iter().enumerate() {
         let q = polygon[(k + 1) % polygon.len()];
-        let (x, y) = (side(p), side(q));
+        let (x, y) = (height(p), height(q));
         if x >= 0.0 {
             out.push(p);
         }

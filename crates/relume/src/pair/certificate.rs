@@ -14,7 +14,7 @@ use crate::event::Foresight;
 use crate::geometry::{Aabb, Plane, Pose, shaft_meets_box};
 use crate::scene::{BodyId, Drift, PatchId};
 
-use super::judge::{LightPlace, body_of};
+use super::ends::{LightPlace, body_of};
 use super::outlook::{Moves, Outlook};
 
 /// A scene in space at one instant, with what comes.

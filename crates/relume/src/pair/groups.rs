@@ -5,10 +5,12 @@ use crate::geometry::no_smaller;
 use crate::transport::{GroupSight, Spread, common_body, light_at};
 
 use super::brightness::Brightness;
+use super::ends::{BoxShaft, body_of};
 use super::hash::pair_key;
-use super::judge::{BoxShaft, Placed, Stage, body_of, culled, passing};
+use super::judge::{Placed, Stage, culled, passing};
 use super::margin::{Margin, SideMargin};
-use super::oracle::{Oracle, Side};
+use super::oracle::Oracle;
+use super::side::Side;
 use super::tree::{Carried, CullReason, Gradients, in_steps};
 use super::update::{Judgement, Verdict};
 

@@ -5,8 +5,8 @@
 //! judged; changes of brightness are added to them exactly, so that what brightens and darkens again leaves
 //! them as they were.
 
-use super::brightness::Light;
-use super::oracle::Side;
+use super::light::Light;
+use super::side::Side;
 
 /// Steps in an octave.
 const STEPS: f64 = 240.0;

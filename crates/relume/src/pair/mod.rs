@@ -5,22 +5,27 @@
 
 mod brightness;
 mod certificate;
+mod ends;
 mod groups;
 mod hash;
 mod judge;
+mod light;
 mod margin;
 mod oracle;
 mod outlook;
+mod side;
 mod since;
 mod tree;
 mod update;
 
-pub use brightness::{Brightness, Light};
+pub use brightness::Brightness;
 pub use hash::{PairHash, pair_key};
 pub use judge::{Placed, Stage};
+pub use light::Light;
 pub use margin::{Margin, Shift};
-pub use oracle::{Oracle, Side};
+pub use oracle::Oracle;
 pub use outlook::Finding;
+pub use side::Side;
 pub use since::Since;
 pub use tree::{
     Carried, CullReason, Gradients, Link, PairId, PairTree, State, StateCounts, in_steps,
@@ -29,6 +34,6 @@ pub use tree::{
 pub(crate) use outlook::{Moves, Outlook};
 
 pub use update::{
-    Changes, Edit, EventKind, Held, Hierarchy, Judge, Judgement, LinkEvent, OutOfMemory, Record,
-    Stale, Verdict, Work, update,
+    Changes, Edit, EventKind, Held, Hierarchy, Judge, Judgement, LinkEvent, OutOfMemory, Pairs,
+    Record, Scope, Stale, Verdict, Work, update,
 };

@@ -3,8 +3,9 @@
 use crate::geometry::no_smaller;
 use crate::transport::{BlockerSizes, Exchange, SEGMENTS, Variation, Visibility};
 
-use super::brightness::Light;
+use super::light::Light;
 use super::margin::Margin;
+use super::side::Side;
 
 /// What decides on a pair of elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,15 +22,6 @@ pub enum Oracle {
         /// Elements below this area are not refined, m2.
         min_area_m2: f64,
     },
-}
-
-/// One end of a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// The first.
-    A,
-    /// The second.
-    B,
 }
 
 /// One end of a pair as the error oracle sees it.

@@ -4,7 +4,7 @@ use crate::element::{ElementId, Forest, Kind, WorldElement, WorldView};
 use crate::scene::{BodyId, LightKind, PatchId, Scene};
 use crate::transport::Shaft;
 
-use super::judge::{BoxShaft, LightPlace, body_of};
+use super::ends::{BoxShaft, LightPlace, body_of};
 use super::margin::{Growth, Shift};
 use super::update::Stale;
 
@@ -30,6 +30,8 @@ pub struct Since<'a> {
     lights: Vec<Option<Shift>>,
     /// Kept nodes above the coarse level with such an element below.
     dimmed_below: Vec<bool>,
+    /// Whether margins count from the first instant.
+    knows_margins: bool,
 }
 
 impl<'a> Since<'a> {
@@ -78,7 +80,13 @@ impl<'a> Since<'a> {
             dimmed: Vec::new(),
             lights: Vec::new(),
             dimmed_below: Vec::new(),
+            knows_margins: true,
         }
+    }
+
+    /// The same where the last update was left half-way: some margins count from its beginning, others from its end.
+    pub fn after_a_stop(self) -> Since<'a> {
+        Since { knows_margins: false, ..self }
     }
 
     /// Adds how coarse elements (by number) changed their brightness.
@@ -124,8 +132,9 @@ impl<'a> Since<'a> {
         }
     }
 
-    /// By how much the errors of a pair at or below the coarse level grew.
-    pub(super) fn growth(&self, forest: &Forest, a: ElementId, b: ElementId) -> Growth {
+    /// By how much the errors of a pair at or below the coarse level grew since its margin was counted; `None` if that is
+    /// not known.
+    pub(super) fn growth(&self, forest: &Forest, a: ElementId, b: ElementId) -> Option<Growth> {
         let shift = |id| {
             let of_light = || forest.light(id).and_then(|light| self.lights[light]);
             forest
@@ -133,7 +142,7 @@ impl<'a> Since<'a> {
                 .map_or_else(of_light, |number| self.dimmed[number])
                 .unwrap_or_default()
         };
-        Growth::of_pair(&shift(a), &shift(b))
+        self.knows_margins.then(|| Growth::of_pair(&shift(a), &shift(b)))
     }
 
     /// Whether the ends of a pair moved against each other.

@@ -9,7 +9,7 @@ use crate::element::{ElementId, Renumbering};
 use crate::event::{History, Lookahead, Tick};
 
 use super::margin::Margin;
-use super::oracle::Side;
+use super::side::Side;
 
 /// Index of a pair in a [`PairTree`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -15,8 +15,8 @@ use crate::event::{History, Lookahead, Sample, Tick};
 
 use super::hash::{PairHash, pair_key};
 use super::margin::Margin;
-use super::oracle::Side;
 use super::outlook::Finding;
+use super::side::Side;
 use super::tree::{Carried, CullReason, PairId, PairTree, State};
 
 /// What is decided on a pair.
@@ -295,21 +295,38 @@ const CHUNK: usize = 128;
 /// Pairs judged before their results are applied.
 const BLOCK: usize = 1 << 15;
 
-/// Brings `tree`, with the hash over its links, up to date.
-///
-/// Edits and events are recorded if `record` says so. `fresh` are pairs (ascending) that an update with the same
-/// [`Judge::stale`] has refined already: all of their children are looked at. `may_go_on` is asked
-/// after each block with the tree, the number of elements and the scratch memory in bytes.
+/// A pair tree with the hash over its links.
+pub struct Pairs<'a> {
+    /// The tree.
+    pub tree: &'a mut PairTree,
+    /// The hash.
+    pub hash: &'a mut PairHash,
+}
+
+/// What an update is about.
+pub struct Scope<'a> {
+    /// What may stand between any two elements.
+    pub candidates: &'a [u32],
+    /// What is written down.
+    pub record: Record,
+    /// Pairs (ascending) that an update with the same [`Judge::stale`] has refined already: all of their children are
+    /// looked at.
+    pub fresh: &'a [PairId],
+    /// Asked after each block with the tree, the number of elements and the scratch memory in bytes.
+    pub may_go_on: &'a dyn Fn(&PairTree, usize, u64) -> bool,
+}
+
+/// Brings a tree, with the hash over its links, up to date.
 ///
 /// # Errors
-/// [`OutOfMemory`] as soon as `may_go_on` says no; the tree is of no use then.
+/// [`OutOfMemory`] as soon as `may_go_on` says no: what was looked at until then is up to date, the rest is as it was, and
+/// pairs may be left unjudged.
 pub fn update<J: Judge>(
-    (tree, hash): (&mut PairTree, &mut PairHash),
+    Pairs { tree, hash }: Pairs<'_>,
     judge: &mut J,
-    root_candidates: &[u32],
-    (record, fresh): (Record, &[PairId]),
-    may_go_on: &dyn Fn(&PairTree, usize, u64) -> bool,
+    scope: &Scope<'_>,
 ) -> Result<Changes, OutOfMemory> {
+    let &Scope { candidates: root_candidates, record, fresh, may_go_on } = scope;
     let mut editor =
         Editor { tree, hash, judge, record, changes: Changes::default(), next: Wave::default() };
     let list = editor.next.push_candidates(root_candidates);
@@ -530,6 +547,20 @@ fn look_at<J: Judge>(
         }
         _ => {}
     }
+    judge_again(tree, judge, item, stale, (candidates, narrowed), &unaffected)
+}
+
+/// Judges a pair of which something changed; `unaffected` is its certificate where nothing but the light did.
+fn judge_again<J: Judge>(
+    tree: &PairTree,
+    judge: &J,
+    item: &Item,
+    stale: Stale,
+    (candidates, narrowed): (&[u32], &mut Vec<u32>),
+    unaffected: &dyn Fn() -> Option<Tick>,
+) -> Look {
+    let ((a, b), state) = (tree.ends(item.pair), tree.state(item.pair));
+    let start = narrowed.len();
     let candidates = if stale == Stale::Followed { &[] } else { item.list.of(candidates) };
     // What is extrapolated is not what an evaluation would find.
     let lit_anew = stale == Stale::Brightness && judge.lookahead().is_none();
@@ -544,29 +575,40 @@ fn look_at<J: Judge>(
         found.margin = found.margin.on_this_side();
     }
     let refined = matches!(found.verdict, Verdict::Refine(_) | Verdict::RefineSelf);
-    let may_be_clear = match refined {
+    let is_clear = match refined {
         true => stale == Stale::Moved && judge.may_be_clear(a, b, &narrowed[start..]),
         false => found.segments == 0,
     };
+    let may_be_clear = is_clear && !candidates.is_empty();
     if !refined {
         narrowed.truncate(start);
     }
-    let due = match (found.verdict, stale) {
-        (Verdict::Cull(_), _) => Some(judge.foresee(a, b, Finding::Culled)),
-        (_, Stale::Followed) => None,
-        // It is met again, perhaps still in the state that it had.
-        (Verdict::Hold, _) => Some(0),
-        (_, Stale::Brightness) => unaffected(),
-        (_, Stale::Moved) if may_be_clear && !candidates.is_empty() => {
-            Some(judge.foresee(a, b, Finding::Clear))
-        }
-        _ => Some(0),
+    let due = match stale == Stale::Brightness {
+        true if !matches!(found.verdict, Verdict::Cull(_) | Verdict::Hold) => unaffected(),
+        _ => certificate(judge, (a, b), (found.verdict, stale), may_be_clear),
     };
     let list = match stale {
         Stale::Followed => Below::Own(List::CLEAR),
         _ => Below::of(item.list, start, narrowed),
     };
     Look::Judged(found, stale, list, due)
+}
+
+/// Until when what was found of a pair cannot change; `None` where the pair keeps the certificate that it has.
+fn certificate<J: Judge>(
+    judge: &J,
+    (a, b): (ElementId, ElementId),
+    found: (Verdict, Stale),
+    may_be_clear: bool,
+) -> Option<Tick> {
+    match found {
+        (Verdict::Cull(_), _) => Some(judge.foresee(a, b, Finding::Culled)),
+        (_, Stale::Followed) => None,
+        // It is met again, perhaps still in the state that it had.
+        (Verdict::Hold, _) => Some(0),
+        (_, Stale::Moved) if may_be_clear => Some(judge.foresee(a, b, Finding::Clear)),
+        _ => Some(0),
+    }
 }
 
 /// What becomes of a dynamic pair that is not due; `None` if the light on it changed so much that it is

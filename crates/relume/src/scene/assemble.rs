@@ -38,27 +38,10 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
     notes.extend(held.into_iter().map(|node| held_note(&draft.nodes[node].name)));
     let mut parts = Parts::default();
     for (node, members) in bodies_of(&draft, &motion) {
-        let first = parts.patches.len() as u32;
-        let body = BodyId(parts.bodies.len() as u32);
-        for member in members {
-            let place = Placement { pose: pose_in_body(&motion, member), shape: residuals[member] };
-            let object = &draft.nodes[member];
-            for surface in &object.surfaces {
-                let name = surface_name(object, surface, &draft.materials);
-                parts.add_surface(
-                    body,
-                    (&object.name, &name),
-                    surface,
-                    &place,
-                    &draft.materials,
-                )?;
-            }
-        }
-        let patches = Range { start: first, end: parts.patches.len() as u32 };
-        if !patches.is_empty() {
-            let name = draft.nodes[node].name.clone();
-            parts.bodies.push(Body { name, node: NodeId(node as u32), patches, distant: false });
-        }
+        parts.add_body(&draft, node, &members, &|member| Placement {
+            pose: pose_in_body(&motion, member),
+            shape: residuals[member],
+        })?;
     }
     parts.leave_out_specks(&motion)?;
     notes.append(&mut parts.notes);
@@ -171,6 +154,33 @@ impl Parts {
         Ok(())
     }
 
+    /// Adds the surfaces of some nodes, which are a body, if they have any.
+    fn add_body(
+        &mut self,
+        draft: &Draft,
+        node: usize,
+        members: &[usize],
+        placement: &dyn Fn(usize) -> Placement,
+    ) -> Result<(), SceneError> {
+        let first = self.patches.len() as u32;
+        let body = BodyId(self.bodies.len() as u32);
+        for &member in members {
+            let place = placement(member);
+            let object = &draft.nodes[member];
+            for surface in &object.surfaces {
+                let name = surface_name(object, surface, &draft.materials);
+                let names = (&*object.name, &*name);
+                self.add_surface(body, names, surface, &place, &draft.materials)?;
+            }
+        }
+        let patches = Range { start: first, end: self.patches.len() as u32 };
+        if !patches.is_empty() {
+            let name = draft.nodes[node].name.clone();
+            self.bodies.push(Body { name, node: NodeId(node as u32), patches, distant: false });
+        }
+        Ok(())
+    }
+
     /// Leaves out polygons that are too small for the scene, with a note for each surface.
     fn leave_out_specks(&mut self, motion: &Motion) -> Result<(), SceneError> {
         let Some(extent) = self.extent_m(motion) else { return Ok(()) };
@@ -201,17 +211,23 @@ impl Parts {
                 self.notes.push(speck_note(&surface.name, specks, others == 0));
             }
         }
-        // What nothing is left of goes; the others move up.
+        self.leave_out(&is_speck, |surface| counts[surface].1 > 0);
+        Ok(())
+    }
+
+    /// Leaves out some polygons, and what nothing is left of: surfaces that do not `stay`, bodies without polygons. The others
+    /// move up.
+    fn leave_out(&mut self, is_out: &[bool], stays: impl Fn(usize) -> bool) {
         let mut new_of_surface = vec![SurfaceId(0); self.surfaces.len()];
         let mut kept = 0;
-        for (new, &(_, others)) in new_of_surface.iter_mut().zip(&counts) {
+        for (k, new) in new_of_surface.iter_mut().enumerate() {
             *new = SurfaceId(kept);
-            kept += u32::from(others > 0);
+            kept += u32::from(stays(k));
         }
         // The number of patches kept before each one, and before the end.
         let mut new_of_patch = vec![0];
-        for &speck in &is_speck {
-            new_of_patch.push(new_of_patch[new_of_patch.len() - 1] + u32::from(!speck));
+        for &out in is_out {
+            new_of_patch.push(new_of_patch[new_of_patch.len() - 1] + u32::from(!out));
         }
         let new = |k: u32| new_of_patch[k as usize];
         for body in &mut self.bodies {
@@ -224,19 +240,18 @@ impl Parts {
             kept += u32::from(!body.patches.is_empty());
         }
         self.bodies.retain(|body| !body.patches.is_empty());
-        let mut counted = counts.iter();
-        self.surfaces.retain(|_| counted.next().is_some_and(|c| c.1 > 0));
+        let mut number = 0..;
+        self.surfaces.retain(|_| number.next().is_some_and(&stays));
         for surface in &mut self.surfaces {
             surface.body = new_of_body[surface.body.0 as usize];
         }
-        let mut specks = is_speck.iter();
-        self.patches.retain(|_| !*specks.next().unwrap_or(&false));
+        let mut out = is_out.iter();
+        self.patches.retain(|_| !*out.next().unwrap_or(&false));
         for patch in &mut self.patches {
             patch.surface = new_of_surface[patch.surface.0 as usize];
             patch.body = new_of_body[patch.body.0 as usize];
             patch.twin = patch.twin.map(|twin| PatchId(new(twin.0)));
         }
-        Ok(())
     }
 
     /// The scene's extent at the start, or what it would be if all were present.

@@ -1,71 +1,36 @@
-//! The session owns all mutable state and runs the phases of a frame; snapshots come out.
+//! The session owns all mutable state: commands go in, frames come out.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::time::Instant;
 
-use crate::element::{ElementId, Forest, WorldView};
-use crate::event::Ticks;
-use crate::pair::{LinkEvent, PairHash, PairTree};
+use crate::follow::{Failed, Follower, Order, Why};
 use crate::scene::{BodyId, Held, Scene, World};
-use crate::solver::{GroupLinks, Links, Radiosity};
+use crate::space::{Bed, Goal, Solved, SpaceState, Tuning};
 use crate::transport::Simd;
 
-mod accuracy;
-mod advance;
-mod ahead;
-mod bends;
-pub(crate) mod budget;
-mod coarse;
+mod back;
 mod command;
-mod compact;
-mod compare;
 mod estimate;
-mod events;
-mod factors;
-mod frame;
-mod gather;
-mod groups;
 mod log;
-mod lossy;
-mod names;
 mod options;
-mod pieces;
-mod promise;
-mod reconstruct;
 mod replant;
-mod report;
-mod snapshot;
-mod solution;
-mod surfaces;
-mod tally;
-mod watch;
 
-pub use accuracy::Accuracy;
 pub use command::{Command, CommandError, Removed};
-pub use compare::{Difference, RadiosityGap, Which, compare, radiosity_gap};
 pub use estimate::Estimate;
-pub use events::{Event, EventKind};
-pub use factors::{Closure, Factors, Grouping, Open, PartFactors};
-pub use frame::{Frame, Hash, Mesh};
-pub use gather::Sensor;
 pub use log::{Log, LogError};
-pub use lossy::{Missed, RadiosityError, missed, radiosity_error};
-pub use names::ElementName;
-pub use options::{Options, Oracle, Update};
-pub use report::{Energy, FrameReport, LinkKinds, PairCounts, RowSumError, Seconds};
-pub use snapshot::{Leaf, Snapshot};
-pub use solution::Solution;
-pub use watch::Watch;
+pub use options::{Options, Oracle};
 
-// Flatland's session shares these.
-pub(crate) use ahead::{Ahead, Void, most_mean, while_extrapolated};
-pub(crate) use events::with_names;
-pub(crate) use surfaces::{Receivers, apply_edits, links_of};
-pub(crate) use tally::balance_of;
+pub use crate::follow::{
+    Accuracy, Energy, FrameReport, LinkKinds, Memory, PairCounts, RowSumError, Seconds, Update,
+    Watch,
+};
+pub use crate::read::{
+    Closure, Difference, ElementName, Event, EventKind, Factors, Frame, Grouping, Hash, Leaf, Mesh,
+    Missed, Open, PartFactors, RadiosityError, RadiosityGap, Sensor, Snapshot, Solution, Which,
+    compare, missed, radiosity_error, radiosity_gap,
+};
 
-use coarse::Coarse;
-use replant::{Bed, Left};
+use replant::{Edited, Start};
 
 /// Why a frame could not be computed.
 #[derive(Debug, thiserror::Error)]
@@ -132,14 +97,19 @@ fn names(surfaces: &[String]) -> String {
 
 /// One scene being solved, frame by frame.
 pub struct Session {
+    /// The scene as commands have made it, and what builds start from: where bodies came or left since the last step, that
+    /// of the scene before.
     bed: Bed,
-    /// Whether the seed is that of the scene.
+    /// Whether they belong together.
     is_planted: bool,
     options: Options,
     simd: Simd,
+    /// The last solution, in the scene that it is of.
     solved: Option<Solved>,
-    /// In place of it once bodies came or left since.
-    left: Option<Left>,
+    /// Bodies that came into that scene and left it since.
+    edited: Option<Edited>,
+    /// Whether the next step may not start from the last solution.
+    starts_anew: bool,
     /// What others may see of a step under way.
     watch: Arc<Watch>,
     /// Time that `moved` compares with, where it is not that of the last step.
@@ -154,62 +124,12 @@ pub struct Session {
     frames: u32,
 }
 
-/// The world that a step leads to.
-struct Next {
-    frame: u32,
-    /// Time of the clip, seconds.
-    time_s: f64,
-    world: World,
-    /// The world of the frame before, which dynamic links are counted from.
-    from: Option<World>,
-}
-
-/// What the last step left.
-struct Solved {
-    time_s: f64,
-    world: World,
-    /// What was held by hand.
-    held: Held,
-    forest: Forest,
-    view: WorldView,
-    /// By which certificates expire.
-    ticks: Ticks,
-    tree: PairTree,
-    hash: PairHash,
-    links: Links,
-    groups: GroupLinks,
-    coarse: Coarse,
-    radiosity: Radiosity,
-    /// Mean radiosity when no link was extrapolated last, W/m2.
-    sound_mean_w_m2: f64,
-    /// The world it was in.
-    sound_world: World,
-    events: Vec<LinkEvent>,
-    /// Facets of which another part is covered than when they were solved, ascending.
-    touched: Vec<ElementId>,
-    report: FrameReport,
-}
-
-impl Solved {
-    /// Whether nothing is extrapolated.
-    fn is_settled(&self) -> bool {
-        self.tree.live_count() == 0
-    }
-}
-
 /// Threshold of the error oracle for a link, relative to the tolerance of the whole: the errors of
 /// a receiver's links add up. Measured; see docs/tolerance.md.
 const LINK_SHARE: f64 = 0.25;
 
-/// Residual of the solver after a cold build, relative to the tolerance.
-const RESIDUAL_SHARE: f64 = 0.005;
-
-/// The same after an update: a small body that moves changes nearly everything a little, and that
-/// little need not be followed.
-const FOLLOWED_SHARE: f64 = 0.05;
-
 impl Session {
-    /// Prepares a scene for solving; the links are built by the first [`Session::step`].
+    /// Prepares a scene for solving; the links are built by the first [`Session::solve`].
     ///
     /// # Errors
     /// [`SessionError::Option`] if an option is out of its range.
@@ -217,23 +137,20 @@ impl Session {
         options.validate()?;
         let scene = scene.into();
         let displaced: BTreeSet<BodyId> = scene.removed_bodies().collect();
-        let (seed, coarse_ids) = seed_of(&scene, &options, &displaced);
-        let simd = Simd::detect();
-        let (watch, solved, came_from) = (Arc::default(), None, None);
-        let (held, time_s, frames) = (Held::default(), 0.0, 0);
         Ok(Session {
-            bed: Bed { scene, seed, coarse_ids },
+            bed: Bed::new(scene, &displaced, options.bedding()),
             is_planted: true,
             options,
-            simd,
-            solved,
-            left: None,
-            watch,
-            came_from,
-            held,
+            simd: Simd::detect(),
+            solved: None,
+            edited: None,
+            starts_anew: false,
+            watch: Arc::default(),
+            came_from: None,
+            held: Held::default(),
             displaced,
-            time_s,
-            frames,
+            time_s: 0.0,
+            frames: 0,
         })
     }
 
@@ -265,71 +182,39 @@ impl Session {
     /// asked for.
     ///
     /// # Errors
-    /// [`SessionError::OutOfMemory`] if the links do not fit; there is no solution then until a
-    /// step succeeds.
+    /// As [`Session::solve`].
     #[doc(hidden)]
     pub fn step(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, SessionError> {
         self.time_s = time_s;
         self.frames += 1;
-        let done = self.step_on(frame, time_s);
+        let back = self.solved.as_ref().map(|solved| self.way_back(solved));
+        let Start { last, remains } = self.follow_hands();
+        let world = self.world();
+        let came_from =
+            self.came_from.take().map(|from_s| self.bed.scene.at_but(from_s, &self.held));
+        let last_world = last.as_ref().map(|last| last.space.world.clone());
+        let from = came_from.as_ref().or(last_world.as_ref());
+        let goal = self.goal(&world, &self.held, from);
+        let moved = from.map_or(Vec::new(), |from| self.moved(from, &world));
+        let order = self.order(FrameReport { frame, time_s, moved, ..FrameReport::default() });
+        let done = Follower::follow(last, &goal, &order);
         // What was called off too late calls nothing else off.
         self.watch.take_cancelled();
-        done
-    }
-
-    fn step_on(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, SessionError> {
-        let Some(scene) = self.follow_hands() else { return self.step_to(frame, time_s) };
-        // On the way bodies that left are still there, absent.
-        let done = self.step_to(frame, time_s);
-        match self.solved.take() {
-            Some(solved) => self.solved = Some(self.forget_remains(solved, scene)),
-            None => (self.bed.scene, self.is_planted) = (scene, false),
-        }
-        done.map(|_| self.now().report.clone())
-    }
-
-    fn step_to(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, SessionError> {
-        let world = self.bed.scene.at_but(time_s, &self.held);
-        let came_from = self.came_from.take();
-        let from = came_from.map(|from_s| self.bed.scene.at_but(from_s, &self.held));
-        let from = from.or(self.solved.as_ref().map(|s| s.world.clone()));
-        let moved = from.as_ref().map_or(Vec::new(), |from| self.moved(from, &world));
-        let next = Next { frame, time_s, world, from };
-        let label = FrameReport { frame, time_s, moved, ..FrameReport::default() };
-        let mut last = self.solved.take();
-        if self.options.update == Update::Scratch {
-            last = None;
-        }
-        // What was extrapolated cannot be taken along when time jumps or goes back, or a hand takes hold.
-        let goes_on =
-            |last: &Solved| last.ticks.goes_on(last.time_s, time_s) && last.held == self.held;
-        last = last.filter(|last| last.is_settled() || goes_on(last));
-        let solved = match last {
-            Some(mut last)
-                if last.is_settled() && last.world == next.world && last.touched.is_empty() =>
-            {
-                if time_s < last.time_s || !last.held.promises_as(&self.held) {
-                    // What was foreseen from a later time says nothing of an earlier one.
-                    last.ticks = Ticks::default();
-                    last.tree.forget_certificates();
-                }
-                let report = last.report.of_a_still_frame(label);
-                let held = self.held.clone();
-                Solved { time_s, held, report, events: Vec::new(), ..last }
+        match done {
+            Ok(solved) => {
+                let solved = match remains {
+                    Some(scene) => self.forget_remains(solved, scene),
+                    None => solved,
+                };
+                Ok(self.solved.insert(solved).report.clone())
             }
-            // On a thread of the pool: entering it anew for every small task would cost more.
-            last => rayon::scope(|_| {
-                let solved = self.advance(last, &next, label.clone())?;
-                // Extrapolated links by which light grows as it should not: this frame is built anew.
-                match solved.report.residual.is_infinite() {
-                    true => self.advance(None, &next, label),
-                    false => Ok(solved),
-                }
-            })?,
-        };
-        let report = solved.report.clone();
-        self.solved = Some(solved);
-        Ok(report)
+            Err(failed) => {
+                let error = self.error_of(&failed, frame);
+                self.solved =
+                    back.and_then(|back| self.go_back(*failed, back, last_world, remains));
+                Err(error)
+            }
+        }
     }
 
     /// Says at which time the frame before the next step was, where that is not the last step:
@@ -343,7 +228,10 @@ impl Session {
     /// Solves the world as the commands so far have made it; the first time that is a cold build.
     ///
     /// # Errors
-    /// [`SessionError`]; there is no solution then, and the next solve is a cold build.
+    /// [`SessionError`]; [`Session::frame`] is then that of the last solution as before, if there was one. Going back to it
+    /// costs what a step there costs, or, where the last step did not start from it ([`Update::Scratch`], say), a cold
+    /// build. Links are the same, bit for bit (but for those that [`Update::Extrapolate`] extrapolates), and
+    /// radiosities within the residual.
     pub fn solve(&mut self) -> Result<Frame<'_>, SessionError> {
         self.solve_at(self.time_s)
     }
@@ -354,12 +242,18 @@ impl Session {
     /// As [`Session::solve`].
     pub fn solve_at(&mut self, time_s: f64) -> Result<Frame<'_>, SessionError> {
         self.step(self.frames, time_s)?;
-        Ok(Frame::new(self))
+        Ok(Frame::new(self.solved.as_ref().expect("a step leaves a solution"), self.frames))
     }
 
-    /// The last solution, if there is one.
+    /// The last solution, if there is one: of the scene as it was then, whatever commands came since.
     pub fn frame(&self) -> Option<Frame<'_>> {
-        self.solved.is_some().then(|| Frame::new(self))
+        self.solved.as_ref().map(|solved| Frame::new(solved, self.frames))
+    }
+
+    /// The state that the last step left.
+    #[doc(hidden)]
+    pub fn solved(&self) -> Option<&Solved> {
+        self.solved.as_ref()
     }
 
     /// The world that the next [`Session::solve`] solves.
@@ -384,77 +278,43 @@ impl Session {
         moved.map(|(_, body)| body.name.clone()).collect()
     }
 
-    /// The present solution as an immutable value, read with the bends that links leave out.
-    ///
-    /// Cost: a pass over all links, some 90 ns each.
-    ///
-    /// # Panics
-    /// Before the first [`Session::step`].
-    #[doc(hidden)]
-    pub fn snapshot(&self) -> Snapshot {
-        let solved = self.solved.as_ref().expect("a step comes before a snapshot");
-        snapshot::take(self, solved, (&solved.links, &solved.radiosity))
+    /// A step to a world, in the present scene.
+    fn goal<'a>(&'a self, world: &'a World, held: &'a Held, from: Option<&'a World>) -> Goal<'a> {
+        let Options { tolerance, .. } = self.options;
+        let tuning = Tuning { tolerance, oracle: self.options.pair_oracle(), simd: self.simd };
+        Goal { bed: &self.bed, world, held, from, tuning }
     }
 
-    /// The present solution settled anew with links of every leaf's own in place of those above it: along
-    /// edges between surfaces, where leaves of [`Session::snapshot`] inherit lines and parabolas through steep
-    /// curves, some thirty times as accurate. The session's own solution stays as it is.
-    ///
-    /// Error: at the default tolerance leaves of a uniform closed scene are within 1e-3, relative
-    /// (docs/tolerance.md). Cost: some ten times that of a frame with a moving light.
-    ///
-    /// # Panics
-    /// Before the first [`Session::step`].
-    #[doc(hidden)]
-    pub fn reconstruction(&self) -> Snapshot {
-        let solved = self.solved.as_ref().expect("a step comes before a snapshot");
-        let (links, radiosity) = reconstruct::solve(self, solved);
-        snapshot::take(self, solved, (&links, &radiosity))
+    /// A step as the options ask for.
+    fn order(&self, label: FrameReport) -> Order<'_> {
+        let Options { update, events, balance, max_memory_bytes, .. } = self.options;
+        Order { label, update, events, balance, max_memory_bytes, watch: Some(&self.watch) }
     }
 
-    /// The pair tree of the present solution, with the forest its elements are in.
-    ///
-    /// # Panics
-    /// Before the first [`Session::step`].
-    #[doc(hidden)]
-    pub fn pairs(&self) -> (&PairTree, &Forest) {
-        let solved = self.solved.as_ref().expect("a step comes before a look at the pairs");
-        (&solved.tree, &solved.forest)
-    }
-
-    /// The link events of the last step, if [`Options::events`] asks for them: none after a cold build.
-    /// In the order in which they were found, which is the same for any number of threads.
-    ///
-    /// # Panics
-    /// Before the first [`Session::step`].
-    #[doc(hidden)]
-    pub fn events(&self) -> Vec<Event> {
-        let solved = self.solved.as_ref().expect("a step comes before its events");
-        events::named(&self.bed.scene, solved)
-    }
-
-    /// Sum of the form factors from every leaf element, in no order of meaning; 1 in a closed scene,
-    /// up to the links' errors. Elements of absent bodies are among them.
-    ///
-    /// # Panics
-    /// Before the first [`Session::step`].
-    #[doc(hidden)]
-    pub fn row_sums(&self) -> Vec<(ElementId, f64)> {
-        let solved = self.solved.as_ref().expect("a step comes before a look at the rows");
-        tally::row_sums_of(&self.bed.scene, solved)
+    /// Why a step came to nothing.
+    fn error_of(&self, failed: &Failed<SpaceState>, frame: u32) -> SessionError {
+        match failed.why.clone() {
+            Why::Cancelled => SessionError::Cancelled { frame },
+            Why::OutOfMemory => SessionError::OutOfMemory {
+                frame,
+                tolerance: self.options.tolerance,
+                limit_bytes: self.options.max_memory_bytes.unwrap_or(u64::MAX),
+                links: failed.pairs(),
+            },
+            Why::Unsettled { residual, surfaces } => {
+                SessionError::Unsettled { frame, residual, surfaces }
+            }
+            Why::Unbalanced { share, surfaces } => {
+                SessionError::Unbalanced { frame, share, surfaces }
+            }
+        }
     }
 
     /// Bytes that the engine's structures hold now.
     pub fn memory(&self) -> Memory {
-        let fixed = self.bed.seed.memory_bytes() + self.bed.seed.shared_bytes();
-        let mut memory = Memory { fixed, ..Memory::default() };
-        if let Some(s) = &self.solved {
-            let of_groups = s.groups.memory_bytes() + s.radiosity.group_bytes();
-            memory.pairs = s.tree.memory_bytes() + s.links.pool_bytes() + of_groups;
-            memory.elements =
-                s.forest.memory_bytes() + s.radiosity.memory_bytes() + s.links.span_bytes();
-            memory.fixed += s.coarse.memory_bytes();
-        }
+        let seed = self.bed.seed.memory_bytes() + self.bed.seed.shared_bytes();
+        let mut memory = self.solved.as_ref().map_or_else(Memory::default, Solved::memory);
+        memory.fixed += seed;
         memory
     }
 
@@ -462,58 +322,5 @@ impl Session {
     pub fn memory_bytes(&self) -> u64 {
         let memory = self.memory();
         memory.pairs + memory.elements + memory.fixed
-    }
-}
-
-/// The part of the forest that is always there, and its coarse elements by number.
-fn seed_of(scene: &Scene, options: &Options, displaced: &BTreeSet<BodyId>) -> (Forest, Vec<u32>) {
-    let is_displaced = |body: BodyId| displaced.contains(&body) || scene.is_inserted(body);
-    let mut seed = match (options.oracle, options.groups) {
-        (Oracle::Error, true) => Forest::with_groups(scene, &is_displaced),
-        _ => Forest::displaced(scene, &is_displaced),
-    };
-    let coarse_ids = match options.oracle {
-        Oracle::Error => coarse::number(scene, &mut seed),
-        Oracle::FormFactor { .. } => Vec::new(),
-    };
-    (seed, coarse_ids)
-}
-
-/// Bytes that the engine's structures hold.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Memory {
-    /// Pair tree and links by receiver.
-    pub pairs: u64,
-    /// Element forest, radiosities, and where each element's links are.
-    pub elements: u64,
-    /// What is as large at every tolerance: the forest that builds start from, what is known of
-    /// facets and clusters alone (one copy for all), the coarse solution.
-    pub fixed: u64,
-}
-
-/// Wall-clock time of the phases; it labels reports and decides nothing.
-pub(crate) struct Clock {
-    start: Instant,
-    lap: Instant,
-}
-
-// The session times its phases for the report; no result uses it.
-#[allow(clippy::disallowed_methods)]
-impl Clock {
-    pub(crate) fn start() -> Clock {
-        let now = Instant::now();
-        Clock { start: now, lap: now }
-    }
-
-    /// Seconds since the last lap.
-    pub(crate) fn lap(&mut self) -> f64 {
-        let now = Instant::now();
-        let seconds = (now - self.lap).as_secs_f64();
-        self.lap = now;
-        seconds
-    }
-
-    pub(crate) fn total(&self) -> f64 {
-        self.start.elapsed().as_secs_f64()
     }
 }

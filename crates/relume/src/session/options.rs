@@ -1,5 +1,7 @@
 //! What a user may choose about a solution.
 
+use crate::follow::Update;
+
 /// How a scene is solved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
@@ -14,7 +16,7 @@ pub struct Options {
     pub groups: bool,
     /// Whether every step measures row sums and energies: a pass over all links, whatever moved.
     pub balance: bool,
-    /// Whether every step keeps the events of its links, for [`Session::events`](super::Session::events).
+    /// Whether every step keeps the events of its links, for [`Frame::events`](super::Frame::events).
     pub events: bool,
     /// Limit on the engine's memory, bytes; `None` for no limit.
     pub max_memory_bytes: Option<u64>,
@@ -49,28 +51,6 @@ pub enum Oracle {
     },
 }
 
-/// How the pair tree follows the motion.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Update {
-    /// Rebuild everything in every frame: the reference that others are checked against.
-    Scratch,
-    /// Look again at every pair that the motion since the last step may concern, and at no other.
-    Reinspect,
-    /// The paper's prediction, lossy: a line through the last two evaluations of each dynamic pair says
-    /// in which frame its verdict changes or its occlusion begins or ends; until then its exchange area
-    /// and visibility follow the line.
-    Extrapolate {
-        /// Frames from one evaluation to the next at most, in 1..=255. The paper's is 7.
-        frames: u32,
-        /// Where given, a pair is evaluated again as soon as the estimated error of X V, relative to X,
-        /// could pass this; then `frames` is only the limit.
-        error: Option<f64>,
-    },
-    /// As [`Update::Reinspect`], but pairs that the known motion cannot concern before some time are not looked at
-    /// until then. The links are the same, bit for bit.
-    Certificate,
-}
-
 impl Options {
     /// Checks every range.
     pub(super) fn validate(&self) -> Result<(), super::SessionError> {
@@ -81,16 +61,7 @@ impl Options {
                 self.tolerance
             ));
         }
-        if let Update::Extrapolate { frames, error } = self.update {
-            if !(1..=255).contains(&frames) {
-                return fail(format!("extrapolate={frames}: frames ahead must be 1 to 255"));
-            }
-            if let Some(error) = error.filter(|&e| !(e > 0.0 && e < 1.0)) {
-                return fail(format!(
-                    "the error {error} of extrapolation is not between 0 and 1: it is a relative error, such as 0.01"
-                ));
-            }
-        }
+        self.update.check().or_else(fail)?;
         if let Oracle::FormFactor { epsilon, min_area_m2 } = self.oracle
             && !(epsilon > 0.0 && epsilon < 1.0 && min_area_m2 >= 0.0)
         {
@@ -99,6 +70,12 @@ impl Options {
             ));
         }
         Ok(())
+    }
+
+    /// Whether builds start with groups of patches, and with coarse elements.
+    pub(super) fn bedding(&self) -> (bool, bool) {
+        let weighs = self.oracle == Oracle::Error;
+        (weighs && self.groups, weighs)
     }
 
     /// The oracle in the pair tree's terms.

@@ -7,23 +7,20 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::element::{ElementId, Forest, WorldView, old_coarse_numbers};
+use crate::element::{Forest, WorldView, old_coarse_numbers};
 use crate::geometry::Pose;
-use crate::pair::PairId;
 use crate::scene::{BodyId, Held, Patch, Scene};
+use crate::space::{Bed, Before, Solved, group_links};
 
-use super::groups::{Before, group_links};
-use super::{Session, Solved, Update, seed_of, tally};
+use super::{Session, Update};
 
-/// A solved state whose scene has been edited since.
-pub(super) struct Left {
-    /// The scene as it was.
-    scene: Arc<Scene>,
-    solved: Solved,
+/// What has come and gone since a scene was solved.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Edited {
     /// Bodies of that scene that left it.
-    gone: BTreeSet<BodyId>,
+    pub(super) gone: BTreeSet<BodyId>,
     /// Bodies that came.
-    fresh: BTreeSet<BodyId>,
+    pub(super) fresh: BTreeSet<BodyId>,
 }
 
 /// What edits a scene.
@@ -35,14 +32,12 @@ pub(super) enum Edit {
     Out(BodyId),
 }
 
-/// A scene, and what starts from it.
-#[derive(Clone)]
-pub(super) struct Bed {
-    pub(super) scene: Arc<Scene>,
-    /// The part of the forest that is always there, where every build starts.
-    pub(super) seed: Forest,
-    /// Coarse elements of the seed by number; none for oracles that ask for no brightness.
-    pub(super) coarse_ids: Vec<u32>,
+/// Where a step starts.
+pub(super) struct Start {
+    /// The state to start from, in the session's scene.
+    pub(super) last: Option<Solved>,
+    /// The scene to go on with after the step, where bodies are to be forgotten then.
+    pub(super) remains: Option<Arc<Scene>>,
 }
 
 impl Session {
@@ -52,87 +47,85 @@ impl Session {
         let (Edit::In(body) | Edit::Out(body)) = edit;
         if !old.is_inserted(body) && !self.bed.scene.is_inserted(body) {
             // One that the scene was made with stays in it, absent; that it comes or goes was not foreseen.
-            self.solved = self.solved.take().filter(Solved::is_settled);
             if let Some(solved) = &mut self.solved {
-                solved.tree.forget_certificates();
+                solved.break_promise();
             }
             return;
         }
         self.is_planted = false;
-        if let Some(solved) = self.solved.take() {
-            let (gone, fresh) = (BTreeSet::new(), BTreeSet::new());
-            self.left = Some(Left { scene: old, solved, gone, fresh });
+        if self.solved.is_none() {
+            return;
         }
-        if let Some(left) = &mut self.left {
-            match edit {
-                Edit::In(body) => drop(left.fresh.insert(body)),
-                Edit::Out(body) if left.fresh.remove(&body) => {}
-                Edit::Out(body) => drop(left.gone.insert(body)),
-            }
+        let edited = self.edited.get_or_insert_default();
+        match edit {
+            Edit::In(body) => drop(edited.fresh.insert(body)),
+            Edit::Out(body) if edited.fresh.remove(&body) => {}
+            Edit::Out(body) => drop(edited.gone.insert(body)),
         }
     }
 
     /// Tells the seed what hands have changed of it: which bodies came and left, which patches emit at any time, and which
-    /// bodies at rest are where the scene has them, covering what they stand on. The state is carried over where it can be;
-    /// else nothing that was solved stays. Returns the scene to go on with after the next step, where bodies are to be
-    /// forgotten then.
-    pub(super) fn follow_hands(&mut self) -> Option<Arc<Scene>> {
+    /// bodies at rest are where the scene has them, covering what they stand on. The last solution is taken from the session,
+    /// and carried over where it can be.
+    pub(super) fn follow_hands(&mut self) -> Start {
         let displaced = self.displaced_now();
-        let glows = |session: &Session, scene: &Scene| {
-            let emits = |p: &Patch| scene.patch_emits(p) || session.emits_by_hand(scene, p);
-            scene.patches.iter().map(emits).collect::<Vec<bool>>()
-        };
         if self.is_planted && displaced == self.displaced {
-            let glows = glows(self, &self.bed.scene);
-            if self.bed.seed.set_glows(glows) {
-                self.solved = None;
-            }
-            return None;
+            let glows = glows(&self.bed.scene, &self.held);
+            let last = self.solved.take();
+            let is_other = self.bed.seed.set_glows(glows);
+            return Start { last: last.filter(|_| !is_other), remains: None };
         }
         let scene = Arc::clone(&self.bed.scene);
         let from = self.take_last(&scene);
         let onto = from.as_ref().map_or_else(|| Arc::clone(&scene), |from| Arc::clone(&from.onto));
-        let plant = |session: &Session, scene: &Arc<Scene>| {
-            let (mut seed, coarse_ids) = seed_of(scene, &session.options, &displaced);
-            seed.set_glows(glows(session, scene));
-            Bed { scene: Arc::clone(scene), seed, coarse_ids }
-        };
-        let bed = plant(self, &onto);
+        let bed = self.plant(Arc::clone(&onto), &displaced, &self.held);
         if let Some(Moved { was, .. }) = &from
             && Arc::ptr_eq(was, &bed.scene)
             && bed.seed.is_as_displaced(&self.bed.seed)
         {
-            (self.solved, self.displaced) = (from.map(|from| from.last), displaced);
-            return None;
+            self.displaced = displaced;
+            return Start { last: from.map(|from| from.last), remains: None };
         }
-        let carried = from.and_then(|from| {
+        let last = from.and_then(|from| {
             let Moved { last, was, body, .. } = from;
             let old = Bed { scene: was, ..self.bed.clone() };
             replanted(last, (&old, &bed), &body)
         });
-        let is_cold = carried.is_none();
-        self.solved = carried;
-        let remains = !Arc::ptr_eq(&onto, &scene);
-        self.bed = if is_cold && remains { plant(self, &scene) } else { bed };
+        let remains = (!Arc::ptr_eq(&onto, &scene)).then(|| Arc::clone(&scene));
+        self.bed = match (&last, &remains) {
+            (None, Some(scene)) => self.plant(Arc::clone(scene), &displaced, &self.held),
+            _ => bed,
+        };
         (self.is_planted, self.displaced) = (true, displaced);
-        (remains && !is_cold).then_some(scene)
+        let remains = remains.filter(|_| last.is_some());
+        Start { last, remains }
+    }
+
+    /// A scene with what builds start from, as hands have changed it.
+    pub(super) fn plant(
+        &self,
+        scene: Arc<Scene>,
+        displaced: &BTreeSet<BodyId>,
+        held: &Held,
+    ) -> Bed {
+        let mut bed = Bed::new(scene, displaced, self.options.bedding());
+        bed.seed.set_glows(glows(&bed.scene, held));
+        bed
     }
 
     /// The last state, if it can be carried over to the present scene.
     fn take_last(&mut self, scene: &Arc<Scene>) -> Option<Moved> {
-        let left = self.left.take();
-        if self.options.update == Update::Scratch {
+        let (last, edited) = (self.solved.take(), self.edited.take());
+        let starts_anew = std::mem::take(&mut self.starts_anew);
+        if starts_anew || self.options.update == Update::Scratch {
             return None;
         }
-        let Some(left) = left else {
-            let last = self.solved.take().filter(Solved::is_settled)?;
+        let last = last.filter(Solved::is_settled)?;
+        let Some(Edited { gone, fresh }) = edited else {
             let (was, onto) = (Arc::clone(scene), Arc::clone(scene));
             return Some(Moved { last, was, onto, body: Box::new(Some) });
         };
-        let Left { scene: was, solved: last, gone, fresh } = left;
-        if !last.is_settled() {
-            return None;
-        }
+        let was = Arc::clone(&last.space.scene);
         let list: Vec<BodyId> = gone.into_iter().collect();
         let (onto, ids) = match list.is_empty() {
             true => (Arc::clone(scene), Vec::new()),
@@ -150,14 +143,11 @@ impl Session {
 
     /// Forgets the bodies that have left, which are absent by now.
     pub(super) fn forget_remains(&mut self, last: Solved, scene: Arc<Scene>) -> Solved {
-        let (mut seed, coarse_ids) = seed_of(&scene, &self.options, &self.displaced);
-        let emits = |p: &Patch| scene.patch_emits(p) || self.emits_by_hand(&scene, p);
-        seed.set_glows(scene.patches.iter().map(emits).collect());
-        let bed = Bed { scene, seed, coarse_ids };
+        let bed = self.plant(scene, &self.displaced, &self.held);
         let count = bed.scene.bodies.len();
         let body = |body: BodyId| ((body.0 as usize) < count).then_some(body);
         let mut last = replanted(last, (&self.bed, &bed), &body).expect("the same but for bodies");
-        debug_assert!(last.touched.is_empty(), "what has left covers nothing");
+        debug_assert!(last.space.touched.is_empty(), "what has left covers nothing");
         last.compact();
         self.bed = bed;
         last
@@ -173,13 +163,16 @@ impl Session {
         let rests = |body: &BodyId| !scene.moves(*body) && !scene.is_inserted(*body);
         bodies.chain(scene.removed_bodies()).filter(rests).collect()
     }
+}
 
-    /// Whether a hand makes a patch emit.
-    fn emits_by_hand(&self, scene: &Scene, patch: &Patch) -> bool {
-        let Some(exitance) = self.held.exitances.get(&patch.material) else { return false };
+/// Whether each patch of a scene emits at any time, with this in hand.
+fn glows(scene: &Scene, held: &Held) -> Vec<bool> {
+    let emits_by_hand = |patch: &Patch| {
+        let Some(exitance) = held.exitances.get(&patch.material) else { return false };
         let share = scene.emission_share(patch);
         (0..3).any(|c| exitance[c] * share[c] > 0.0)
-    }
+    };
+    scene.patches.iter().map(|p| scene.patch_emits(p) || emits_by_hand(p)).collect()
 }
 
 /// A state on its way from one scene to another.
@@ -198,42 +191,34 @@ fn replanted(
     body: &dyn Fn(BodyId) -> Option<BodyId>,
 ) -> Option<Solved> {
     let seeds = (&old.seed, &new.seed);
-    let to = last.forest.renumbering_to(seeds, body)?;
-    let (forest, touched) = last.forest.replanted(seeds, &to);
-    last.forest = forest;
-    last.touched = touched;
+    let to = last.space.forest.renumbering_to(seeds, body)?;
+    let (forest, touched) = last.space.forest.replanted(seeds, &to);
+    last.space.scene = Arc::clone(&new.scene);
+    last.space.forest = forest;
+    last.space.touched = touched;
     last.links.renumber(&to);
     last.radiosity.renumber(&to);
     last.tree.renumber(&to);
-    last.tree.regroup(last.forest.children(Forest::ROOT));
+    last.tree.regroup(last.space.forest.children(Forest::ROOT));
     // What stands in the way of whom was not foreseen.
     last.tree.forget_certificates();
     let numbers = old_coarse_numbers(seeds, &to, new.coarse_ids.len());
     let lens = [old, new].map(|bed| bed.seed.kept_len());
-    last.coarse.renumber(&to.below(lens), &numbers);
+    last.space.coarse.renumber(&to.below(lens), &numbers);
     let mut from = vec![None; new.scene.bodies.len()];
     for was in (0..old.scene.bodies.len() as u32).map(BodyId) {
         if let Some(is) = body(was) {
             from[is.0 as usize] = Some(was);
         }
     }
-    for world in [&mut last.world, &mut last.sound_world] {
+    let space = &mut last.space;
+    for world in [&mut space.world, &mut space.sound_world] {
         *world = world.of_bodies(&from);
     }
-    last.view = WorldView::new(&new.scene, &last.forest, &last.world);
-    last.groups = group_links((&last.forest, &last.view), &last.tree, &Before::default());
+    space.view = WorldView::new(&new.scene, &space.forest, &space.world);
+    space.groups = group_links((&space.forest, &space.view), &last.tree, &Before::default());
     let mut report = std::mem::take(&mut last.report);
-    tally::fill(&mut report, &last);
+    last.count(&mut report);
     last.report = report;
     Some(last)
-}
-
-/// Links with an end on some facets, to be made anew.
-pub(super) fn links_on(solved: &Solved, facets: &[ElementId]) -> Vec<PairId> {
-    let is_on = |id| facets.binary_search(&solved.forest.fixed(id)).is_ok();
-    let touches = |&id: &PairId| {
-        let (a, b) = solved.tree.ends(id);
-        is_on(a) || is_on(b)
-    };
-    solved.tree.link_ids().filter(touches).collect()
 }

@@ -2,7 +2,7 @@
 
 use crate::element::Renumbering;
 
-use super::surfaces::Place;
+use super::place::Place;
 
 /// A quantity that varies linearly over an element, red, green and blue.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -2,7 +2,8 @@
 
 use super::field::Linear;
 use super::links::Links;
-use super::surfaces::{Place, Surfaces};
+use super::place::Place;
+use super::surfaces::Surfaces;
 
 /// Calls `visit` with the sum of the form factors from each leaf of a facet, over its and its
 /// ancestors' links: as lines, or as means alone unless `linear`.

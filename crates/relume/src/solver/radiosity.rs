@@ -13,11 +13,13 @@ use super::gather::gather_some;
 use super::groups::Arriving;
 use super::jump::Jump;
 use super::links::Links;
+use super::place::Place;
 use super::push::{push, row_sums};
 use super::settle::{Below, News, Settled};
-use super::surfaces::{Place, Surfaces, for_each_below};
+use super::surfaces::{Surfaces, for_each_below};
 use super::trend::Trend;
-use super::work::{Batch, Dirty, PENDING_SHARE, Way, Work};
+use super::way::{Batch, Way};
+use super::work::{Dirty, PENDING_SHARE, Work};
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +36,22 @@ pub enum Stop {
     Sweeps(u32),
     /// When no element's radiosity would change by more than this, relative to the mean radiosity.
     Residual(f64),
+}
+
+impl Stop {
+    /// Change of a radiosity that is too small to be followed, at a mean radiosity; W/m2.
+    fn limit_w_m2(&self, mean_w_m2: f64) -> f32 {
+        match *self {
+            Stop::Sweeps(_) => 0.0,
+            Stop::Residual(limit) | Stop::Bounded { residual: limit, .. } => {
+                (limit * mean_w_m2) as f32
+            }
+        }
+    }
+
+    fn is_by_residual(&self) -> bool {
+        !matches!(self, Stop::Sweeps(_))
+    }
 }
 
 /// What came over links of groups to whom something did: few elements do, since groups are linked with large ones.
@@ -282,19 +300,14 @@ impl Radiosity {
         let mut work = Work::new(surfaces, dirty);
         let mut jump = Jump::default();
         (self.sweeps, self.gathers) = (0, 0);
-        let limit_of = |mean: f64| match stop {
-            Stop::Sweeps(_) => 0.0,
-            Stop::Residual(limit) | Stop::Bounded { residual: limit, .. } => (limit * mean) as f32,
-        };
-        let to_residual = !matches!(stop, Stop::Sweeps(_));
         let mut last_mean = self.mean_w_m2(surfaces);
-        let mut limit = limit_of(last_mean);
+        let mut limit = stop.limit_w_m2(last_mean);
         if self.trend.is_wide {
             // Nothing is known of what is owed.
             work.start_all(surfaces);
             grow(&mut self.owed, self.pending.len());
         }
-        let start = (to_residual && self.trend.is_wide)
+        let start = (stop.is_by_residual() && self.trend.is_wide)
             .then(|| self.trend.follow(surfaces, &mut self.radiosity));
         let mut is_wide = work.all && !is_first;
         let mut arriving = match work.all {
@@ -302,7 +315,7 @@ impl Radiosity {
             false => self.mark_over_groups(surfaces, &mut work, limit),
         };
         loop {
-            if self.held > HELD_MAX * limit && !work.all && to_residual {
+            if self.held > HELD_MAX * limit && !work.all && stop.is_by_residual() {
                 // What was little beside a brighter scene is too much beside this one.
                 work.start_all(surfaces);
             }
@@ -314,37 +327,14 @@ impl Radiosity {
             let over_groups = arriving.take().or_else(|| self.arriving(surfaces));
             let small = self.sweep((surfaces, links, over_groups.as_ref()), &mut work, limit);
             self.sweeps += 1;
-            if all {
-                (self.passed_over, self.held) = (small, 0.0);
-            } else {
-                self.held = self.held.max(limit);
-            }
-            // A radiosity stays, what its ancestors gathered is owed to it, and they may gather other values.
-            let gathered = if surfaces.groups().is_some() { 2.0 } else { 1.0 };
-            let left = self.passed_over + self.held * (1.0 + 1.0 + gathered * PENDING_SHARE);
-            let (mean, before) = (self.mean_w_m2(surfaces), limit);
-            limit = limit_of(mean);
-            self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
-            let done = match stop {
-                Stop::Sweeps(count) => self.sweeps >= count,
-                Stop::Bounded { mean_w_m2, .. } if mean > mean_w_m2 || mean.is_nan() => {
-                    self.residual = f64::INFINITY;
-                    true
-                }
-                // Where the sweep itself made the scene much darker, what it left is no longer little.
-                _ if before > HELD_MAX * limit => {
-                    work.start_all(surfaces);
-                    false
-                }
-                _ => {
-                    let is_left = work.is_left(surfaces, links, limit, &mut self.pending);
-                    if !work.all {
-                        arriving = self.mark_over_groups(surfaces, &mut work, limit);
-                    }
-                    !is_left && !work.waits()
-                }
+            (self.passed_over, self.held) = match all {
+                true => (small, 0.0),
+                false => (self.passed_over, self.held.max(limit)),
             };
-            if done {
+            let (mean, before) = (self.mean_w_m2(surfaces), limit);
+            limit = stop.limit_w_m2(mean);
+            let limits = (before, limit);
+            if self.is_done((surfaces, links), stop, &mut work, (mean, limits), &mut arriving) {
                 break;
             }
             if self.sweeps >= SWEEPS_MAX {
@@ -355,7 +345,7 @@ impl Radiosity {
                 break;
             }
             last_mean = mean;
-            if all && work.all && to_residual {
+            if all && work.all && stop.is_by_residual() {
                 jump.after(&mut self.radiosity);
             }
         }
@@ -365,6 +355,41 @@ impl Radiosity {
         }
         if self.trend.is_wide {
             self.owed = Vec::new();
+        }
+    }
+
+    /// Whether a sweep was the last one, by the mean radiosity after it and what counted as little before and counts so now;
+    /// if not, what is left is marked.
+    fn is_done<S: Surfaces>(
+        &mut self,
+        (surfaces, links): (&S, &Links),
+        stop: Stop,
+        work: &mut Work,
+        (mean, (before, limit)): (f64, (f32, f32)),
+        arriving: &mut Option<Arriving>,
+    ) -> bool {
+        // A radiosity stays, what its ancestors gathered is owed to it, and they may gather other values.
+        let gathered = if surfaces.groups().is_some() { 2.0 } else { 1.0 };
+        let left = self.passed_over + self.held * (1.0 + 1.0 + gathered * PENDING_SHARE);
+        self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
+        match stop {
+            Stop::Sweeps(count) => self.sweeps >= count,
+            Stop::Bounded { mean_w_m2, .. } if mean > mean_w_m2 || mean.is_nan() => {
+                self.residual = f64::INFINITY;
+                true
+            }
+            // Where the sweep itself made the scene much darker, what it left is no longer little.
+            _ if before > HELD_MAX * limit => {
+                work.start_all(surfaces);
+                false
+            }
+            _ => {
+                let is_left = work.is_left(surfaces, links, limit, &mut self.pending);
+                if !work.all {
+                    *arriving = self.mark_over_groups(surfaces, work, limit);
+                }
+                !is_left && !work.waits()
+            }
         }
     }
 

@@ -5,8 +5,9 @@
 //! level gains and another loses cancels, and where a change is small it waits though it may be large elsewhere.
 
 use super::field::{Field, Linear};
-use super::surfaces::{Lit, Place, Surfaces};
-use super::work::{Way, bit};
+use super::place::Place;
+use super::surfaces::{Lit, Surfaces};
+use super::way::{Way, bit};
 
 /// What pushing and pulling through one facet found.
 #[derive(Default)]

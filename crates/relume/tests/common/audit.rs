@@ -27,7 +27,7 @@ pub(crate) struct Audit {
 
 /// Measures every law.
 pub(crate) fn audit(session: &Session) -> Audit {
-    let (tree, forest) = session.pairs();
+    let (tree, forest) = session.frame().unwrap().pairs();
     let mut out = Audit {
         visibility: [f64::INFINITY, f64::NEG_INFINITY],
         row_sum: [f64::INFINITY, f64::NEG_INFINITY],
@@ -43,7 +43,7 @@ pub(crate) fn audit(session: &Session) -> Audit {
             out.areas = out.areas.max((sum / forest.area_m2(id) - 1.0).abs());
         }
     }
-    for (id, row) in session.row_sums() {
+    for (id, row) in session.frame().unwrap().rows() {
         assert!(row.is_finite() && forest.kind(id) == Kind::Element);
         out.row_sum = [out.row_sum[0].min(row), out.row_sum[1].max(row)];
         squares += forest.area_m2(id) * (row - row.clamp(0.0, 1.0)).powi(2);

@@ -165,7 +165,7 @@ pub(crate) fn area_of(scene: &Scene, surface: &str) -> f64 {
 
 /// Exchange area between two named surfaces, occlusion included, m2: the sum of X V over links.
 pub(crate) fn exchange_area(session: &Session, one: &str, two: &str) -> f64 {
-    let (tree, forest) = session.pairs();
+    let (tree, forest) = session.frame().unwrap().pairs();
     let scene = session.scene();
     let (ones, twos) = (patches_of(scene, one), patches_of(scene, two));
     let mut sum = 0.0;

@@ -23,7 +23,7 @@ fn end(forest: &Forest, id: ElementId) -> End {
 
 /// All pairs of a solved session.
 pub(crate) fn pairs_of(session: &Session) -> BTreeMap<Name, Is> {
-    let (tree, forest) = session.pairs();
+    let (tree, forest) = session.frame().unwrap().pairs();
     let mut out = BTreeMap::new();
     let mut stack = vec![PairTree::ROOT];
     while let Some(id) = stack.pop() {
@@ -54,7 +54,7 @@ pub(crate) struct Difference {
 
 /// What a solved session holds that a table from before does not.
 pub(crate) fn difference(before: &BTreeMap<Name, Is>, after: &Session) -> Difference {
-    let (tree, forest) = after.pairs();
+    let (tree, forest) = after.frame().unwrap().pairs();
     let mut out = Difference::default();
     let mut stack = vec![(PairTree::ROOT, false)];
     while let Some((id, anew)) = stack.pop() {

@@ -127,13 +127,18 @@ fn check_frames(seed: u64, bodies: usize, frames: u32, (pace, coarse): (f64, f64
         assert_eq!(of(two), of(built), "{place}");
         assert_eq!(of(one), of(built), "with certificates, {place}");
         // No event later than it is due.
-        assert_eq!(missed(&certain, &warm), Missed::default(), "{place}");
+        assert_eq!(
+            missed(certain.solved().unwrap(), warm.solved().unwrap()),
+            Missed::default(),
+            "{place}"
+        );
         assert_eq!((one.changed, one.segments), (two.changed, two.segments), "{place}");
         for followed in [&certain, &warm] {
-            radiosity_gap(followed, &cold).unwrap_or_else(|e| panic!("{place}: {e}"));
+            radiosity_gap(followed.solved().unwrap(), cold.solved().unwrap())
+                .unwrap_or_else(|e| panic!("{place}: {e}"));
         }
         walk += Walk {
-            events: warm.link_events().len() as u64,
+            events: warm.frame().unwrap().link_events().len() as u64,
             reinspected: two.examined,
             examined: one.examined,
             reevaluated: one.reevaluated,
@@ -149,8 +154,8 @@ fn check_frames(seed: u64, bodies: usize, frames: u32, (pace, coarse): (f64, f64
 
 /// Coverage of the pair tree, and the bounds of what links carry.
 fn audit(session: &FlatSession) {
-    let (tree, forest) = session.pairs();
-    for link in session.links() {
+    let (tree, forest) = session.frame().unwrap().pairs();
+    for link in session.frame().unwrap().links() {
         let x = f64::from(link.carried.exchange_area_m2);
         let shorter = forest.length(link.a).min(forest.length(link.b));
         assert!(x >= 0.0 && x <= shorter * (1.0 + 1e-6));
@@ -213,7 +218,7 @@ fn follow(text: &str, epsilon: f64, times_s: impl Iterator<Item = f64>) -> Walk 
             continue;
         }
         walk += Walk {
-            events: certain.link_events().len() as u64,
+            events: certain.frame().unwrap().link_events().len() as u64,
             reevaluated: one.reevaluated,
             followed: one.followed,
             ..Walk::default()
@@ -322,10 +327,10 @@ fn gutter(update: Update) -> FlatSession {
 fn what_comes_nearer_is_demoted_and_promoted_on_the_way_back() {
     let mut session = gutter(Update::Reinspect);
     let count = |session: &FlatSession, kind| {
-        session.link_events().iter().filter(|e| e.kind == kind).count() as u64
+        session.frame().unwrap().link_events().iter().filter(|e| e.kind == kind).count() as u64
     };
     let there = session.step(0, 0.0);
-    assert!(session.link_events().is_empty());
+    assert!(session.frame().unwrap().link_events().is_empty());
     let near = session.step(1, 10.0);
     assert!(near.demoted > 0 && near.elements > there.elements && near.links > there.links);
     assert!(count(&session, EventKind::Demoted) == near.demoted);
@@ -344,20 +349,26 @@ fn a_hidden_link_is_kept_and_restored() {
     let coarse = FlatOptions { epsilon: 0.9, ..options(0.9, Update::Reinspect) };
     let mut session = FlatSession::new(scene, coarse).unwrap();
     let visibility = |s: &FlatSession| {
-        let (_, forest) = s.pairs();
+        let (_, forest) = s.frame().unwrap().pairs();
         let of = |id| forest.wall(id).0.0;
-        let link = s.links().into_iter().find(|l| of(l.a) + of(l.b) == 1).expect("it is kept");
+        let link = s
+            .frame()
+            .unwrap()
+            .links()
+            .into_iter()
+            .find(|l| of(l.a) + of(l.b) == 1)
+            .expect("it is kept");
         link.carried.visibility()
     };
     session.step(0, 0.0);
     assert_eq!(visibility(&session), 1.0);
     let hidden = session.step(1, 1.0);
     assert_eq!(visibility(&session), 0.0);
-    assert!(session.link_events().iter().any(|e| e.kind == EventKind::Occluded));
+    assert!(session.frame().unwrap().link_events().iter().any(|e| e.kind == EventKind::Occluded));
     assert_eq!(hidden.visibility_only, 1, "the pair of the two walls, and no other");
     session.step(2, 0.0);
     assert_eq!(visibility(&session), 1.0);
-    assert!(session.link_events().iter().any(|e| e.kind == EventKind::Revealed));
+    assert!(session.frame().unwrap().link_events().iter().any(|e| e.kind == EventKind::Revealed));
 }
 
 #[test]
@@ -382,7 +393,12 @@ fn extrapolated_links_stay_close() {
         followed.step(frame, time_s);
         extrapolated += line.step(frame, time_s).extrapolated;
         let sum = |s: &FlatSession| -> f64 {
-            s.links().iter().map(|l| f64::from(l.carried.exchange_area_past_occluders_m2())).sum()
+            s.frame()
+                .unwrap()
+                .links()
+                .iter()
+                .map(|l| f64::from(l.carried.exchange_area_past_occluders_m2()))
+                .sum()
         };
         let (exact, guess) = (sum(&followed), sum(&line));
         assert!((exact - guess).abs() < 0.05 * exact, "frame {frame}: {exact} {guess}");

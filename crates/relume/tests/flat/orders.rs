@@ -26,8 +26,12 @@ fn solve(scene: &str, epsilon: f64, constant: bool) -> (Vec<f64>, u64) {
     };
     let mut session = FlatSession::new(Arc::new(parse(scene).unwrap()), options).unwrap();
     let links = session.step(0, 0.0).links;
-    let (_, forest) = session.pairs();
-    let means = forest.facets().iter().map(|&f| f64::from(session.radiosity(f)[0])).collect();
+    let (_, forest) = session.frame().unwrap().pairs();
+    let means = forest
+        .facets()
+        .iter()
+        .map(|&f| f64::from(session.frame().unwrap().radiosity(f)[0]))
+        .collect();
     (means, links)
 }
 

@@ -34,7 +34,7 @@ fn table(case: &Case, tolerance: f64) -> Table {
 
 fn table_of(session: &Session) -> Table {
     let grouping = Grouping::by_surface(session.scene());
-    Table::new(&grouping.names, &session.factors(&grouping))
+    Table::new(&grouping.names, &session.frame().unwrap().factors(&grouping))
 }
 
 /// The factors and rows that are off by more than is allowed.
@@ -74,7 +74,7 @@ fn light(case: &Case, right: &[f64], allowed: f64) {
     let mut session = session(case, 0.02, true);
     session.step(0, 0.0).unwrap();
     let mut misses = Misses::default();
-    let found = session.irradiances_at(&case.world_sensors());
+    let found = session.frame().unwrap().irradiances_at(&case.world_sensors());
     for (k, (found, &right)) in found.iter().zip(right).enumerate() {
         misses.near(&format!("sensor {k}"), found[0], right, allowed * right);
     }
@@ -299,7 +299,7 @@ fn light_beside_a_small_device_is_within_the_tolerance() {
 fn rms_off(case: &Case, right: &[f64], tolerance: f64) -> f64 {
     let mut session = session(case, tolerance, true);
     session.step(0, 0.0).unwrap();
-    let found = session.irradiances_at(&case.world_sensors());
+    let found = session.frame().unwrap().irradiances_at(&case.world_sensors());
     let off = |(found, right): (&[f64; 3], &f64)| (found[0] / right - 1.0).powi(2);
     let rms = (found.iter().zip(right).map(off).sum::<f64>() / right.len() as f64).sqrt();
     println!("{rms:.4} at {tolerance}");
@@ -430,7 +430,7 @@ fn f4_crate_on_floor_closure() {
     let mut session = session(&crate_on_floor(), 0.02, false);
     session.step(0, 0.0).unwrap();
     let grouping = Grouping::by_surface(session.scene());
-    let closed = session.factors(&grouping).close(Closure::Reciprocal);
+    let closed = session.frame().unwrap().factors(&grouping).close(Closure::Reciprocal);
     assert!(closed.is_ok(), "{closed:?}");
 }
 

@@ -131,7 +131,7 @@ fn run(case: &Case, scene: &Arc<Scene>, options: &Options, verdict: &mut Verdict
         if case.says_steps {
             println!("{STEP}at {time_s} s: {:.1} s, {} links", verdict.engine_s, report.links);
         }
-        let highest = session.row_sums().iter().map(|r| r.1).fold(0.0, f64::max);
+        let highest = session.frame().unwrap().rows().iter().map(|r| r.1).fold(0.0, f64::max);
         verdict.element = verdict.element.max(highest);
         look(&session, &report, time_s, verdict);
         if case.cold {
@@ -187,7 +187,7 @@ impl Table {
 fn factors(case: &Case, session: &Session, time_s: f64, verdict: &mut Verdict) {
     let scene = session.scene();
     let grouping = Grouping::by_surface(scene);
-    let table = Table::new(&grouping.names, &session.factors(&grouping));
+    let table = Table::new(&grouping.names, &session.frame().unwrap().factors(&grouping));
     let allowed = case.tolerance / 4.0;
     let touching = case.contact.as_ref().filter(|c| time_s >= c.since_s);
     for k in &case.known {
@@ -317,7 +317,7 @@ fn sensors(case: &Case, session: &Session, time_s: f64, verdict: &mut Verdict) {
         return;
     }
     let sensors = case.world_sensors();
-    let found = session.irradiances_at(&sensors);
+    let found = session.frame().unwrap().irradiances_at(&sensors);
     let (world, _) = case.world(time_s);
     let site = |s: &Sensor| Site::point(s.at, s.normal);
     let sites: Vec<Site> = sensors.iter().map(site).collect();

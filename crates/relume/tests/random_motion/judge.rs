@@ -58,10 +58,12 @@ fn follow_unguarded(recipe: &Recipe) -> Result<Seen, String> {
         let one = warm.step(k as u32, time_s).map_err(|e| e.to_string())?;
         let mut cold = Session::new(Arc::clone(&scene), recipe.options()).unwrap();
         let two = cold.step(k as u32, time_s).map_err(|e| e.to_string())?;
-        let drift =
-            agree(&scene, (&one, &warm.snapshot()), (&two, &cold.snapshot())).map_err(|e| {
-                format!("step {k} to {time_s} s: {e}{}", first_differences(&warm, &cold))
-            })?;
+        let drift = agree(
+            &scene,
+            (&one, &warm.frame().unwrap().solution()),
+            (&two, &cold.frame().unwrap().solution()),
+        )
+        .map_err(|e| format!("step {k} to {time_s} s: {e}{}", first_differences(&warm, &cold)))?;
         if k % 5 == 4 {
             // Rows of random scenes may be far off where things coincide or cut each other.
             Audit { row_sum: [0.0; 2], row_excess: 0.0, ..audit(&warm) }.check(0.0);

@@ -98,7 +98,14 @@ fn any_number_of_threads_follows_alike() {
                 let mut step = |&time_s: &f64| {
                     let mut report = session.step(0, time_s).unwrap();
                     report.seconds = relume::session::Seconds::default();
-                    let radiosity = session.snapshot().leaves.iter().map(|l| l.radiosity).collect();
+                    let radiosity = session
+                        .frame()
+                        .unwrap()
+                        .solution()
+                        .leaves
+                        .iter()
+                        .map(|l| l.radiosity)
+                        .collect();
                     (format!("{report:?}"), radiosity)
                 };
                 recipe.times_s.iter().map(&mut step).collect::<Vec<(String, Vec<[f32; 3]>)>>()
@@ -130,7 +137,11 @@ fn ten_thousand_frames_leave_no_trace() {
             let time_s = if home { 2.5 } else { random.between(0.0, 6.0) };
             let one = warm.step(frame as u32, time_s).unwrap();
             if home {
-                let used = agree(&scene, (&one, &warm.snapshot()), (&two, &cold.snapshot()));
+                let used = agree(
+                    &scene,
+                    (&one, &warm.frame().unwrap().solution()),
+                    (&two, &cold.frame().unwrap().solution()),
+                );
                 assert!(used.is_ok(), "frame {frame}: {used:?}");
                 Audit { row_sum: [0.0; 2], row_excess: 0.0, ..audit(&warm) }.check(0.0);
                 bytes.push(warm.memory_bytes());

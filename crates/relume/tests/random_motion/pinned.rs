@@ -68,7 +68,7 @@ fn frames_of(pin: &Pin) -> String {
     let mut out = String::new();
     for (frame, &time_s) in pin.times_s.iter().enumerate() {
         let report = session.step(frame as u32, time_s).unwrap();
-        let snapshot = session.snapshot();
+        let snapshot = session.frame().unwrap().solution();
         let radiosity = fold(snapshot.leaves.iter().flat_map(|l| l.radiosity.map(f32::to_bits)));
         writeln!(out, "{} {frame} {} {} {radiosity:016x}", pin.name, report.links, report.hash)
             .unwrap();
@@ -98,7 +98,7 @@ fn plane() -> String {
     let mut out = String::new();
     for (frame, time_s) in [0.0, 0.4, 0.45, 1.6].into_iter().enumerate() {
         let report = session.step(frame as u32, time_s);
-        let elements = session.elements();
+        let elements = session.frame().unwrap().elements();
         let radiosity = fold(elements.iter().flat_map(|e| e.radiosity.map(f32::to_bits)));
         writeln!(out, "plane {frame} {} {} {radiosity:016x}", report.links, report.hash).unwrap();
     }

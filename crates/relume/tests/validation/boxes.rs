@@ -86,7 +86,7 @@ fn a_room_of_64_boxes_keeps_its_mean_and_its_cells() {
     assert!(off < 0.03, "{off}");
     // Closed and of uniform reflectance: the mean irradiance is flux / ((1 - rho) A).
     let (session, _) = common::solved(room_of_boxes(), at_tolerance(0.05));
-    let leaves = session.snapshot().leaves;
+    let leaves = session.frame().unwrap().solution().leaves;
     let flux: f64 = leaves.iter().map(|l| common::leaf_area(l) * f64::from(l.irradiance[0])).sum();
     let exact = 10.0 * 0.09 / 0.5;
     println!("| mean of 64 boxes | {:+.1e} |", flux / exact - 1.0);
@@ -155,7 +155,7 @@ impl Looked<'_> {
     /// A link's kind: from the lamp or not, and what is in its way; and what it does, V by the judge's
     /// own integration.
     fn look(&self, link: &Link) -> (bool, usize, Kind) {
-        let (_, forest) = self.session.pairs();
+        let (_, forest) = self.session.frame().unwrap().pairs();
         let patches = [link.a, link.b].map(|id| forest.patch(id).expect("elements have patches"));
         let ends = [link.a, link.b].map(|id| WorldElement::new(self.view, forest, id, false));
         let [a, b] = ends.each_ref();
@@ -186,7 +186,7 @@ impl Looked<'_> {
 
 /// Mean radiosity and irradiance of each patch, W/m2.
 fn means(session: &Session) -> Vec<[f64; 2]> {
-    let snapshot = session.snapshot();
+    let snapshot = session.frame().unwrap().solution();
     let mean = |k: usize| {
         let leaves = snapshot.leaves_of(PatchId(k as u32));
         let area: f64 = leaves.iter().map(common::leaf_area).sum();
@@ -205,7 +205,7 @@ fn where_the_error_sits_among_64_boxes() {
     let scene = room_of_boxes();
     let polygons = judged::polygons(&scene, 0.0);
     let (session, report) = common::solved(room_of_boxes(), at_tolerance(0.05));
-    let (tree, forest) = session.pairs();
+    let (tree, forest) = session.frame().unwrap().pairs();
     let view = WorldView::new(&scene, forest, &scene.at(0.0));
     let (scene, session, view, polygons) = (&scene, &session, &view, &polygons[..]);
     let looked = Looked { scene, session, view, polygons, means: means(session) };

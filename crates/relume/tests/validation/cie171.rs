@@ -47,7 +47,7 @@ impl Reflector {
     ) -> f64 {
         let total = |reflectance: f64| {
             let scene = self.scene(reflectance, add);
-            solved(scene, at_tolerance(tolerance)).0.irradiance_at(at, normal)[0]
+            solved(scene, at_tolerance(tolerance)).0.frame().unwrap().irradiance_at(at, normal)[0]
         };
         (total(self.reflectance) - total(0.0)) / (self.irradiance() * self.reflectance)
     }
@@ -168,7 +168,8 @@ fn cie_5_8_the_internally_reflected_component() {
         // What the factors are off in the mean comes back with every reflection.
         let error_max = 5e-4 * exact / (1.0 - reflectance);
         line(&format!("5.8, reflectance {reflectance}"), exact, error_max, |tolerance| {
-            let snapshot = solved(scene.clone(), at_tolerance(tolerance)).0.snapshot();
+            let snapshot =
+                solved(scene.clone(), at_tolerance(tolerance)).0.frame().unwrap().solution();
             let sums = snapshot.leaves.iter().fold((0.0, 0.0), |(area, sum), leaf| {
                 let a = leaf_area(leaf);
                 (area + a, sum + a * f64::from(leaf.irradiance[0]))

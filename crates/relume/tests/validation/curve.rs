@@ -59,7 +59,8 @@ impl Case {
         let report = grid::on_one_thread(|| session.step(0, 0.0)).unwrap();
         let cells = grid::error(&grid::found(&session, self.sides), &self.cells);
         let start = Instant::now();
-        let gather = |s: &Site| grid::grey(session.irradiance_at(s.origin, s.normal));
+        let gather =
+            |s: &Site| grid::grey(session.frame().unwrap().irradiance_at(s.origin, s.normal));
         let gathered: Vec<f64> =
             if at_points { self.points.par_iter().map(gather).collect() } else { vec![] };
         let seconds = start.elapsed().as_secs_f64();

@@ -46,7 +46,7 @@ fn dense_solve_on_the_same_leaves() {
     // By motion, not from scratch: it is the links of a later frame that count.
     session.step(0, 0.0).unwrap();
     session.step(1, 0.6).unwrap();
-    let (elements, found) = leaves(&session.snapshot());
+    let (elements, found) = leaves(&session.frame().unwrap().solution());
     let polygons = judged::polygons(&scene, 0.6);
     let areas = exchange_areas(&polygons, &elements, 1e-4);
     let dense = radiosities(&polygons, &elements, &areas);
@@ -154,8 +154,10 @@ fn path_traced_at_other_poses() {
         let time = f64::from(frame) / 24.0;
         session.step(frame, time).unwrap();
         let places: Vec<Site> = sensors(5).iter().map(|s| s.1).collect();
-        let found: Vec<[f64; 3]> =
-            places.iter().map(|s| session.irradiance_at(s.origin, s.normal)).collect();
+        let found: Vec<[f64; 3]> = places
+            .iter()
+            .map(|s| session.frame().unwrap().irradiance_at(s.origin, s.normal))
+            .collect();
         let world = World::new(judged::polygons(&scene, time));
         let traced = path::irradiance(&world, &places, 400, u64::from(frame));
         let z = z_test(&found, traced.iter(), 0.002);

@@ -29,7 +29,7 @@ pub(crate) fn sites(scene: &Scene, time_s: f64, sides: Sides) -> Vec<Site> {
 
 /// Mean irradiance over the same cells in a solution and over the channels, W/m2.
 pub(crate) fn found(session: &Session, sides: Sides) -> Vec<f64> {
-    let snapshot = session.snapshot();
+    let snapshot = session.frame().unwrap().solution();
     let scene = &snapshot.scene;
     let mut grids: Vec<(usize, Cells)> = Vec::new();
     let mut out = Vec::new();

@@ -6,6 +6,8 @@
 
 use glam::DVec2;
 
+use crate::geometry::part_in_front;
+
 /// Least share of the squares of all texels that a cut has to gain: no more than a hundred cuts can, over all
 /// polygons for which that sum is one.
 pub(super) const GAIN: f64 = 0.01;
@@ -147,21 +149,11 @@ impl Search<'_> {
     }
 }
 
-/// The half of a polygon below a cut (`side` 1) or above it (-1).
+/// The half of a polygon below a cut (`side` 1) or above it (-1); its new corners lie on the cut, bit for bit.
 fn half(corners: &[DVec2], cut: &Cut, side: f64) -> Vec<DVec2> {
-    let inside = |p: DVec2| (cut.at - p[cut.axis]) * side;
-    let mut out = Vec::with_capacity(corners.len() + 1);
-    for (k, &p) in corners.iter().enumerate() {
-        let q = corners[(k + 1) % corners.len()];
-        let (a, b) = (inside(p), inside(q));
-        if a >= 0.0 {
-            out.push(p);
-        }
-        if (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0) {
-            let mut on = p + (q - p) * (a / (a - b));
-            on[cut.axis] = cut.at;
-            out.push(on);
-        }
+    let mut out = part_in_front(corners, |p| (cut.at - p[cut.axis]) * side);
+    for p in out.iter_mut().filter(|p| !corners.contains(p)) {
+        p[cut.axis] = cut.at;
     }
     out
 }

@@ -15,7 +15,8 @@ mod sky;
 mod sun;
 
 pub use environment::Environment;
-pub use sky::{LUMENS_PER_WATT, Sky};
+pub use perez::LUMENS_PER_WATT;
+pub use sky::Sky;
 pub use sun::{SUN_DIAMETER_DEG, Sun, SunPlace};
 
 use super::SceneError;

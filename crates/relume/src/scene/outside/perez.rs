@@ -8,8 +8,6 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::sky::{HORIZON, LUMENS_PER_WATT};
-
 /// Relative radiance (1 + a e^(b / cos zenith)) (1 + c e^(d gamma) + e cos^2 gamma), gamma being the angle from the sun.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Distribution {
@@ -28,6 +26,13 @@ impl Distribution {
         gradation * (1.0 + c * libm::exp(d * libm::acos(to_sun)) + e * to_sun * to_sun)
     }
 }
+
+/// Luminous efficacy of the light of clear skies, lm/W (Perez et al. 1990 find 110 to 140): what turns the
+/// luminance of Preetham's model into radiance.
+pub const LUMENS_PER_WATT: f64 = 125.0;
+
+/// The smallest cosine of the angle from the zenith at which gradations are evaluated.
+pub(super) const HORIZON: f64 = 0.01;
 
 /// A sky with colours at one instant.
 #[derive(Clone, Debug)]

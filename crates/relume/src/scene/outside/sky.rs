@@ -8,7 +8,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::environment::Environment;
-use super::perez::{self, Distribution};
+use super::perez::{self, Distribution, HORIZON};
 
 /// What the sky looks like, without the sun's disc.
 #[derive(Clone, Debug)]
@@ -26,7 +26,7 @@ pub enum Sky {
         irradiance: f64,
     },
     /// Clear to hazy skies by turbidity, with their colours (Preetham, Shirley and Smits 1999); it needs the sun's
-    /// direction. Luminance becomes radiance by [`LUMENS_PER_WATT`].
+    /// direction. Luminance becomes radiance by [`LUMENS_PER_WATT`](super::LUMENS_PER_WATT).
     Turbid {
         /// 2 (very clear) to 10 (hazy).
         turbidity: f64,
@@ -41,10 +41,6 @@ pub enum Sky {
     /// A picture of all directions, from below too.
     Environment(Arc<Environment>),
 }
-
-/// Luminous efficacy of the light of clear skies, lm/W (Perez et al. 1990 find 110 to 140): what turns the
-/// luminance of Preetham's model into radiance.
-pub const LUMENS_PER_WATT: f64 = 125.0;
 
 impl Sky {
     /// Whether it changes with the sun's place.
@@ -153,9 +149,6 @@ impl Shape {
         }
     }
 }
-
-/// The smallest cosine of the angle from the zenith at which gradations are evaluated.
-pub(super) const HORIZON: f64 = 0.01;
 
 /// Steps in height and around in which skies are integrated.
 const STEPS: (u32, u32) = (128, 128);

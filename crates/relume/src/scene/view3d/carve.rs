@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::super::flatten::area_vector;
 use super::read::{RawSurface, Wrong};
+use crate::geometry::part_in_front;
 
 /// How far a part may be off the plane of its base, or beside it, relative to the base's size: as
 /// much as View3D allows.
@@ -62,30 +63,14 @@ fn outside(polygon: &[DVec3], hole: &[DVec3], normal: DVec3) -> Vec<Vec<DVec3>> 
         let (from, to) = (hole[k], hole[(k + 1) % hole.len()]);
         let inward = normal.cross(to - from) * sign;
         let side = |c: DVec3| (c - from).dot(inward);
-        let beyond = part(&rest, |c| -side(c));
+        let beyond = part_in_front(&rest, |c| -side(c));
         if beyond.len() >= 3 && area_vector(&beyond).length() > least {
             out.push(beyond);
         }
-        rest = part(&rest, side);
+        rest = part_in_front(&rest, side);
         if rest.len() < 3 || area_vector(&rest).length() <= least {
             // The hole is beside the polygon.
             return vec![polygon.to_vec()];
-        }
-    }
-    out
-}
-
-/// The part of a convex polygon where `side` is not negative.
-fn part(polygon: &[DVec3], side: impl Fn(DVec3) -> f64) -> Vec<DVec3> {
-    let mut out = Vec::new();
-    for (k, &p) in polygon.iter().enumerate() {
-        let q = polygon[(k + 1) % polygon.len()];
-        let (dp, dq) = (side(p), side(q));
-        if dp >= 0.0 {
-            out.push(p);
-        }
-        if (dp > 0.0 && dq < 0.0) || (dp < 0.0 && dq > 0.0) {
-            out.push(p + (q - p) * (dp / (dp - dq)));
         }
     }
     out

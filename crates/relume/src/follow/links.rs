@@ -1,0 +1,118 @@
+//! Links by receiver, from the pairs of a tree: all at once, or by its edits.
+
+use crate::element::ElementId;
+use crate::pair::{self, Edit, PairTree};
+use crate::solver::{Link, Links, LinksBuilder};
+
+/// Who receives over links: all that turning pairs into links asks of a hierarchy.
+pub(crate) trait Receivers {
+    /// Room for elements: ids are below this.
+    fn room(&self) -> usize;
+    /// Whether light is gathered there: an element, neither a light nor distant.
+    fn receives(&self, id: ElementId) -> bool;
+    /// Area that what arrives is spread over, m2.
+    fn receiving_area_m2(&self, id: ElementId) -> f64;
+    /// Whether two elements rest against each other, so that what they exchange counts for nothing.
+    fn rest_in_contact(&self, _a: ElementId, _b: ElementId) -> bool {
+        false
+    }
+    /// Whether a link that ends there is gathered in another way.
+    fn is_apart(&self, _id: ElementId) -> bool {
+        false
+    }
+}
+
+/// Both directions of a link: (receiver, link), for the ends that receive. Links of visibility 0
+/// carry nothing.
+pub(crate) fn directions(
+    forest: &impl Receivers,
+    link: &pair::Link,
+) -> impl Iterator<Item = (u32, Link)> {
+    let carried = link.carried;
+    let exchange = carried.exchange_area_past_occluders_m2();
+    let g = carried.gradients;
+    let exchange = if forest.rest_in_contact(link.a, link.b) { 0.0 } else { exchange };
+    let one = |receiver: ElementId, source: ElementId, over_receiver, over_source| {
+        let apart = forest.is_apart(link.a) || forest.is_apart(link.b);
+        let receives = forest.receives(receiver) && exchange > 0.0 && !apart;
+        receives.then(|| {
+            let coupling = exchange / forest.receiving_area_m2(receiver) as f32;
+            // Nothing at all would take the link out.
+            let coupling = coupling.max(f32::MIN_POSITIVE);
+            (receiver.0, Link { source: source.0, coupling, over_receiver, over_source })
+        })
+    };
+    let forth = one(link.a, link.b, g.over_a, g.over_b);
+    let back = one(link.b, link.a, g.over_b, g.over_a);
+    forth.into_iter().chain(back)
+}
+
+/// All links of a tree, by receiver.
+pub(super) fn links_of(forest: &impl Receivers, tree: &PairTree) -> Links {
+    let mut builder = LinksBuilder::new(forest.room());
+    for link in tree.links() {
+        directions(forest, &link).for_each(|(receiver, _)| builder.count(receiver));
+    }
+    builder.fill(|add| {
+        for link in tree.links() {
+            directions(forest, &link).for_each(|(receiver, link)| add(receiver, link));
+        }
+    })
+}
+
+/// Removes both directions of some pairs and sets those of others to what they carry now; what is in both, is set.
+pub(crate) fn set_pairs(
+    links: &mut Links,
+    forest: &impl Receivers,
+    removed: impl Iterator<Item = (ElementId, ElementId)>,
+    set: impl Iterator<Item = pair::Link>,
+) {
+    links.extend(forest.room());
+    let without = |source: ElementId| Link { source: source.0, ..Link::default() };
+    let both = |(a, b): (ElementId, ElementId)| [(a.0, without(b)), (b.0, without(a))];
+    let mut wanted: Vec<(u32, Link)> = Vec::new();
+    for pair in set {
+        if pair.carried.exchange_area_past_occluders_m2() > 0.0
+            && !forest.rest_in_contact(pair.a, pair.b)
+        {
+            wanted.extend(directions(forest, &pair));
+        } else {
+            wanted.extend(both((pair.a, pair.b)));
+        }
+    }
+    wanted.extend(removed.flat_map(both));
+    // In stable order: of equals, what is set comes first.
+    let ends = |(receiver, link): &(u32, Link)| u64::from(*receiver) << 32 | u64::from(link.source);
+    wanted.sort_by_key(ends);
+    wanted.dedup_by_key(|one| ends(one));
+    for of_one in wanted.chunk_by(|one, two| one.0 == two.0) {
+        links.set(of_one[0].0, of_one.iter().map(|(_, link)| *link));
+    }
+}
+
+/// Carries edits of a tree over to its links; returns the receivers concerned, ascending.
+pub(super) fn apply_edits(
+    links: &mut Links,
+    forest: &impl Receivers,
+    tree: &PairTree,
+    edits: &[Edit],
+) -> Vec<u32> {
+    let removed = edits.iter().filter_map(|edit| match *edit {
+        Edit::Removed(a, b) => Some((a, b)),
+        Edit::Set(_) => None,
+    });
+    let set = edits.iter().filter_map(|edit| match *edit {
+        // What was removed again, after it was set, is no link by now.
+        Edit::Set(id) => tree.link(id),
+        Edit::Removed(..) => None,
+    });
+    let ends = removed.clone().chain(set.clone().map(|link| (link.a, link.b)));
+    let receiving = |e: &ElementId| forest.receives(*e);
+    let mut receivers: Vec<u32> =
+        ends.flat_map(|(a, b)| [a, b]).filter(receiving).map(|e| e.0).collect();
+    set_pairs(links, forest, removed, set);
+    links.tidy();
+    receivers.sort_unstable();
+    receivers.dedup();
+    receivers
+}

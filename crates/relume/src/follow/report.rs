@@ -1,0 +1,226 @@
+//! What happened in a frame: exact counters, energies, seconds.
+
+use serde::Serialize;
+
+use crate::pair::Work;
+
+/// One entry of `frames` in a report of schema `relume-report/1`.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct FrameReport {
+    /// Frame number.
+    pub frame: u32,
+    /// Time in the animation, seconds.
+    pub time_s: f64,
+    /// Names of the bodies whose pose differs from the frame before.
+    pub moved: Vec<String>,
+    /// Elements alive: every node of the forest that can carry radiosity.
+    pub elements: u64,
+    /// Elements without children: what is drawn.
+    pub leaves: u64,
+    /// Active pairs: links, each used in both directions.
+    pub links: u64,
+    /// Links with an end that moved against the other.
+    pub dynamic_links: u64,
+    /// Nodes of the pair tree by state.
+    pub pairs: PairCounts,
+    /// Links by what they end on; absent where no group of patches is an end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub link_kinds: Option<LinkKinds>,
+    /// Pairs met on the walk through the pair tree: those examined, and those next to them that
+    /// turned out to be unaffected.
+    pub visited: u64,
+    /// Pairs judged, each counted once.
+    pub examined: u64,
+    /// Pairs with moved ends of which the exchange area alone was evaluated: by certificate nothing
+    /// stands between their ends.
+    pub followed: u64,
+    /// Links of which exchange area and visibility were extrapolated.
+    pub extrapolated: u64,
+    /// Pairs passed over, with all below them, because their certificate stands.
+    pub certified: u64,
+    /// Pairs judged for the coarse solution, beforehand: all of them are visited again.
+    pub coarse_examined: u64,
+    /// Of these, pairs judged because an end moved against the other, or for the first time.
+    pub reevaluated: u64,
+    /// Of these, pairs of which only the visibility may have changed.
+    pub visibility_only: u64,
+    /// Of these, pairs of which only the light on their ends may have changed.
+    pub brightness_only: u64,
+    /// Pairs of which the state, or what they carry as a link, differs from before.
+    pub changed: u64,
+    /// Refined pairs that became links.
+    pub promoted: u64,
+    /// Links that were refined.
+    pub demoted: u64,
+    /// Links whose visibility changed.
+    pub occlusion_changed: u64,
+    /// Visibility segments traced.
+    pub segments: u64,
+    /// Elements made.
+    pub elements_made: u64,
+    /// Elements reaped.
+    pub elements_reaped: u64,
+    /// Gather sweeps of the solver.
+    pub sweeps: u32,
+    /// Receivers gathered in all sweeps together.
+    pub gathers: u64,
+    /// Largest change of radiosity that the last sweep left undone, relative to the mean radiosity.
+    pub residual: f64,
+    /// How far the row sums of the form factors are from 1, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub row_sum_error: Option<RowSumError>,
+    /// Where the flux goes, summed over the three channels, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy: Option<Energy>,
+    /// Errors of the solution, where they were estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<Accuracy>,
+    /// Where the balance is off, the surfaces that receive most light over rows that sum to more than 1.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub suspects: Vec<String>,
+    /// Hash over the active pairs with their exchange areas and visibilities, in key order.
+    pub hash: String,
+    /// Wall-clock seconds by phase.
+    pub seconds: Seconds,
+}
+
+/// Nodes of the pair tree by state.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct PairCounts {
+    /// Links.
+    pub active: u64,
+    /// Pairs whose children carry the transport.
+    pub refined: u64,
+    /// Pairs that exchange nothing.
+    pub culled: u64,
+}
+
+/// Links by what they end on: groups of patches, or elements (and lights).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct LinkKinds {
+    /// Between two elements.
+    pub element_element: u64,
+    /// Between a group and an element.
+    pub group_element: u64,
+    /// Between two groups.
+    pub group_group: u64,
+}
+
+/// |1 - row sum| over the leaf elements of one frame.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct RowSumError {
+    /// Area-weighted root mean square.
+    pub rms: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+/// Flux balance of a frame, watts, summed over the channels.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Energy {
+    /// Emitted by surfaces and punctual lights.
+    pub emitted_w: f64,
+    /// Absorbed by surfaces.
+    pub absorbed_w: f64,
+    /// Left the scene.
+    pub escaped_w: f64,
+}
+
+impl Energy {
+    /// Share of what is emitted that is neither absorbed nor escaped, or that is so without having been emitted.
+    pub fn unbalanced(&self) -> f64 {
+        let off = (self.emitted_w - self.absorbed_w - self.escaped_w).abs();
+        if self.emitted_w > 0.0 { off / self.emitted_w } else { 0.0 }
+    }
+}
+
+/// Errors of a solution, relative to the irradiance (sum of the channels) at each of some points: 1. Estimated, not bounded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Accuracy {
+    /// Number of points.
+    pub points: u32,
+    /// Root mean square over the points of the error of what a sensor there reads
+    /// (`Frame::irradiance_at`).
+    pub rms: f64,
+    /// Root mean square error that these points and walks can tell from none: of what is below, `rms` says nothing.
+    pub resolved: f64,
+    /// Mean of these errors, with its sign: positive where the solution is too bright.
+    pub mean: f64,
+    /// Largest of these errors, with its sign: positive where the solution is too bright.
+    pub largest: f64,
+    /// Where that is, metres.
+    pub largest_at: [f64; 3],
+    /// Root mean square of the error of what the mesh says there (`Snapshot::irradiance_at`): of pictures and lit
+    /// meshes. `None` at sensors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh_rms: Option<f64>,
+}
+
+/// Bytes that the engine's structures hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Memory {
+    /// Pair tree and links by receiver.
+    pub pairs: u64,
+    /// Element forest, radiosities, and where each element's links are.
+    pub elements: u64,
+    /// What is as large at every tolerance: the forest that builds start from, what is known of
+    /// facets and clusters alone (one copy for all), the coarse solution.
+    pub fixed: u64,
+}
+
+/// Wall-clock seconds by phase.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Seconds {
+    /// Poses and bounds.
+    #[serde(rename = "move")]
+    pub moving: f64,
+    /// Which pairs are affected.
+    pub predict: f64,
+    /// Exchange areas and visibilities.
+    pub evaluate: f64,
+    /// Verdicts and edits.
+    pub judge: f64,
+    /// Gather, push, pull.
+    pub solve: f64,
+    /// The whole step.
+    pub total: f64,
+}
+
+impl FrameReport {
+    /// Takes over the counts of an update.
+    pub(super) fn count(&mut self, work: &Work) {
+        self.visited = work.visited;
+        self.examined = work.examined;
+        self.followed = work.followed;
+        self.certified = work.certified;
+        self.extrapolated = work.extrapolated;
+        self.coarse_examined = work.coarse_examined;
+        self.reevaluated = work.reevaluated;
+        self.visibility_only = work.visibility_only;
+        self.brightness_only = work.brightness_only;
+        self.changed = work.changed;
+        self.promoted = work.promoted;
+        self.demoted = work.demoted;
+        self.occlusion_changed = work.occlusion_changed;
+        self.dynamic_links = work.dynamic_links;
+        self.segments = work.segments;
+        self.elements_made = work.elements_made;
+    }
+
+    /// The report of a frame in which nothing changed: the state as it was, and no work.
+    pub(super) fn of_a_still_frame(&self, label: FrameReport) -> FrameReport {
+        FrameReport {
+            elements: self.elements,
+            leaves: self.leaves,
+            links: self.links,
+            pairs: self.pairs,
+            link_kinds: self.link_kinds,
+            residual: self.residual,
+            row_sum_error: self.row_sum_error,
+            energy: self.energy,
+            suspects: self.suspects.clone(),
+            hash: self.hash.clone(),
+            ..label
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! Row sums and the balance of a solution.
+
+use crate::element::ElementId;
+use crate::solver::{Links, Radiosity, Surfaces, row_sums};
+
+use super::report::{Energy, RowSumError};
+
+/// Row sums and energies of some facets.
+pub(crate) fn balance_of(
+    surfaces: &impl Surfaces,
+    (links, radiosity): (&Links, &Radiosity),
+    facets: impl Iterator<Item = ElementId>,
+    is_surface: &dyn Fn(u32) -> bool,
+) -> (RowSumError, Energy) {
+    let mut rows = RowSumError::default();
+    let mut energy = Energy::default();
+    let mut area = 0.0;
+    let mut sums = Vec::new();
+    let linear = !radiosity.is_bounded();
+    for facet in facets {
+        let lit = surfaces.lit(facet.0);
+        sums.clear();
+        row_sums(surfaces, (links, linear), is_surface, facet.0, &mut |_, sum| sums.push(sum));
+        let mut next = sums.iter();
+        radiosity.irradiances(surfaces, facet.0, &mut |id, h| {
+            let a = surfaces.area_m2(id);
+            let off = f64::from(*next.next().expect("the same leaves")) - 1.0;
+            rows.rms += a * off * off;
+            if !surfaces.is_covered(id) {
+                rows.max = rows.max.max(off.abs());
+            }
+            area += a;
+            let b = radiosity.radiosity(id);
+            for c in 0..3 {
+                energy.emitted_w += a * f64::from(lit.exitance[c]);
+                energy.absorbed_w += a * f64::from((1.0 - lit.reflectance[c]) * h.mean[c].max(0.0));
+                energy.escaped_w -= off * a * f64::from(b[c]);
+            }
+        });
+    }
+    rows.rms = if area > 0.0 { (rows.rms / area).sqrt() } else { 0.0 };
+    (rows, energy)
+}

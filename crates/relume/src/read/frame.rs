@@ -1,0 +1,160 @@
+//! A solved state as its readers see it.
+
+use glam::DVec3;
+
+use crate::element::{ElementId, Forest};
+use crate::follow::{Accuracy, FrameReport};
+use crate::geometry::Pose;
+use crate::pair::PairTree;
+use crate::space::{Solved, row_sums_of};
+
+use super::events::{self, Event};
+use super::factors::{Factors, Grouping};
+use super::gather::{self, Sensor};
+use super::snapshot::{self, Snapshot};
+use super::{accuracy, reconstruct};
+
+/// The solution of a world, until the session goes on.
+#[derive(Clone, Copy)]
+pub struct Frame<'a> {
+    solved: &'a Solved,
+    revision: u32,
+}
+
+/// A 128-bit hash of all links with their exchange areas and visibilities: equal for equal states, whatever led to
+/// them, on any number of threads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Hash(u128);
+
+impl std::fmt::Display for Hash {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:032x}", self.0)
+    }
+}
+
+/// The leaves of a solution as flat arrays, in the world: one entry for each leaf.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Corners, metres, counter-clockwise seen from the front; a triangle repeats its last.
+    pub corners: Vec<[[f32; 3]; 4]>,
+    /// Radiosity, W/m2, linear RGB.
+    pub radiosity: Vec<[f32; 3]>,
+    /// Index of the patch that it is a part of.
+    pub patch: Vec<u32>,
+    /// Number of the solve that it is of: meshes of one session with the same number are equal.
+    pub revision: u64,
+}
+
+impl<'a> Frame<'a> {
+    /// A solution, with the number of the solve that it is of.
+    pub(crate) fn new(solved: &'a Solved, revision: u32) -> Frame<'a> {
+        Frame { solved, revision }
+    }
+
+    /// Counters, energies and seconds.
+    pub fn report(&self) -> &'a FrameReport {
+        &self.solved.report
+    }
+
+    /// The hash of the links.
+    pub fn hash(&self) -> Hash {
+        Hash(self.solved.hash.bits())
+    }
+
+    /// Irradiance at a point with a unit normal, W/m2, linear RGB: gathered from all elements and punctual lights, each
+    /// with visibility of its own from this point. What an emitter emits is exact; what an element sends errs by its
+    /// radiosity's variation within it.
+    pub fn irradiance_at(&self, point: impl Into<DVec3>, normal: impl Into<DVec3>) -> [f64; 3] {
+        self.irradiances_at(&[Sensor { at: point.into(), normal: normal.into() }])[0]
+    }
+
+    /// Irradiances at many sensors in parallel, W/m2, linear RGB, in their order. Cost: some 0.1 us for each element
+    /// that is neither far from a sensor nor hidden, more where something is partly in the way.
+    pub fn irradiances_at(&self, sensors: &[Sensor]) -> Vec<[f64; 3]> {
+        gather::irradiances_at(self.solved, sensors)
+    }
+
+    /// Errors of the solution, estimated at so many points with exact visibility; each costs some fifty sensors.
+    pub fn accuracy(&self, points: usize) -> Accuracy {
+        accuracy::accuracy(self.solved, points)
+    }
+
+    /// Errors of what sensors read, estimated at each of them as by [`Frame::accuracy`]; where no light arrives, there is none.
+    pub fn accuracy_at(&self, sensors: &[Sensor]) -> Accuracy {
+        accuracy::accuracy_at(self.solved, sensors)
+    }
+
+    /// The link events of this frame, if [`Options::events`](crate::Options::events) asks for them: none after a cold build.
+    /// In the order in which they were found, which is the same for any number of threads.
+    pub fn events(&self) -> Vec<Event> {
+        events::named(self.solved)
+    }
+
+    /// Form factors between groups of patches.
+    ///
+    /// Error of an entry: that of its links, which the tolerance bounds relative to the row where
+    /// nothing emits (see [`Scene::without_light`](crate::Scene::without_light)). Cost: one pass over all links.
+    ///
+    /// # Panics
+    /// If the grouping is of another scene.
+    pub fn factors(&self, grouping: &Grouping) -> Factors {
+        Factors::of(self.solved, grouping)
+    }
+
+    /// Sums of the form factors from every leaf element, in no order of meaning: 1 in a closed scene, up to the links'
+    /// errors. Elements of absent bodies are among them.
+    pub fn row_sums(&self) -> Vec<f64> {
+        row_sums_of(self.solved).into_iter().map(|(_, sum)| sum).collect()
+    }
+
+    /// The same with the elements.
+    #[doc(hidden)]
+    pub fn rows(&self) -> Vec<(ElementId, f64)> {
+        row_sums_of(self.solved)
+    }
+
+    /// The solution as pictures and exports read it, with the bends that links leave out. Cost: a pass over all links, some
+    /// 90 ns each.
+    pub fn solution(&self) -> Snapshot {
+        snapshot::take(self.solved, &self.solved.links, &self.solved.radiosity)
+    }
+
+    /// The same with the light of every element found anew from links of every leaf's own in place of those above it: along
+    /// edges between surfaces, where leaves of [`Frame::solution`] inherit lines and parabolas through steep curves, some
+    /// thirty times as accurate. The solution itself stays as it is.
+    ///
+    /// Error: at the default tolerance leaves of a uniform closed scene are within 1e-3, relative
+    /// (docs/tolerance.md). Cost: some ten times that of a frame with a moving light.
+    pub fn reconstruction(&self) -> Snapshot {
+        let (links, radiosity) = reconstruct::solve(self.solved);
+        snapshot::take(self.solved, &links, &radiosity)
+    }
+
+    /// The radiosity of all surfaces, as flat arrays.
+    pub fn snapshot(&self) -> Mesh {
+        let Snapshot { scene, world, leaves, leaf_offsets, .. } = self.solution();
+        let mut mesh = Mesh { revision: u64::from(self.revision), ..Mesh::default() };
+        for (k, patch) in scene.patches.iter().enumerate() {
+            let pose = world.pose(patch.body).unwrap_or(Pose::IDENTITY);
+            for leaf in &leaves[leaf_offsets[k] as usize..leaf_offsets[k + 1] as usize] {
+                let place = |c| pose.point(patch.frame.point(c)).as_vec3().to_array();
+                mesh.corners.push(leaf.corners.map(place));
+                mesh.radiosity.push(leaf.radiosity);
+                mesh.patch.push(k as u32);
+            }
+        }
+        mesh
+    }
+
+    /// The pair tree, with the forest its elements are in.
+    #[doc(hidden)]
+    pub fn pairs(&self) -> (&'a PairTree, &'a Forest) {
+        (&self.solved.tree, &self.solved.space.forest)
+    }
+
+    /// The state itself.
+    #[doc(hidden)]
+    pub fn solved(&self) -> &'a Solved {
+        self.solved
+    }
+}

@@ -1,0 +1,549 @@
+//! Irradiance at points, gathered from the elements with visibility of their own.
+//!
+//! From patches down: what stands between the point and a whole patch is found once, and handed
+//! down to the elements below it, most of which find nothing in the way.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::element::{ElementId, Forest, Kind, WorldElement};
+use crate::geometry::{Aabb, Plane, shaft_meets_box};
+use crate::scene::{InPlane, LightId, LightKind, PatchId};
+use crate::solver::SQUARE_MOMENT;
+use crate::transport::{
+    form_factor_from_point, form_factor_past, in_plane, keep_in_front, lies_in, light_at,
+    segment_is_clear,
+};
+
+use crate::space::{Solved, place_of};
+
+/// A place and a direction at which irradiance is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensor {
+    /// Where it is, metres.
+    pub at: DVec3,
+    /// Unit vector that it faces along.
+    pub normal: DVec3,
+}
+
+/// Sensors that one task handles.
+const SENSORS_AT_ONCE: usize = 8;
+
+/// Irradiances at sensors in parallel, W/m2, linear RGB, in their order: gathered from all elements and punctual lights,
+/// each with visibility of its own from the sensor; the same bits for any number of threads.
+///
+/// Visibility is exact up to rounding, except where an element falls into more than some hundred visible pieces; what an
+/// element sends errs by its radiosity's variation within it. What an emitter emits is exact. Cost: proportional to sensors
+/// times the elements that are neither far away nor hidden, some 0.1 us each, more where something is partly in the way.
+pub(super) fn irradiances_at(solved: &Solved, sensors: &[Sensor]) -> Vec<[f64; 3]> {
+    let one = |sensor: &Sensor| Look::new(solved, sensor, Purpose::Sensor).irradiance();
+    sensors.par_chunks(SENSORS_AT_ONCE).flat_map_iter(|some| some.iter().map(one)).collect()
+}
+
+/// How far a sensor may be off the surface it lies on, relative to the scene's diagonal: what files
+/// with six digits hold. What is no further above its tangent plane hides nothing.
+const SENSOR_ROUNDING: f64 = 1.0 / (1 << 20) as f64;
+
+/// How far what lies on a patch is lifted off it, in roundings of its corners.
+const LIFT: f64 = 8.0;
+
+/// Elements in plain view that are no larger than this share of their distance send their mean
+/// radiosity: what is brighter in them than the rest then weighs at most this much too much.
+const FAR: f64 = 1.0 / 32.0;
+
+/// Form factor to a part of a leaf below which it is taken to send what the leaf's line says.
+const LITTLE: f64 = 0.01;
+
+/// Share of what a point sees above which leaves that are large against their distance are not taken at their word: it
+/// is in a gap, and what leaves them is followed on.
+const IN_A_GAP: f64 = 0.5;
+
+/// Share of the light below which nobody follows on what leaves a leaf, and how often at most.
+const FOLLOWED: (f64, usize) = (1e-3, 24);
+
+/// Share of what arrives in a gap that may come from parts that are taken at their leaf's word.
+const BY_LINES: f64 = 0.02;
+
+/// Halvings of a leaf that falls into too many pieces; then its middle decides.
+const SPLITS: u32 = 6;
+
+/// What a look is for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Purpose {
+    /// A sensor itself: all that leaves surfaces close by is gathered anew where they are looked at.
+    Sensor,
+    /// A point that a sensor sees: leaves are taken at their word.
+    Beyond,
+    /// A point of which each source is listed: leaves are taken at their word.
+    Listing,
+}
+
+/// A sensor looking at a solved scene.
+pub(super) struct Look<'a> {
+    solved: &'a Solved,
+    forest: &'a Forest,
+    point: DVec3,
+    normal: DVec3,
+    /// Where the sensor's front begins.
+    tangent: Plane,
+    slack_m: f64,
+    purpose: Purpose,
+}
+
+/// What a point gathers.
+#[derive(Default)]
+struct Gathered {
+    /// From what is far enough for its size, W/m2.
+    sum: [f64; 3],
+    /// Parts of leaves that are large against their distance; of the sensor itself.
+    parts: Vec<Part>,
+    /// Such leaves as wholes; of other points.
+    near: Vec<Near>,
+    /// What is far enough, where sources are listed.
+    far: Vec<Source>,
+}
+
+/// An element that light comes from.
+#[derive(Clone, Copy)]
+pub(super) struct Source {
+    pub(super) element: ElementId,
+    /// Form factor from the point to what is seen of it.
+    pub(super) factor: f64,
+    /// The middle of what is seen, where that is not all of it.
+    pub(super) at: Option<DVec3>,
+}
+
+/// A part of a leaf, as large as it is far.
+#[derive(Clone, Copy)]
+struct Part {
+    leaf: ElementId,
+    /// The middle of what is seen of it.
+    at: DVec3,
+    factor: f64,
+}
+
+/// A leaf that is large against its distance.
+struct Near {
+    leaf: ElementId,
+    factor: f64,
+    /// The middle of what is seen of it.
+    at: DVec3,
+    /// What its line says that it sends, W/m2.
+    sent: [f64; 3],
+}
+
+impl<'a> Look<'a> {
+    pub(super) fn new(solved: &'a Solved, sensor: &Sensor, purpose: Purpose) -> Look<'a> {
+        let slack_m = SENSOR_ROUNDING * solved.space.view.fixed_box(Forest::ROOT).diagonal();
+        Look {
+            solved,
+            forest: &solved.space.forest,
+            point: sensor.at,
+            normal: sensor.normal,
+            tangent: Plane::through(sensor.at, sensor.normal),
+            slack_m,
+            purpose,
+        }
+    }
+
+    /// What arrives at the point if leaves are taken at their word, W/m2, and from where: a look for [`Purpose::Listing`].
+    pub(super) fn by_source(&self) -> ([f64; 3], Vec<Source>) {
+        let Gathered { mut sum, near, mut far, .. } = self.gather();
+        for n in &near {
+            (0..3).for_each(|c| sum[c] += n.sent[c]);
+            far.push(Source { element: n.leaf, factor: n.factor, at: Some(n.at) });
+        }
+        (sum, far)
+    }
+
+    /// What arrives at the sensor, W/m2.
+    pub(super) fn irradiance(&self) -> [f64; 3] {
+        let Gathered { mut sum, parts, .. } = self.gather();
+        let add = |sum: &mut [f64; 3], part: &Part, b: [f64; 3]| {
+            (0..3).for_each(|c| sum[c] += part.factor * b[c]);
+        };
+        let is_in_a_gap = parts.iter().map(|p| p.factor).sum::<f64>() > IN_A_GAP;
+        let (large, little): (Vec<_>, Vec<_>) =
+            parts.iter().enumerate().partition(|(_, part)| part.factor > LITTLE);
+        for (k, part) in large {
+            add(&mut sum, part, self.sent_by(part, k));
+        }
+        let all = |e: [f64; 3]| e.iter().sum::<f64>();
+        let mut little: Vec<(f64, [f64; 3], (usize, &Part))> = little
+            .into_iter()
+            .map(|(k, part)| {
+                let e = WorldElement::new(&self.solved.space.view, self.forest, part.leaf, false);
+                let line = self.radiosity_at(&e, part.leaf, part.at).map(f64::from);
+                (part.factor * all(line), line, (k, part))
+            })
+            .collect();
+        // In the dark of a gap what lines say of little parts is more than all that arrives.
+        little.sort_by(|one, other| other.0.total_cmp(&one.0));
+        let mut left: f64 = little.iter().map(|part| part.0).sum();
+        for (brings, line, (k, part)) in little {
+            let is_much = is_in_a_gap && left > BY_LINES * (all(sum) + left);
+            add(&mut sum, part, if is_much { self.sent_by(part, k) } else { line });
+            left -= brings;
+        }
+        sum
+    }
+
+    fn gather(&self) -> Gathered {
+        let mut out = Gathered::default();
+        for patch in 0..self.solved.space.scene.patches.len() as u32 {
+            self.add_patch(PatchId(patch), &mut out);
+        }
+        for id in self.forest.children(Forest::ROOT).map(ElementId) {
+            if self.forest.kind(id) == Kind::Light {
+                let e = self.light_arriving(id);
+                (0..3).for_each(|c| out.sum[c] += e[c]);
+            }
+        }
+        out
+    }
+
+    fn light_arriving(&self, id: ElementId) -> [f64; 3] {
+        let view = &self.solved.space.view;
+        let index = self.forest.light(id).expect("a light has an index");
+        let Some(light) = view.light(index) else { return [0.0; 3] };
+        let e = light_at(light, self.point, self.normal);
+        let away = view.far_m();
+        let end = match light.kind {
+            LightKind::Directional => self.point - light.direction * away,
+            _ => light.position,
+        };
+        let clear = e > 0.0 && segment_is_clear(view, self.forest, self.point, end, 1e-9 * away);
+        let intensity = self.solved.space.world.intensity(LightId(index as u32));
+        intensity.map(|i| if clear { i * e } else { 0.0 })
+    }
+
+    fn add_patch(&self, patch: PatchId, out: &mut Gathered) {
+        let (view, root) = (&self.solved.space.view, self.forest.patch_root(patch));
+        if !view.is_present(view.patch(patch).body) {
+            return;
+        }
+        let polygon = view.occluder(patch);
+        let rounding_m = view.patch(patch).rounding_m;
+        let before = polygon.plane.distance(self.point) > rounding_m;
+        if !before || polygon.corners.iter().all(|&c| self.tangent.distance(c) <= 0.0) {
+            return;
+        }
+        let occluders = self.between(patch, rounding_m);
+        let all: Vec<&Occluder> = occluders.iter().collect();
+        let mut stack = vec![root];
+        while let Some(id) = stack.pop() {
+            match self.forest.kind(id) {
+                Kind::Element => self.add_element(id, &all, out),
+                _ => stack.extend(self.forest.children(id).rev().map(ElementId)),
+            }
+        }
+    }
+
+    /// What stands between the point and a patch, in the order of the forest.
+    fn between(&self, target: PatchId, rounding_m: f64) -> Vec<Occluder> {
+        let view = &self.solved.space.view;
+        let root = self.forest.patch_root(target);
+        let (from, to) = (Aabb::of([self.point]), *view.end_box(root));
+        let plane = view.occluder(target).plane;
+        let raised = |p: &Plane, by: f64| Plane { normal: p.normal, offset: p.offset + by };
+        let front = [raised(&self.tangent, self.slack_m), raised(&plane, rounding_m)];
+        let mut out = Vec::new();
+        let mut stack = vec![Forest::ROOT];
+        while let Some(id) = stack.pop() {
+            let bounds = view.fixed_box(id);
+            // What lies in the target's plane may be a little behind it.
+            if bounds.is_empty() || !shaft_meets_box(&from, &to, &bounds.grown(rounding_m)) {
+                continue;
+            }
+            let Some(patch) = self.forest.patch(id) else {
+                stack.extend(self.forest.children(id).map(ElementId));
+                continue;
+            };
+            if patch == target || view.is_hidden_twin(patch) {
+                continue;
+            }
+            let polygon = view.occluder(patch);
+            let on_target = lies_in(&polygon, &plane, rounding_m).is_some_and(|opposed| {
+                in_plane(self.forest, view, patch, target, opposed) != InPlane::Apart
+            });
+            let lift = if on_target { plane.normal * (LIFT * rounding_m) } else { DVec3::ZERO };
+            let mut corners: Vec<DVec3> = polygon.corners.iter().map(|&c| c + lift).collect();
+            front.iter().for_each(|p| keep_in_front(&mut corners, p));
+            if corners.len() >= 3
+                && let Some(occluder) = Occluder::new(self.point, corners)
+            {
+                out.push(occluder);
+            }
+        }
+        out
+    }
+
+    /// Adds what an element sends past the occluders that may be in its way.
+    fn add_element(&self, id: ElementId, occluders: &[&Occluder], out: &mut Gathered) {
+        let e = WorldElement::new(&self.solved.space.view, self.forest, id, false);
+        let seen = self.in_front(&e);
+        if seen.len() < 3 {
+            return;
+        }
+        let Some(in_the_way) = self.in_the_way(&seen, occluders) else { return };
+        let children = self.forest.children(id);
+        let distance = (e.centre - self.point).length();
+        let as_one = in_the_way.is_empty() && e.radius < FAR * distance;
+        if !children.is_empty() && !as_one {
+            children.for_each(|child| self.add_element(ElementId(child), &in_the_way, out));
+            return;
+        }
+        let is_near = e.radius > e.bounds.distance(&Aabb::of([self.point]));
+        if self.purpose == Purpose::Sensor && is_near {
+            return self.add_parts(id, &seen, (&in_the_way, SPLITS), &mut out.parts);
+        }
+        let (factor, b, at) = if in_the_way.is_empty() && !is_near {
+            let factor = form_factor_from_point(self.point, self.normal, &seen);
+            (factor, self.solved.radiosity.radiosity(id.0), None)
+        } else {
+            // The part in view may be much brighter or darker than the rest.
+            let (factor, moment) = self.factor_past(&seen, &in_the_way, SPLITS);
+            let at = moment / factor.max(f64::MIN_POSITIVE);
+            (factor, self.radiosity_at(&e, id, at), Some(at))
+        };
+        if factor <= 0.0 {
+            return;
+        }
+        let sent = b.map(|b| factor * f64::from(b));
+        if let (true, Some(at)) = (is_near, at) {
+            out.near.push(Near { leaf: id, factor, at, sent });
+            return;
+        }
+        (0..3).for_each(|c| out.sum[c] += sent[c]);
+        if self.purpose == Purpose::Listing {
+            out.far.push(Source { element: id, factor, at });
+        }
+    }
+
+    /// The part of an element before the point.
+    fn in_front(&self, e: &WorldElement) -> Vec<DVec3> {
+        let mut seen = e.corners[..e.len].to_vec();
+        if !seen.iter().all(|&c| self.tangent.distance(c) >= 0.0) {
+            keep_in_front(&mut seen, &self.tangent);
+        }
+        seen
+    }
+
+    /// Which occluders hide some of a polygon; `None` if one hides all of it.
+    fn in_the_way<'o>(
+        &self,
+        seen: &[DVec3],
+        occluders: &[&'o Occluder],
+    ) -> Option<Vec<&'o Occluder>> {
+        let mut out = Vec::new();
+        if !occluders.is_empty() {
+            let pyramid = pyramid(self.point, seen);
+            for &occluder in occluders {
+                match occluder.hides(seen, &pyramid) {
+                    Hides::Nothing => {}
+                    Hides::Some => out.push(occluder),
+                    Hides::All => return None,
+                }
+            }
+        }
+        Some(out)
+    }
+
+    /// Radiosity of an element at a point of it, from its line, never negative.
+    pub(super) fn radiosity_at(&self, e: &WorldElement, id: ElementId, at: DVec3) -> [f32; 3] {
+        let place = place_of(self.forest, id);
+        let b = self.solved.radiosity.linear(id.0, &place, SQUARE_MOMENT);
+        // Its mean is that of what is exposed of it.
+        let [x, y] = place.centroid.map(f64::from);
+        let middle = glam::DVec2::new(x, y) - self.forest.extent(id).centroid;
+        let at = (e.offset(at) - middle) / e.radius;
+        b.at(at.x as f32, at.y as f32).map(|b| b.max(0.0))
+    }
+
+    /// Adds the parts, as large as they are far, of a part of a leaf that is seen.
+    fn add_parts(
+        &self,
+        leaf: ElementId,
+        part: &[DVec3],
+        (occluders, splits): (&[&Occluder], u32),
+        out: &mut Vec<Part>,
+    ) {
+        let middle = part.iter().sum::<DVec3>() / part.len() as f64;
+        let radius = part.iter().map(|c| c.distance(middle)).fold(0.0, f64::max);
+        if splits > 0 && radius > (middle - self.point).length() {
+            for k in 0..part.len() {
+                let part = towards(part, k, middle);
+                let pyramid = pyramid(self.point, &part);
+                let hides = |o: &&&Occluder| o.hides(&part, &pyramid) != Hides::Nothing;
+                let rest: Vec<&Occluder> = occluders.iter().filter(hides).copied().collect();
+                self.add_parts(leaf, &part, (&rest, splits - 1), out);
+            }
+            return;
+        }
+        let (factor, moment) = self.factor_past(part, occluders, SPLITS);
+        if factor > 0.0 {
+            out.push(Part { leaf, at: moment / factor, factor });
+        }
+    }
+
+    /// What leaves a part of a leaf that is large against its distance, W/m2: the leaf knows its radiosity as a line only, and
+    /// beside it may be the shadow of what the sensor is close to. What arrives there is gathered there.
+    ///
+    /// In a gap most of what is seen there is as close again, and so on: one part of it is followed, chosen by its form
+    /// factor and the number `k` of the first part, so that many of them together show all ways that light takes.
+    fn sent_by(&self, part: &Part, k: usize) -> [f64; 3] {
+        let scene = &self.solved.space.scene;
+        let (mut b, mut share, mut part) = ([0.0; 3], [1.0; 3], *part);
+        for step in 0.. {
+            let patch = self.forest.patch(part.leaf).expect("an element has a patch");
+            let sensor =
+                Sensor { at: part.at, normal: self.solved.space.view.occluder(patch).plane.normal };
+            let patch = &scene.patches[patch.0 as usize];
+            let now = &self.solved.space.world;
+            let (m, rho) = (now.exitance(scene, patch), now.reflectance(scene, patch));
+            let look = Look::new(self.solved, &sensor, Purpose::Beyond);
+            let Gathered { sum, near, .. } = look.gather();
+            for c in 0..3 {
+                b[c] += share[c] * m[c];
+                share[c] *= rho[c];
+                b[c] += share[c] * sum[c];
+            }
+            let seen: f64 = near.iter().map(|n| n.factor).sum();
+            let left = seen * share.iter().fold(0.0, |most: f64, s| most.max(*s));
+            if seen > IN_A_GAP && left <= FOLLOWED.0 {
+                return b;
+            }
+            let next = (seen > IN_A_GAP && step < FOLLOWED.1)
+                .then(|| look.choose(&near, [spread(k, 2 * step), spread(k, 2 * step + 1)]));
+            match next.flatten() {
+                Some(next) => (share, part) = (share.map(|s| s * seen), next),
+                None => {
+                    for n in &near {
+                        (0..3).for_each(|c| b[c] += share[c] * n.sent[c]);
+                    }
+                    return b;
+                }
+            }
+        }
+        b
+    }
+
+    /// One part of some leaves close by, each as likely as its form factor is large if both numbers, from 0 to 1, are equally
+    /// distributed; `None` if nothing is seen of them.
+    fn choose(&self, near: &[Near], [which, where_]: [f64; 2]) -> Option<Part> {
+        let leaf = near[at_share(near.iter().map(|n| n.factor), which)?].leaf;
+        let patch = self.forest.patch(leaf).expect("an element has a patch");
+        let occluders = self.between(patch, self.solved.space.view.patch(patch).rounding_m);
+        let e = WorldElement::new(&self.solved.space.view, self.forest, leaf, false);
+        let seen = self.in_front(&e);
+        let all: Vec<&Occluder> = occluders.iter().collect();
+        let in_the_way = self.in_the_way(&seen, &all)?;
+        let mut parts = Vec::new();
+        self.add_parts(leaf, &seen, (&in_the_way, SPLITS), &mut parts);
+        Some(parts[at_share(parts.iter().map(|p| p.factor), where_)?])
+    }
+
+    /// The form factor to what is seen of a polygon past occluders, and that times the middle of it.
+    fn factor_past(&self, seen: &[DVec3], occluders: &[&Occluder], splits: u32) -> (f64, DVec3) {
+        let polygons = occluders.iter().map(|o| o.corners.as_slice());
+        let found = form_factor_past(self.point, self.normal, seen, polygons);
+        if found.is_exact {
+            return (found.factor, found.middle * found.factor);
+        }
+        let middle = seen.iter().sum::<DVec3>() / seen.len() as f64;
+        if splits == 0 {
+            let view = &self.solved.space.view;
+            let clear = segment_is_clear(view, self.forest, self.point, middle, self.slack_m);
+            let f = form_factor_from_point(self.point, self.normal, seen);
+            return if clear { (f, middle * f) } else { (0.0, DVec3::ZERO) };
+        }
+        // Towards the corners: each part is a quadrilateral.
+        let n = seen.len();
+        let part = |k: usize| {
+            let part = towards(seen, k, middle);
+            let pyramid = pyramid(self.point, &part);
+            let hides = |o: &&&Occluder| o.hides(&part, &pyramid) != Hides::Nothing;
+            let rest: Vec<&Occluder> = occluders.iter().filter(hides).copied().collect();
+            self.factor_past(&part, &rest, splits - 1)
+        };
+        (0..n).map(part).fold((0.0, DVec3::ZERO), |sum, part| (sum.0 + part.0, sum.1 + part.1))
+    }
+}
+
+/// The first of some numbers up to which all sum to a share of the whole.
+pub(super) fn at_share(values: impl Iterator<Item = f64> + Clone, share: f64) -> Option<usize> {
+    let mut left = share * values.clone().sum::<f64>();
+    let last = values.clone().count().checked_sub(1)?;
+    let found = values.into_iter().position(|value| {
+        left -= value;
+        left < 0.0
+    });
+    Some(found.unwrap_or(last))
+}
+
+/// Number `k` of a sequence that fills (0, 1) evenly, another for each dimension: multiples of the roots of primes, less whole
+/// numbers (Richtmyer 1951).
+pub(super) fn spread(k: usize, dimension: usize) -> f64 {
+    const PRIMES: [f64; 26] = [
+        2., 3., 5., 7., 11., 13., 17., 19., 23., 29., 31., 37., 41., 43., 47., 53., 59., 61., 67.,
+        71., 73., 79., 83., 89., 97., 101.,
+    ];
+    (0.5 + k as f64 * PRIMES[dimension % PRIMES.len()].sqrt()).fract()
+}
+
+/// The part of a polygon towards its corner `k`: a quadrilateral with a corner in the middle.
+fn towards(polygon: &[DVec3], k: usize, middle: DVec3) -> [DVec3; 4] {
+    let n = polygon.len();
+    let (before, after) = (polygon[(k + n - 1) % n], polygon[(k + 1) % n]);
+    [polygon[k], (polygon[k] + after) * 0.5, middle, (polygon[k] + before) * 0.5]
+}
+
+/// A polygon between the point and a patch.
+struct Occluder {
+    corners: Vec<DVec3>,
+    /// Planes through the point and its edges; the shadow is in front of all.
+    pyramid: Vec<DVec3>,
+    point: DVec3,
+}
+
+/// How much of a polygon an occluder hides.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Hides {
+    Nothing,
+    Some,
+    All,
+}
+
+impl Occluder {
+    /// `None` for a polygon that is seen edge on.
+    fn new(point: DVec3, corners: Vec<DVec3>) -> Option<Occluder> {
+        let pyramid = pyramid(point, &corners);
+        (!pyramid.is_empty()).then_some(Occluder { corners, pyramid, point })
+    }
+
+    /// How much of a polygon with this pyramid is hidden. Conservative: what touches counts.
+    fn hides(&self, polygon: &[DVec3], pyramid: &[DVec3]) -> Hides {
+        let beside = |planes: &[DVec3], corners: &[DVec3]| {
+            planes.iter().any(|n| corners.iter().all(|&c| n.dot(c - self.point) <= 0.0))
+        };
+        if beside(pyramid, &self.corners) || beside(&self.pyramid, polygon) {
+            return Hides::Nothing;
+        }
+        let within =
+            self.pyramid.iter().all(|n| polygon.iter().all(|&c| n.dot(c - self.point) >= 0.0));
+        if within { Hides::All } else { Hides::Some }
+    }
+}
+
+/// Normals of the planes through a point and a polygon's edges, inwards; none where the polygon is
+/// seen edge on.
+fn pyramid(point: DVec3, corners: &[DVec3]) -> Vec<DVec3> {
+    let n = corners.len();
+    let normals = |k: usize| (corners[k] - point).cross(corners[(k + 1) % n] - point);
+    let fan = |k: usize| (corners[k] - corners[0]).cross(corners[k + 1] - corners[0]);
+    let facing = (1..n - 1).map(fan).sum::<DVec3>().dot(corners[0] - point);
+    if facing == 0.0 {
+        return Vec::new();
+    }
+    (0..n).map(|k| normals(k) * facing.signum()).collect()
+}

@@ -1,0 +1,30 @@
+//! Readers of a solution: snapshots, sensors, tables, errors, comparisons.
+//!
+//! All of them take a solved state and change nothing. Must not know what led to it: sessions, commands or clips.
+
+mod accuracy;
+mod bends;
+mod compare;
+mod events;
+mod factors;
+mod frame;
+mod gather;
+mod lossy;
+mod names;
+mod pieces;
+mod reconstruct;
+mod snapshot;
+mod solution;
+
+pub use compare::{Difference, RadiosityGap, Which, compare, radiosity_gap};
+pub use events::{Event, EventKind};
+pub use factors::{Closure, Factors, Grouping, Open, PartFactors};
+pub use frame::{Frame, Hash, Mesh};
+pub use gather::Sensor;
+pub use lossy::{Missed, RadiosityError, missed, radiosity_error};
+pub use names::ElementName;
+pub use snapshot::{Leaf, Snapshot};
+pub use solution::Solution;
+
+// The plane names its events likewise.
+pub(crate) use events::with_names;

@@ -1,0 +1,177 @@
+//! An immutable picture of the solution at one instant: what pictures and exports read.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use crate::element::{ElementId, Kind};
+use crate::scene::{PatchId, Scene, World};
+
+use crate::solver::{Links, Radiosity, Surfaces};
+use crate::space::{Solved, SpaceState};
+
+use super::bends::Bends;
+
+/// The solution at one instant.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// The scene that was solved.
+    pub scene: Arc<Scene>,
+    /// Time in the animation, seconds.
+    pub time_s: f64,
+    /// What radiosities may be off by where little light arrives, W/m2: a share of the tolerance times the mean irradiance,
+    /// rough. Pictures show nothing darker than this.
+    pub error_w_m2: f64,
+    /// Poses, materials and lights as they were.
+    pub world: World,
+    /// Leaf elements of all patches, grouped by patch; none of those that are distant.
+    pub leaves: Vec<Leaf>,
+    /// For each patch the range of its leaves; indexed by `PatchId`, one entry more than patches.
+    pub leaf_offsets: Vec<u32>,
+}
+
+/// A leaf of the element forest: a convex piece of a patch with constant radiosity.
+#[derive(Clone, Copy, Debug)]
+pub struct Leaf {
+    /// Corners in the patch's frame, counter-clockwise, metres; a triangle repeats its last corner.
+    pub corners: [DVec2; 4],
+    /// Irradiance H, W/m2, linear RGB.
+    pub irradiance: [f32; 3],
+    /// Gradient of the irradiance in the patch's frame, W/m3, linear RGB: along u, then along v.
+    pub irradiance_gradient: [[f32; 3]; 2],
+    /// Radiosity B = M + rho H, W/m2, linear RGB.
+    pub radiosity: [f32; 3],
+}
+
+impl Leaf {
+    /// Irradiance at a point of the patch's frame: linear over the leaf, never negative; W/m2.
+    pub fn irradiance_at(&self, p: DVec2) -> [f32; 3] {
+        let d = p - crate::element::Shape { corners: self.corners, len: 4 }.centroid();
+        let [x, y] = [d.x as f32, d.y as f32];
+        let [gu, gv] = self.irradiance_gradient;
+        std::array::from_fn(|c| (self.irradiance[c] + gu[c] * x + gv[c] * y).max(0.0))
+    }
+
+    /// Whether a point of the patch's frame is in the leaf, or no further than `slack_m` beside it.
+    fn holds(&self, p: DVec2, slack_m: f64) -> bool {
+        (0..4).all(|k| {
+            let (from, to) = (self.corners[k], self.corners[(k + 1) % 4]);
+            (to - from).perp_dot(p - from) >= -slack_m * (to - from).length()
+        })
+    }
+}
+
+/// Cosine of the angle by which the normal of a sensor may differ from that of its patch.
+const FACES_ALONG: f64 = 0.9;
+
+impl Snapshot {
+    /// Irradiance that the mesh says is at a point of a surface, W/m2, linear RGB: on the nearest
+    /// patch that faces along `normal` (to within 25 degrees) and has the point on it, no further
+    /// than a 1/1000 of the scene's diagonal away; `None` where there is none.
+    ///
+    /// Linear over a leaf, with jumps between leaves: across the edge of a shadow it is right in the
+    /// mean and wrong on either side. [`super::Frame::irradiance_at`] has no such limit.
+    pub fn irradiance_at(&self, point: DVec3, normal: DVec3) -> Option<[f64; 3]> {
+        let (lo, hi) = self.scene.bounds_in(&self.world)?;
+        let near_m = 1e-3 * (hi - lo).length();
+        let mut found: Vec<(f64, PatchId, DVec2)> = Vec::new();
+        for (k, patch) in self.scene.patches.iter().enumerate() {
+            let Some(pose) = self.world.pose(patch.body) else { continue };
+            let d = pose.inverse_point(point) - patch.frame.origin;
+            let off_m = d.dot(patch.frame.normal).abs();
+            let along = pose.direction(patch.frame.normal).dot(normal);
+            if along > FACES_ALONG && off_m <= near_m {
+                let p = DVec2::new(d.dot(patch.frame.u), d.dot(patch.frame.v));
+                found.push((off_m, PatchId(k as u32), p));
+            }
+        }
+        // Stable: of patches alike the first.
+        found.sort_by(|one, other| one.0.total_cmp(&other.0));
+        found.iter().find_map(|&(_, patch, p)| {
+            let under = |leaf: &&Leaf| leaf.holds(p, 1e-3 * near_m);
+            let leaf = self.leaves_of(patch).iter().find(under)?;
+            Some(leaf.irradiance_at(p).map(f64::from))
+        })
+    }
+
+    /// The leaves of one patch; empty if its body is absent.
+    pub fn leaves_of(&self, patch: PatchId) -> &[Leaf] {
+        let i = patch.0 as usize;
+        &self.leaves[self.leaf_offsets[i] as usize..self.leaf_offsets[i + 1] as usize]
+    }
+}
+
+/// Error of a solution in dark places, in tolerances of the mean irradiance. Not calibrated.
+const VISIBLE: f64 = 0.05;
+
+/// The leaves of a solved forest with a solution over it.
+pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Snapshot {
+    let SpaceState { scene, forest, .. } = &solved.space;
+    let surfaces = solved.space.surfaces();
+    let bends = Bends { solved, links, radiosity };
+    let of_facet = |facet: ElementId, out: &mut Vec<Leaf>| {
+        let lit = surfaces.lit(facet.0);
+        let mut bent = bends.of_leaves(facet.0).into_iter();
+        radiosity.irradiances(&surfaces, facet.0, &mut |id, h| {
+            // Of what is exposed; a leaf is read about its own centroid.
+            let extent = forest.extent(ElementId(id));
+            let h = h.moved(&surfaces.place(id), [extent.centroid.x, extent.centroid.y]);
+            let h = h.plus(&bent.next().expect("the same leaves"));
+            let irradiance = h.mean.map(|x| x.max(0.0));
+            out.push(Leaf {
+                corners: forest.shape(ElementId(id)).corners,
+                irradiance,
+                irradiance_gradient: h.gradient,
+                radiosity: std::array::from_fn(|c| {
+                    lit.exitance[c] + lit.reflectance[c] * irradiance[c]
+                }),
+            });
+        });
+    };
+    let of_patch = |k: usize| {
+        let mut out = Vec::new();
+        let mut stack = vec![forest.patch_root(PatchId(k as u32))];
+        let body = scene.patches[k].body;
+        if !solved.space.view.is_present(body) || scene.is_distant(body) {
+            stack.clear();
+        }
+        while let Some(id) = stack.pop() {
+            match forest.kind(id) {
+                Kind::Polygon => stack.extend(forest.children(id).rev().map(ElementId)),
+                _ => of_facet(id, &mut out),
+            }
+        }
+        out
+    };
+    let by_patch: Vec<Vec<Leaf>> = (0..scene.patches.len()).into_par_iter().map(of_patch).collect();
+    let mut leaf_offsets = vec![0];
+    let mut end = 0;
+    leaf_offsets.extend(by_patch.iter().map(|leaves| {
+        end += leaves.len() as u32;
+        end
+    }));
+    let leaves = by_patch.concat();
+    let error = solved.space.tuning.tolerance * VISIBLE;
+    Snapshot {
+        scene: Arc::clone(scene),
+        time_s: solved.time_s,
+        error_w_m2: error * mean_irradiance_w_m2(&leaves),
+        world: solved.space.world.clone(),
+        leaves,
+        leaf_offsets,
+    }
+}
+
+/// Mean over the area and the channels.
+fn mean_irradiance_w_m2(leaves: &[Leaf]) -> f64 {
+    let area_m2 = |leaf: &Leaf| {
+        let [a, b, c, d] = leaf.corners;
+        (c - a).perp_dot(d - b) / 2.0
+    };
+    let arriving = |leaf: &Leaf| {
+        area_m2(leaf) * leaf.irradiance.iter().map(|&h| f64::from(h)).sum::<f64>() / 3.0
+    };
+    let whole_m2: f64 = leaves.iter().map(area_m2).sum();
+    if whole_m2 > 0.0 { leaves.iter().map(arriving).sum::<f64>() / whole_m2 } else { 0.0 }
+}

@@ -1,0 +1,37 @@
+//! A scene with what every build of it starts from.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use crate::element::Forest;
+use crate::scene::{BodyId, Scene};
+
+use super::coarse;
+
+/// A scene, and what starts from it.
+#[derive(Clone)]
+pub(crate) struct Bed {
+    pub(crate) scene: Arc<Scene>,
+    /// The part of the forest that is always there, where every build starts.
+    pub(crate) seed: Forest,
+    /// Coarse elements of the seed by number; none for oracles that ask for no brightness.
+    pub(crate) coarse_ids: Vec<u32>,
+}
+
+impl Bed {
+    /// Of a scene of which some bodies are not where it has them at rest; with groups of patches and coarse elements, or
+    /// not.
+    pub(crate) fn new(
+        scene: Arc<Scene>,
+        displaced: &BTreeSet<BodyId>,
+        (groups, coarse): (bool, bool),
+    ) -> Bed {
+        let is_displaced = |body: BodyId| displaced.contains(&body) || scene.is_inserted(body);
+        let mut seed = match groups {
+            true => Forest::with_groups(&scene, &is_displaced),
+            false => Forest::displaced(&scene, &is_displaced),
+        };
+        let coarse_ids = if coarse { coarse::number(&scene, &mut seed) } else { Vec::new() };
+        Bed { scene, seed, coarse_ids }
+    }
+}

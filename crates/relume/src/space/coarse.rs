@@ -1,0 +1,203 @@
+//! The coarse solution that the error oracle weighs by: a fixed set of coarse elements, all pairs
+//! of them linked, a fixed number of sweeps from the emission. A pure function of the scene at one
+//! instant: links are summed in the order of the coarse elements, whatever their history.
+
+use crate::element::{ElementId, Forest, Kind, Renumbering};
+use crate::pair::{self, Brightness, Carried, Changes, Held, Light};
+use crate::scene::{LightId, PatchId, Scene, World};
+use crate::solver::{Dirty, Link, Links, Radiosity, Stop, Surfaces};
+
+use crate::follow::set_pairs;
+
+use super::surfaces::{CoarseReceivers, CoarseSurfaces, LitForest};
+
+/// Coarse elements are no larger than this share of the scene's area: some 1/31, which equal quadtrees do not meet
+/// exactly.
+const COARSE_SHARE: f64 = 0.0323;
+
+/// An element of this share of the scene's area weighs 1 in the error norm.
+const REFERENCE_SHARE: f64 = 1.0 / 512.0;
+
+/// Sweeps of the coarse solution: five bounces bring every closed room within 10 % or so.
+const SWEEPS: u32 = 8;
+
+/// Errors on dark receivers are measured against at least this share of the mean irradiance: a room into which light comes
+/// through a door that is ajar is some 200 times darker than the one beside it, and keeps the tolerance.
+const DARK_FLOOR: f64 = 1e-3;
+
+/// Share of what would arrive directly if nothing were in the way, below which what arrives is what rounding lets through
+/// between shadows: errors relative to that would have no end. (A lamp outside a closed room.)
+const LOST: f64 = 1e-4;
+
+/// Splits facets down to coarse elements, numbers them and keeps them for good; returns their ids
+/// by number.
+pub(super) fn number(scene: &Scene, forest: &mut Forest) -> Vec<u32> {
+    let largest = forest.made_m2() * COARSE_SHARE;
+    let mut out = Vec::new();
+    let groups = forest.groups().roots().to_vec();
+    for patch in 0..scene.patches.len() as u32 {
+        let mut stack = vec![forest.patch_root(PatchId(patch))];
+        stack.retain(|&root| !forest.is_in_group(root));
+        while let Some(id) = stack.pop() {
+            let whole = forest.kind(id) == Kind::Element
+                && (forest.area_m2(id) <= largest || !forest.can_split(id));
+            if whole {
+                forest.set_coarse(id, out.len());
+                out.push(id.0);
+                continue;
+            }
+            let children = match forest.kind(id) {
+                Kind::Element => forest.split(id).0,
+                _ => forest.children(id),
+            };
+            stack.extend(children.rev().map(ElementId));
+        }
+    }
+    for group in groups {
+        forest.set_coarse(group, out.len());
+        out.push(group.0);
+    }
+    forest.keep_all();
+    out
+}
+
+/// The coarse links and their solution.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Coarse {
+    links: Links,
+    /// The same with nothing in the way.
+    open: Links,
+    radiosity: Radiosity,
+    pub(super) brightness: Brightness,
+}
+
+impl Coarse {
+    /// Takes over what an update found on the coarse pairs. Whether any of them changed.
+    pub(super) fn follow(&mut self, seed: &Forest, changes: &Changes) -> bool {
+        let held = changes.held.iter();
+        let held = held.map(|&Held { a, b, carried }| pair::Link { a, b, carried });
+        let open = held.clone().map(|link| {
+            let carried = Carried { visibility: u16::MAX, ..link.carried };
+            pair::Link { carried, ..link }
+        });
+        let seed = &CoarseReceivers(seed);
+        set_pairs(&mut self.links, seed, changes.dropped.iter().copied(), held);
+        set_pairs(&mut self.open, seed, changes.dropped.iter().copied(), open);
+        self.links.tidy();
+        self.open.tidy();
+        !changes.dropped.is_empty() || !changes.held.is_empty()
+    }
+
+    /// Solves over the coarse links as the scene shines in a world; `coarse` are the coarse elements of `seed` by number.
+    pub(super) fn solve(&mut self, (scene, now): (&Scene, &World), seed: &Forest, coarse: &[u32]) {
+        for &id in coarse {
+            self.links.sort(id);
+            self.open.sort(id);
+        }
+        let lit = LitForest::new(scene, seed, now).with_places();
+        self.radiosity = start(now, seed, &lit);
+        let surfaces = CoarseSurfaces::new(lit);
+        for &group in seed.groups().roots() {
+            self.radiosity.set(group.0, surfaces.lit(group.0).exitance);
+        }
+        self.radiosity.solve(&surfaces, &self.links, Dirty::All, Stop::Sweeps(SWEEPS));
+        self.brightness = self.measure((scene, now), seed, coarse, &surfaces);
+    }
+
+    fn measure(
+        &self,
+        (scene, now): (&Scene, &World),
+        seed: &Forest,
+        coarse: &[u32],
+        surfaces: &CoarseSurfaces<'_>,
+    ) -> Brightness {
+        let total_area = seed.made_m2();
+        let mean = |v: [f32; 3]| v.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
+        let mut irradiance = vec![0.0; coarse.len()];
+        for facet in surfaces.facets() {
+            self.radiosity.irradiances(surfaces, facet.0, &mut |id, h| {
+                let number = seed.coarse(ElementId(id)).expect("leaves of the seed are coarse");
+                irradiance[number] = mean(h.mean.map(|x| x.max(0.0)));
+            });
+        }
+        let arriving: f64 =
+            coarse.iter().zip(&irradiance).map(|(&id, h)| surfaces.area_m2(id) * h).sum();
+        let intensity = |k: u32| now.intensity(LightId(k)).iter().sum::<f64>() / 3.0;
+        let mut lights: Vec<f64> = (0..scene.lights.len() as u32).map(intensity).collect();
+        let floor = arriving / total_area * DARK_FLOOR;
+        let light_of = |(&id, irradiance): (&u32, &f64)| {
+            if seed.is_distant(ElementId(id)) {
+                let radiosity = mean(self.radiosity.radiosity(id));
+                return Light { radiosity, ..Light::DISTANT };
+            }
+            let emitted = mean(surfaces.lit(surfaces.facet_of(id)).exitance);
+            let radiosity = mean(self.radiosity.radiosity(id));
+            let reflected = (radiosity - emitted).max(0.0);
+            Light { radiosity, reflected, irradiance: irradiance + floor }
+        };
+        let emits = |source: u32| match seed.light(ElementId(source)) {
+            Some(light) => lights[light],
+            None => mean(surfaces.lit(surfaces.facet_of(source)).exitance),
+        };
+        let brings = |link: &Link| f64::from(link.coupling) * emits(link.source);
+        let open =
+            |&id: &u32| surfaces.area_m2(id) * self.open.of(id).iter().map(brings).sum::<f64>();
+        let known = if arriving > LOST * coarse.iter().map(open).sum::<f64>() {
+            coarse.iter().zip(&irradiance).map(light_of).collect()
+        } else {
+            // Nothing emits, or all is hidden: every surface and light weighs the same, and errors are relative to row sums.
+            lights.iter_mut().for_each(|i| *i = f64::from(u8::from(*i > 0.0)));
+            let uniform = |&id: &u32| match seed.is_distant(ElementId(id)) {
+                true if self.radiosity.radiosity(id) == [0.0; 3] => Light::DISTANT,
+                true => Light { radiosity: 1.0, ..Light::DISTANT },
+                false => Light::UNIFORM,
+            };
+            coarse.iter().map(uniform).collect()
+        };
+        Brightness::new(known, lights, total_area * REFERENCE_SHARE)
+    }
+
+    /// Follows elements to their new ids, and coarse elements to other numbers.
+    pub(crate) fn renumber(&mut self, to: &Renumbering, numbers: &[Option<usize>]) {
+        for links in [&mut self.links, &mut self.open] {
+            links.extend(to.old_len());
+            links.renumber(to);
+        }
+        self.radiosity = Radiosity::default();
+        self.brightness.renumber(numbers);
+    }
+
+    /// Radiosity of a coarse element.
+    pub(super) fn radiosity(&self, id: u32) -> [f32; 3] {
+        self.radiosity.radiosity(id)
+    }
+
+    /// Bytes held.
+    pub(super) fn memory_bytes(&self) -> u64 {
+        let links = self.links.memory_bytes() + self.open.memory_bytes();
+        links + self.radiosity.memory_bytes()
+    }
+}
+
+/// A solution to begin with: exitances, and what lights and what is distant send.
+pub(super) fn start(now: &World, forest: &Forest, surfaces: &LitForest<'_>) -> Radiosity {
+    let mut out = Radiosity::new(surfaces);
+    set_sources(now, (forest, surfaces), &mut out);
+    out
+}
+
+/// Gives the punctual lights the intensities that they have in a world, and what is distant its exitance.
+pub(super) fn set_sources(
+    now: &World,
+    (forest, surfaces): (&Forest, &LitForest<'_>),
+    radiosity: &mut Radiosity,
+) {
+    for facet in forest.distant_facets() {
+        radiosity.set(facet.0, surfaces.lit(facet.0).exitance);
+    }
+    for id in 0..forest.fixed_len() {
+        if let Some(light) = forest.light(ElementId(id)) {
+            radiosity.set(id, now.intensity(LightId(light as u32)).map(|x| x as f32));
+        }
+    }
+}

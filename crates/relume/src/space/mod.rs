@@ -1,0 +1,24 @@
+//! Space as followers see it: polygons on bodies, their places in a world, and their light.
+//!
+//! [`Solved`] is a solved state of a scene: what everything that reads a solution takes. Must not know commands or clips.
+
+mod bed;
+mod coarse;
+mod emission;
+mod groups;
+mod phases;
+mod promise;
+mod state;
+mod surfaces;
+mod tally;
+
+pub(crate) use bed::Bed;
+pub(crate) use groups::{Before, group_links};
+pub(crate) use phases::Goal;
+pub use state::SpaceState;
+pub(crate) use state::Tuning;
+pub(crate) use surfaces::place_of;
+pub(crate) use tally::row_sums_of;
+
+/// A solved state of a scene.
+pub type Solved = crate::follow::Follower<SpaceState>;

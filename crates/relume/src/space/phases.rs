@@ -1,0 +1,388 @@
+//! What the phases of a frame ask of space.
+
+use std::sync::Arc;
+
+use crate::element::{ElementId, Forest, Renumbering, WorldView};
+use crate::follow::{
+    Ahead, Balance, Clocked, Follower, FrameReport, Level, Motion, Space, Update, Void, Why,
+};
+use crate::pair::{self, Changes, Oracle, PairId, PairTree, Placed, Since, Stage};
+use crate::scene::{BodyId, Held, LightId, World};
+use crate::solver::{Dirty, GroupLinks, Radiosity};
+
+use super::bed::Bed;
+use super::coarse::{self, Coarse};
+use super::promise::Promise;
+use super::state::{SpaceState, Tuning};
+use super::surfaces::LitForest;
+use super::{emission, groups, tally};
+
+/// Residual of the solver after a cold build, relative to the tolerance.
+const RESIDUAL_SHARE: f64 = 0.005;
+
+/// The same after an update: a small body that moves changes nearly everything a little, and that
+/// little need not be followed.
+const FOLLOWED_SHARE: f64 = 0.05;
+
+/// Share of the elements' room that may be vacant: an element takes more than a hundred bytes of the
+/// 128 it may take.
+///
+/// Putting everything together is a pass over all pairs, some nanoseconds each; at least as many
+/// elements as this share, with all their pairs, have gone since the last such pass, and every one of
+/// those pairs cost a judgement (a microsecond or so).
+const VACANT_ELEMENTS: usize = 32;
+
+/// What a frame leads to.
+pub(crate) struct Goal<'a> {
+    /// The scene, and what a cold build begins with.
+    pub(crate) bed: &'a Bed,
+    /// Where everything is to be, and how bright.
+    pub(crate) world: &'a World,
+    /// What of it is held by hand.
+    pub(crate) held: &'a Held,
+    /// The world that dynamic links of a cold build are counted from.
+    pub(crate) from: Option<&'a World>,
+    /// What it is solved with.
+    pub(crate) tuning: Tuning,
+}
+
+/// What was before a frame.
+pub(crate) struct Was {
+    world: World,
+    held: Held,
+    view: WorldView,
+}
+
+impl Space for SpaceState {
+    type Goal<'g> = Goal<'g>;
+    type Was = Was;
+    type Since<'m> = Since<'m>;
+    type Judge<'j> = Placed<'j>;
+    type Forest = Forest;
+    type Lit<'l> = LitForest<'l>;
+
+    const ROOT: ElementId = Forest::ROOT;
+
+    fn blank(goal: &Goal<'_>) -> SpaceState {
+        let &Goal { bed, world, held, tuning, .. } = goal;
+        SpaceState {
+            scene: Arc::clone(&bed.scene),
+            tuning,
+            world: world.clone(),
+            held: held.clone(),
+            forest: bed.seed.clone(),
+            view: WorldView::new(&bed.scene, &bed.seed, world),
+            groups: GroupLinks::default(),
+            coarse: Coarse::default(),
+            sound_world: world.clone(),
+            touched: Vec::new(),
+            is_stopped: false,
+        }
+    }
+
+    fn is_at(&self, goal: &Goal<'_>) -> bool {
+        self.world == *goal.world && self.touched.is_empty()
+    }
+
+    fn stay(&mut self, goal: &Goal<'_>) -> bool {
+        self.scene = Arc::clone(&goal.bed.scene);
+        let held = std::mem::replace(&mut self.held, goal.held.clone());
+        held.promises_as(goal.held)
+    }
+
+    fn stop(&mut self) {
+        self.is_stopped = true;
+    }
+
+    fn goes_on(&self, goal: &Goal<'_>) -> bool {
+        self.held == *goal.held
+    }
+
+    fn go(&mut self, goal: &Goal<'_>) -> Was {
+        self.scene = Arc::clone(&goal.bed.scene);
+        let view = WorldView::new(&self.scene, &self.forest, goal.world);
+        Was {
+            world: std::mem::replace(&mut self.world, goal.world.clone()),
+            held: std::mem::replace(&mut self.held, goal.held.clone()),
+            view: std::mem::replace(&mut self.view, view),
+        }
+    }
+
+    fn since<'m>(&self, _: &Goal<'_>, was: &'m Was) -> Since<'m> {
+        let since = Since::new(&self.scene, &self.forest, &was.view, &self.view);
+        if self.is_stopped { since.after_a_stop() } else { since }
+    }
+
+    fn ahead(&self, goal: &Goal<'_>, was: &Was, update: Update, clocked: Clocked<'_>) -> Ahead {
+        let promise = Promise { scene: &self.scene, held: goal.held };
+        let no_longer = Void {
+            rounding: self.is_rounded_otherwise(was),
+            promise: !was.held.promises_as(goal.held),
+        };
+        Ahead::new(update, &promise, clocked, no_longer)
+    }
+
+    fn candidates(_: &Goal<'_>) -> Vec<u32> {
+        vec![Forest::ROOT.0]
+    }
+
+    fn judge<'j>(
+        &'j mut self,
+        goal: &'j Goal<'_>,
+        level: Level,
+        motion: &Motion<'j, Since<'_>>,
+    ) -> Placed<'j> {
+        Placed {
+            forest: &mut self.forest,
+            view: &self.view,
+            stage: match level {
+                Level::Coarse => Stage::Coarse,
+                Level::Fine => Stage::Fine(&self.coarse.brightness),
+            },
+            oracle: goal.tuning.oracle,
+            simd: goal.tuning.simd,
+            since: motion.since,
+            ahead: motion.ahead.foresight.as_ref(),
+            lookahead: motion.ahead.lookahead,
+        }
+    }
+
+    fn has_coarse(goal: &Goal<'_>) -> bool {
+        !goal.bed.coarse_ids.is_empty()
+    }
+
+    fn weigh(
+        &mut self,
+        goal: &Goal<'_>,
+        was: &Was,
+        changes: &Changes,
+        since: Option<&mut Since<'_>>,
+    ) {
+        let Bed { scene, seed, coarse_ids } = goal.bed;
+        let changed = self.coarse.follow(seed, changes);
+        let relit = since.is_none() || self.world.any_relit(&was.world);
+        if !changed && !relit && self.touched.is_empty() {
+            return;
+        }
+        let before = std::mem::take(&mut self.coarse.brightness);
+        self.coarse.solve((scene, &self.world), seed, coarse_ids);
+        if let Some(since) = since {
+            let (shifts, of_lights) = self.coarse.brightness.shifts(&before);
+            since.dim(seed, coarse_ids, (shifts, of_lights));
+        }
+    }
+
+    fn remade(&self, _: &Was, tree: &PairTree) -> Vec<PairId> {
+        if self.touched.is_empty() {
+            return Vec::new();
+        }
+        let is_touched = |id| self.touched.binary_search(&self.forest.fixed(id)).is_ok();
+        let ends_there = |&id: &PairId| {
+            let (a, b) = tree.ends(id);
+            is_touched(a) || is_touched(b)
+        };
+        tree.link_ids().filter(ends_there).collect()
+    }
+
+    fn forest(&self) -> &Forest {
+        &self.forest
+    }
+
+    fn reap(&mut self) -> u64 {
+        self.forest.reap()
+    }
+
+    fn take_changed(&mut self) -> Vec<u32> {
+        self.forest.take_changed().into_iter().map(|id| id.0).collect()
+    }
+
+    /// The coarse solution, where there is one; else exitances.
+    fn first_guess(&self, goal: &Goal<'_>, lit: &LitForest<'_>) -> Radiosity {
+        let mut out = coarse::start(&self.world, &self.forest, lit);
+        for id in 0..self.forest.len() as u32 {
+            if let Some(number) = self.forest.coarse(ElementId(id)) {
+                out.set(id, self.coarse.radiosity(goal.bed.coarse_ids[number]));
+            }
+        }
+        out
+    }
+
+    fn place_groups(
+        &mut self,
+        _: &Goal<'_>,
+        was: &Was,
+        tree: &PairTree,
+        apart: Option<Vec<(ElementId, ElementId)>>,
+    ) {
+        let before = match apart.filter(|_| !self.is_rounded_otherwise(was)) {
+            None => groups::Before::default(),
+            Some(apart) => {
+                let links = (std::mem::take(&mut self.groups), apart);
+                groups::Before::new((&self.scene, &self.forest), (&was.view, &self.view), links)
+            }
+        };
+        self.groups = groups::group_links((&self.forest, &self.view), tree, &before);
+    }
+
+    fn add_dirty(&self, _: &Goal<'_>, was: &Was, dirty: &mut Dirty) -> bool {
+        if let Dirty::Some { parents, .. } = dirty {
+            let facets = self.forest.near_facets();
+            parents.extend(self.came_or_went(was, facets));
+            parents.extend(self.relit_facets(was, facets));
+        }
+        let sources_differ = self.world.lights_differ(&was.world) || self.outside_differs(was);
+        // Whoever gathers from a light, or from outside, gathers anew: neither knows who that is.
+        if sources_differ || !self.touched.is_empty() {
+            *dirty = Dirty::All;
+        }
+        sources_differ
+    }
+
+    fn lit(&self, _: &Goal<'_>, everywhere: bool) -> LitForest<'_> {
+        let lit = LitForest::new(&self.scene, &self.forest, &self.world);
+        let lit = lit.with_groups(&self.groups).present_in(&self.view);
+        if everywhere { lit.with_places() } else { lit }
+    }
+
+    fn set_sources(&self, _: &Goal<'_>, lit: &LitForest<'_>, light: &mut Radiosity) {
+        coarse::set_sources(&self.world, (&self.forest, lit), light);
+    }
+
+    fn if_dark(&self, _: &Goal<'_>, lit: &LitForest<'_>) -> Option<Radiosity> {
+        let now = &self.world;
+        let shines = |&light: &LightId| {
+            now.light_pose(light).is_some() && now.intensity(light).iter().any(|&i| i > 0.0)
+        };
+        let lamps = (0..self.scene.lights.len() as u32).map(LightId).any(|light| shines(&light));
+        (lit.is_dark() && !lamps).then(|| coarse::start(now, &self.forest, lit))
+    }
+
+    fn residual(goal: &Goal<'_>, is_cold: bool) -> f64 {
+        goal.tuning.tolerance * if is_cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE }
+    }
+
+    fn most_mean_w_m2(goal: &Goal<'_>) -> f64 {
+        emission::most_mean_w_m2(&goal.bed.scene, goal.world)
+    }
+
+    fn brightened(&self, _: &Goal<'_>) -> f64 {
+        emission::brightened(&self.scene, &self.sound_world, &self.world)
+    }
+
+    fn finish(&mut self, is_settled: bool) {
+        (self.touched, self.is_stopped) = (Vec::new(), false);
+        if is_settled {
+            self.sound_world = self.world.clone();
+        }
+    }
+
+    fn compact(&mut self) -> Option<Renumbering> {
+        if self.forest.vacant_len() * VACANT_ELEMENTS <= self.forest.len() {
+            return None;
+        }
+        let to = self.forest.compact();
+        self.groups.renumber(&to);
+        Some(to)
+    }
+
+    fn trim(&mut self) {
+        self.forest.trim();
+    }
+
+    fn count(&self, tree: &PairTree, report: &mut FrameReport) {
+        report.link_kinds = groups::kinds(&self.forest, tree);
+        let counts = self.forest.counts();
+        (report.elements, report.leaves) = (counts.elements, counts.leaves);
+    }
+
+    fn balance(state: &Follower<SpaceState>) -> Balance {
+        tally::balance(state)
+    }
+
+    fn dynamic_links(&self, goal: &Goal<'_>, tree: &PairTree) -> u64 {
+        goal.from.map_or(0, |from| self.links_moved_since(from, tree))
+    }
+
+    fn check(goal: &Goal<'_>, state: &Follower<SpaceState>) -> Result<(), Why> {
+        if !state.is_settled() {
+            return Ok(());
+        }
+        if !state.radiosity.has_settled() {
+            let residual = state.radiosity.residual;
+            return Err(Why::Unsettled { residual, surfaces: tally::suspects(state) });
+        }
+        let share = state.report.energy.map_or(0.0, |energy| energy.unbalanced());
+        if share > unbalanced_max(&goal.tuning) || share.is_nan() {
+            return Err(Why::Unbalanced { share, surfaces: tally::suspects(state) });
+        }
+        Ok(())
+    }
+
+    fn bytes(&self) -> [u64; 3] {
+        [self.groups.memory_bytes(), self.forest.memory_bytes(), self.coarse.memory_bytes()]
+    }
+}
+
+/// Share of what is emitted that may be unaccounted for in a result: as much as is asked for, or a tenth.
+fn unbalanced_max(tuning: &Tuning) -> f64 {
+    match tuning.oracle {
+        Oracle::Error { .. } => tuning.tolerance.max(0.1),
+        Oracle::FormFactor { .. } => 0.5,
+    }
+}
+
+impl SpaceState {
+    /// Whether what counts as rounding differs.
+    fn is_rounded_otherwise(&self, was: &Was) -> bool {
+        was.view.far_m() != self.view.far_m()
+    }
+
+    /// Those of some facets whose bodies appeared or vanished: what they emit did too.
+    fn came_or_went(&self, was: &Was, of: &[ElementId]) -> Vec<u32> {
+        let toggled = |facet: &&ElementId| {
+            let patch = self.forest.patch(**facet).expect("a facet has a patch");
+            let body = self.view.patch(patch).body;
+            self.view.is_present(body) != was.view.is_present(body)
+        };
+        of.iter().filter(toggled).map(|f| f.0).collect()
+    }
+
+    /// Those of some facets that emit or reflect otherwise than before.
+    fn relit_facets(&self, was: &Was, of: &[ElementId]) -> Vec<u32> {
+        if !self.world.any_relit(&was.world) {
+            return Vec::new();
+        }
+        let is_relit = |facet: &&ElementId| {
+            let patch = self.forest.patch(**facet).expect("a facet has a patch");
+            let material = self.scene.patches[patch.0 as usize].material;
+            self.world.is_relit(&was.world, material)
+        };
+        of.iter().filter(is_relit).map(|f| f.0).collect()
+    }
+
+    /// Whether what is distant emits otherwise than before, or came or went.
+    fn outside_differs(&self, was: &Was) -> bool {
+        let distant = self.forest.distant_facets();
+        !self.came_or_went(was, distant).is_empty() || !self.relit_facets(was, distant).is_empty()
+    }
+
+    /// Links between bodies (or lights) of which at least one is elsewhere than in another world.
+    fn links_moved_since(&self, from: &World, tree: &PairTree) -> u64 {
+        let (scene, forest) = (&*self.scene, &self.forest);
+        let body = |id| match forest.patch(id) {
+            Some(patch) => Some(scene.patches[patch.0 as usize].body),
+            None => forest.cluster_body(id),
+        };
+        let has_moved = |b: BodyId| from.pose(b) != self.world.pose(b);
+        let light_has_moved = |k: usize| {
+            let before = WorldView::light_in(scene, from, LightId(k as u32));
+            before.as_ref() != self.view.light(k)
+        };
+        let moves = |id| match forest.light(id) {
+            Some(light) => light_has_moved(light),
+            None => body(id).is_some_and(has_moved),
+        };
+        let is_dynamic = |l: &pair::Link| body(l.a) != body(l.b) && (moves(l.a) || moves(l.b));
+        tree.links().filter(is_dynamic).count() as u64
+    }
+}

@@ -1,0 +1,49 @@
+//! The part of a solved state that is of space.
+
+use std::sync::Arc;
+
+use crate::element::{ElementId, Forest, WorldView};
+use crate::pair::Oracle;
+use crate::scene::{Held, Scene, World};
+use crate::solver::GroupLinks;
+use crate::transport::Simd;
+
+use super::coarse::Coarse;
+use super::surfaces::LitForest;
+
+/// What a scene is solved with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tuning {
+    /// Relative error of irradiance aimed at.
+    pub(crate) tolerance: f64,
+    /// What decides on pairs.
+    pub(crate) oracle: Oracle,
+    /// Vector instructions.
+    pub(crate) simd: Simd,
+}
+
+/// The part of a solved state that is of space.
+pub struct SpaceState {
+    pub(crate) scene: Arc<Scene>,
+    pub(crate) tuning: Tuning,
+    pub(crate) world: World,
+    /// What was held by hand.
+    pub(crate) held: Held,
+    pub(crate) forest: Forest,
+    pub(crate) view: WorldView,
+    pub(crate) groups: GroupLinks,
+    pub(crate) coarse: Coarse,
+    /// The world when no link was extrapolated last.
+    pub(crate) sound_world: World,
+    /// Facets of which another part is covered than when they were solved, ascending.
+    pub(crate) touched: Vec<ElementId>,
+    /// Whether a frame was left half-way.
+    pub(super) is_stopped: bool,
+}
+
+impl SpaceState {
+    /// The elements with their light, absent ones among them.
+    pub(crate) fn surfaces(&self) -> LitForest<'_> {
+        LitForest::new(&self.scene, &self.forest, &self.world).with_groups(&self.groups)
+    }
+}

@@ -59,40 +59,22 @@
 //! rayon's global pool; inside `ThreadPool::install` on that pool. Results are the same on any. [`Session::watch`] shows a
 //! solve under way to other threads, and calls it off.
 //!
-//! Not part of the interface, and free to change: the modules that are hidden here, which the command and the tests of this
-//! repository use.
+//! The engine is the crate `relume-core`. Its rooms are re-exported here for the command and the tests of this repository,
+//! hidden: not part of the interface, and free to change.
 
-// Tests may measure and compare with whatever the platform offers: what they compute decides nothing.
-#![cfg_attr(test, allow(clippy::disallowed_methods, clippy::disallowed_types))]
+#[doc(hidden)]
+pub use relume_core::{element, event, geometry, pair, scene, session, solver, transport};
 
-// The rooms, from the ground up; each may use those above it in this list and no other (`tests/layers.rs` checks it).
-#[doc(hidden)]
-pub mod element; // the element forest: clusters, patches and their quadtrees
-#[doc(hidden)]
-pub mod event; // what the known motion allows within the coming time, and until when
-pub mod flat;
-#[doc(hidden)]
-pub mod geometry; // polygons, bounds, shafts, rigid motion: pure functions
-#[doc(hidden)]
-pub mod pair; // the pair tree, oracles and verdicts
-#[doc(hidden)]
-pub mod scene; // files in; bodies, patches, materials, motion, and worlds made of them
-#[doc(hidden)]
-pub mod session; // owns all state; runs the phases of a frame; frames and snapshots out
-#[doc(hidden)]
-pub mod solver; // gather, push, pull, residual
-#[doc(hidden)]
-pub mod transport; // exchange area and visibility of two elements: pure queries // the plane: another space for the same pairs, events and solver
-
-pub use geometry::Pose;
-pub use glam;
-pub use scene::{
+pub use relume_core::flat;
+pub use relume_core::geometry::Pose;
+pub use relume_core::glam;
+pub use relume_core::scene::{
     Body, BodyId, Camera, Edits, Held, ImportOptions, Interpolation, Light, LightId, LightKind,
     Material, MaterialId, NewBody, Note, Patch, PatchId, Projection, RotationTrack, Scene,
     SceneBuilder, SceneError, Severity, Surface, SurfaceId, TakenBody, Track, World, import,
     outside,
 };
-pub use session::{
+pub use relume_core::session::{
     Accuracy, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Frame,
     FrameReport, Grouping, Hash, Leaf, Log, LogError, Memory, Mesh, Open, Options, Oracle,
     PairCounts, Removed, RowSumError, Seconds, Sensor, Session, SessionError, Snapshot, Update,

@@ -11,8 +11,12 @@ const ROOMS: [&str; 9] =
     ["geometry", "scene", "element", "transport", "event", "pair", "solver", "session", "flat"];
 
 /// The crates from the ground up, with the names they have in source text.
-const CRATES: [(&str, &str); 3] =
-    [("relume", "relume"), ("relume-picture", "relume_picture"), ("relume-cli", "relume_cli")];
+const CRATES: [(&str, &str); 4] = [
+    ("relume-core", "relume_core"),
+    ("relume", "relume"),
+    ("relume-picture", "relume_picture"),
+    ("relume-cli", "relume_cli"),
+];
 
 /// The crate of references: it uses none of those above, and only their tests may use it.
 const JUDGE: (&str, &str) = ("relume-judge", "relume_judge");
@@ -116,7 +120,7 @@ fn crates_dir() -> PathBuf {
 
 #[test]
 fn each_room_uses_only_rooms_above_it() {
-    let src = crates_dir().join("relume/src");
+    let src = crates_dir().join("relume-core/src");
     let mut wrong = Vec::new();
     let mut rooms_seen = 0;
     for file in sources(&src) {

@@ -10,7 +10,7 @@ use super::ImportOptions;
 use super::document::Document;
 
 fn open(file: &str) -> Document {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/packed");
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../relume/tests/data/packed");
     Document::open(&folder.join(file), &ImportOptions::default()).unwrap()
 }
 

@@ -9,7 +9,7 @@
 //! ```
 //! use relume::{ImportOptions, Options, Session, import};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/box_room.glb");
+//! # let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/box_room.glb");
 //! let scene = import(file, &ImportOptions::default())?;
 //! let mut session = Session::new(scene, Options { tolerance: 0.1, ..Options::default() })?;
 //! for k in 0..3 {
@@ -63,20 +63,30 @@
 //! hidden: not part of the interface, and free to change.
 
 #[doc(hidden)]
-pub use relume_core::{element, event, geometry, pair, scene, session, solver, transport};
+pub use relume_core::{element, event, geometry, pair, session, solver, transport};
 
-pub use relume_core::flat;
+/// The plane: scenes that do not change along one direction, with that direction integrated out.
+pub mod flat {
+    pub use relume_core::flat::*;
+    pub use relume_io::flat::{SvgError, TextError, parse, parse_svg};
+}
+
+#[doc(hidden)]
+pub mod scene {
+    pub use relume_core::scene::*;
+    pub use relume_io::{ImportOptions, import};
+}
+
 pub use relume_core::geometry::Pose;
 pub use relume_core::glam;
 pub use relume_core::scene::{
-    Body, BodyId, Camera, Edits, Held, ImportOptions, Interpolation, Light, LightId, LightKind,
-    Material, MaterialId, NewBody, Note, Patch, PatchId, Projection, RotationTrack, Scene,
-    SceneBuilder, SceneError, Severity, Surface, SurfaceId, TakenBody, Track, World, import,
-    outside,
+    Body, BodyId, Camera, Edits, Held, Interpolation, Light, LightId, LightKind, Material,
+    MaterialId, NewBody, Note, Patch, PatchId, Projection, RotationTrack, Scene, SceneBuilder,
+    SceneError, Severity, Surface, SurfaceId, TakenBody, Track, World, outside,
 };
 pub use relume_core::session::{
     Accuracy, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Frame,
-    FrameReport, Grouping, Hash, Leaf, Log, LogError, Memory, Mesh, Open, Options, Oracle,
-    PairCounts, Removed, RowSumError, Seconds, Sensor, Session, SessionError, Snapshot, Update,
-    Watch,
+    FrameReport, Grouping, Hash, Leaf, Memory, Mesh, Open, Options, Oracle, PairCounts, Removed,
+    RowSumError, Seconds, Sensor, Session, SessionError, Snapshot, Update, Watch,
 };
+pub use relume_io::{ImportOptions, Log, LogError, import, read_environment};

@@ -4,7 +4,7 @@
 //! exchange has a closed form, occlusion included (Hottel's crossed strings). Pair tree, verdict
 //! bookkeeping, events, extrapolation, hash and solver are those of space: this room hands them another
 //! [`Hierarchy`](crate::pair::Hierarchy), another [`Judge`](crate::pair::Judge) and other
-//! [`Surfaces`](crate::solver::Surfaces), and knows nothing of glTF, polygons or pictures.
+//! [`Surfaces`](crate::solver::Surfaces), and knows nothing of files, polygons or pictures.
 //!
 //! All quantities are per metre of the direction that was integrated out: an "area" is a length, m2 for
 //! each metre of depth.
@@ -17,8 +17,6 @@ mod plane;
 mod scene;
 mod session;
 mod strings;
-mod svg;
-mod text;
 
 pub use forest::FlatForest;
 pub use judge::PlaneView;
@@ -26,5 +24,3 @@ pub use plane::{PlanePose, Segment};
 pub use scene::{Body, BodyIndex, FlatScene, Key, Material, Motion, SceneError, Wall, WallIndex};
 pub use session::{FlatElement, FlatLink, FlatOptions, FlatSession, OptionError};
 pub use strings::{Shaft, exchange, visible_exchange};
-pub use svg::{SvgError, parse_svg};
-pub use text::{TextError, parse};

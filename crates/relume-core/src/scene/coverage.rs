@@ -9,9 +9,12 @@ use super::pyramid::{BLOCK, Pyramid, Sums};
 
 /// What texture coordinates beyond the image mean, along one axis (glTF 2.0, sampler.wrapS).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Wrap {
+pub enum Wrap {
+    /// The image again.
     Repeat,
+    /// The image again, every second one mirrored.
     MirroredRepeat,
+    /// The texels at the edge.
     ClampToEdge,
 }
 
@@ -30,19 +33,21 @@ const FLAT: f64 = 1e-7;
 const POINT: f64 = 1e-4;
 
 /// An image under texture coordinates.
-pub(super) struct Cover<'a> {
-    pub(super) pyramid: &'a Pyramid,
-    pub(super) wrap: [Wrap; 2],
+pub struct Cover<'a> {
+    /// The image.
+    pub pyramid: &'a Pyramid,
+    /// What texture coordinates beyond it mean, along its width and height.
+    pub wrap: [Wrap; 2],
     /// Blocks smaller than the extent of a polygon by this factor are not cut any further: they count with their
     /// mean, in proportion to what the polygon covers of them, so that sums over polygons that tile stay exact.
-    pub(super) resolution: f64,
+    pub resolution: f64,
 }
 
 impl Cover<'_> {
     /// The mean over a triangle of texture coordinates; where they lie on a line or in a point, over what the
     /// triangle has of it (up to 4096 points, nearest texels). Exact up to rounding where the triangle is less than
     /// `resolution` texels across.
-    pub(super) fn mean(&self, triangle: [DVec2; 3]) -> Sums {
+    pub fn mean(&self, triangle: [DVec2; 3]) -> Sums {
         let corners = triangle.map(|p| self.texels(p));
         let piece = Piece::of(&corners);
         let extent = piece.extent();
@@ -57,7 +62,7 @@ impl Cover<'_> {
     }
 
     /// Area in texels and integral over a convex polygon of texture coordinates that has an area.
-    pub(super) fn integral(&self, polygon: &[DVec2]) -> (f64, Sums) {
+    pub fn integral(&self, polygon: &[DVec2]) -> (f64, Sums) {
         let corners: Vec<DVec2> = polygon.iter().map(|&p| self.texels(p)).collect();
         let mut all = (0.0, [0.0; 5]);
         for k in 1..corners.len().max(1) - 1 {
@@ -121,7 +126,7 @@ impl Cover<'_> {
 }
 
 /// Barycentric weights of the middles of the n x n triangles that a triangle is cut into.
-pub(super) fn for_each_third(n: usize, mut each: impl FnMut([f64; 3])) {
+pub fn for_each_third(n: usize, mut each: impl FnMut([f64; 3])) {
     let third = 1.0 / (3.0 * n as f64);
     for i in 0..n {
         for j in 0..n - i {

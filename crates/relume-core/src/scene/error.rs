@@ -146,27 +146,6 @@ pub enum SceneError {
     },
 }
 
-impl SceneError {
-    /// An error if something of a file needs more bytes, by itself, than are allowed.
-    pub(super) fn unless_fits(
-        file: &str,
-        what: impl std::fmt::Display,
-        needs_bytes: u64,
-        limit_bytes: Option<u64>,
-    ) -> Result<(), SceneError> {
-        match limit_bytes {
-            Some(limit_bytes) if needs_bytes > limit_bytes => Err(SceneError::TooLarge {
-                file: file.to_owned(),
-                what: what.to_string(),
-                needs_bytes,
-                limit_bytes,
-                remedy: "raise --max-memory, or make the file smaller".into(),
-            }),
-            _ => Ok(()),
-        }
-    }
-}
-
 fn at(line: usize) -> String {
     if line == 0 { String::new() } else { format!(", line {line}") }
 }

@@ -8,11 +8,11 @@ use super::Frame;
 
 /// Largest share of a polygon's extent by which a corner may leave its plane or a straight side:
 /// above the rounding of 32-bit coordinates, far below any angle that is modelled on purpose.
-pub(super) const FLATNESS: f64 = 1e-5;
+pub const FLATNESS: f64 = 1e-5;
 
 /// Why a loop of points is not a convex polygon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Flaw {
+pub enum Flaw {
     /// No area relative to its extent.
     Degenerate,
     /// Corners off the plane.
@@ -23,7 +23,7 @@ pub(super) enum Flaw {
 
 /// The frame and corners of a loop, counter-clockwise seen from the front, relative tolerance
 /// [`FLATNESS`]; doubled and collinear corners are removed.
-pub(super) fn flatten(points: &[DVec3]) -> Result<(Frame, Vec<DVec2>), Flaw> {
+pub fn flatten(points: &[DVec3]) -> Result<(Frame, Vec<DVec2>), Flaw> {
     let frame = frame_of(points).ok_or(Flaw::Degenerate)?;
     let extent = extent_of(points);
     if points.iter().any(|&p| (p - frame.origin).dot(frame.normal).abs() > FLATNESS * extent) {
@@ -42,13 +42,13 @@ pub(super) fn flatten(points: &[DVec3]) -> Result<(Frame, Vec<DVec2>), Flaw> {
 }
 
 /// The same polygon seen from behind, with exactly the same points.
-pub(super) fn seen_from_behind(frame: &Frame, corners: &[DVec2]) -> (Frame, Vec<DVec2>) {
+pub fn seen_from_behind(frame: &Frame, corners: &[DVec2]) -> (Frame, Vec<DVec2>) {
     let behind = Frame { origin: frame.origin, u: frame.v, v: frame.u, normal: -frame.normal };
     (behind, corners.iter().rev().map(|c| DVec2::new(c.y, c.x)).collect())
 }
 
 /// Newell's vector: twice the area times the normal. Exact up to rounding for planar loops.
-pub(super) fn area_vector(points: &[DVec3]) -> DVec3 {
+pub fn area_vector(points: &[DVec3]) -> DVec3 {
     let o = points[0];
     (1..points.len() - 1).map(|i| (points[i] - o).cross(points[i + 1] - o)).sum()
 }

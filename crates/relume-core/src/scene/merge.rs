@@ -8,13 +8,13 @@ use glam::DVec3;
 use super::flatten::{FLATNESS, area_vector, flatten};
 
 /// The polygons of a triangle mesh, and how many triangles had no area.
-pub(super) struct Merged {
+pub struct Merged {
     /// Convex loops, counter-clockwise from the front, in the order of their first triangles.
-    pub(super) polygons: Vec<Vec<DVec3>>,
+    pub polygons: Vec<Vec<DVec3>>,
     /// The polygon that each triangle is in; `None` for those left out.
-    pub(super) polygon_of: Vec<Option<u32>>,
+    pub polygon_of: Vec<Option<u32>>,
     /// Triangles left out because they have no area relative to their longest side.
-    pub(super) degenerate: usize,
+    pub degenerate: usize,
 }
 
 /// Merges the triangles (indices into `points`, counter-clockwise from the front).
@@ -23,13 +23,13 @@ pub(super) struct Merged {
 /// coplanar region with a convex outline becomes one polygon; any other is cut into convex ones by
 /// removing the longest sides first (Hertel and Mehlhorn 1983: at most four times the fewest).
 /// O(n log n).
-pub(super) fn merge(points: &[DVec3], triangles: &[[u32; 3]]) -> Merged {
+pub fn merge(points: &[DVec3], triangles: &[[u32; 3]]) -> Merged {
     merge_alike(points, triangles, &|_, _| true)
 }
 
 /// Merges only triangles that are alike: `alike(a, b)` of two of their numbers, of which the first is the larger one that
 /// a region grows from.
-pub(super) fn merge_alike(
+pub fn merge_alike(
     points: &[DVec3],
     triangles: &[[u32; 3]],
     alike: &dyn Fn(usize, usize) -> bool,

@@ -1,8 +1,8 @@
 //! What is lit: bodies, patches, materials, lights, cameras and their motion.
 //!
 //! A [`Scene`] is validated when it is made and immutable afterwards; every pose is a pure
-//! function of time. This room reads files and nothing else does. It must not know elements,
-//! pairs or light transport.
+//! function of time. Scenes are built in code ([`SceneBuilder`]) or from what a reader of files hands over
+//! ([`draft::Draft`]). This room must not know files, elements, pairs or light transport.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -15,38 +15,34 @@ mod assemble;
 mod builder;
 mod check;
 mod connected;
-mod coverage;
+pub mod coverage;
 mod covered;
 mod dark;
 mod discontinuity;
-mod draft;
+pub mod draft;
 mod drift;
 mod edit;
 mod edited;
 mod error;
-mod flatten;
-mod folder;
+pub mod flatten;
 mod glow;
-mod import;
 mod in_plane;
 mod insert;
 mod inside;
 mod join;
 mod lamp;
 pub mod limits;
-mod merge;
-mod mesh_file;
+pub mod merge;
 mod motion;
-mod names;
+pub mod names;
 pub mod outside;
-mod print;
-mod pyramid;
+pub mod print;
+pub mod pyramid;
 mod rigid;
 mod shell;
 mod solid;
 mod tint;
 mod topology;
-mod view3d;
 mod weld;
 mod world;
 
@@ -60,12 +56,12 @@ pub use edited::Edited;
 pub(crate) use edited::FIRST_NAME;
 pub use error::SceneError;
 pub use glow::Glow;
-pub use import::{ImportOptions, import};
 pub use in_plane::{InPlane, Sheet};
 pub use insert::{NewBody, TakenBody};
 pub use join::{Joined, Part};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
 pub use print::{Print, Printed};
+pub use rigid::check_track;
 pub use solid::{Enclosure, Solid, SolidEdge, SolidFace, Solids};
 pub use tint::Tint;
 pub use world::{Held, World};
@@ -171,7 +167,7 @@ pub struct Patch {
     pub material: MaterialId,
     /// Where its reflectance or emission differ from the material's, what they are.
     pub tint: Option<TintId>,
-    /// Images that vary over it, if they were kept for pictures ([`ImportOptions::pictures`]).
+    /// Images that vary over it, if they were kept for pictures.
     pub print: Option<Arc<Print>>,
     /// Its plane's frame in the body's frame.
     pub frame: Frame,

@@ -6,7 +6,7 @@ use super::{Note, Severity};
 
 /// Gives out names that have not been given out before.
 #[derive(Default)]
-pub(super) struct Names {
+pub struct Names {
     taken: BTreeSet<String>,
     /// For each name that was wanted again the number to try next.
     next: BTreeMap<String, u32>,
@@ -15,7 +15,7 @@ pub(super) struct Names {
 
 impl Names {
     /// `wanted`, or `wanted` with the first free number behind it.
-    pub(super) fn unique(&mut self, wanted: &str) -> String {
+    pub fn unique(&mut self, wanted: &str) -> String {
         if self.taken.insert(wanted.to_owned()) {
             return wanted.to_owned();
         }
@@ -33,7 +33,7 @@ impl Names {
     }
 
     /// One note for each name that was wanted more than once; `kind` is what is named.
-    pub(super) fn notes(&self, kind: &str) -> Vec<Note> {
+    pub fn notes(&self, kind: &str) -> Vec<Note> {
         let mut notes: Vec<Note> = Vec::new();
         let mut note_of: BTreeMap<&str, usize> = BTreeMap::new();
         for (wanted, name) in &self.renamed {

@@ -13,29 +13,33 @@ use super::pyramid::{Pyramid, Sums};
 #[derive(Clone, Debug)]
 pub struct Print {
     /// What the base colour is multiplied with, linear RGB.
-    pub(super) factor: [f64; 3],
-    pub(super) base: Option<Sheet>,
-    pub(super) emission: Option<Sheet>,
+    pub factor: [f64; 3],
+    /// The image of the base colour.
+    pub base: Option<Sheet>,
+    /// The image of the emission, as a share of the exitance.
+    pub emission: Option<Sheet>,
     /// The triangles of the mesh that the patch, and perhaps others beside it, was merged from.
-    pub(super) triangles: Vec<PrintedTriangle>,
+    pub triangles: Vec<PrintedTriangle>,
 }
 
 /// An image as it is laid on triangles.
 #[derive(Clone, Debug)]
-pub(super) struct Sheet {
-    pub(super) pyramid: Arc<Pyramid>,
-    pub(super) wrap: [Wrap; 2],
+pub struct Sheet {
+    /// The image.
+    pub pyramid: Arc<Pyramid>,
+    /// What texture coordinates beyond it mean, along its width and height.
+    pub wrap: [Wrap; 2],
 }
 
 /// A triangle of a mesh.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PrintedTriangle {
+pub struct PrintedTriangle {
     /// In the frame of the body, metres.
-    pub(super) corners: [DVec3; 3],
+    pub corners: [DVec3; 3],
     /// Texture coordinates of base colour and emission.
-    pub(super) places: [[DVec2; 3]; 2],
+    pub places: [[DVec2; 3]; 2],
     /// Colours of the vertices, linear RGB.
-    pub(super) colours: [[f64; 3]; 3],
+    pub colours: [[f64; 3]; 3],
 }
 
 /// What is at one place of a patch.

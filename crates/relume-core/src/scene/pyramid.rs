@@ -4,19 +4,19 @@
 
 /// What is summed over an image: red, green and blue in linear light, how much of it is there, and the square of the
 /// mean of the three colours; all of texels that are there.
-pub(super) type Sums = [f64; 5];
+pub type Sums = [f64; 5];
 
 /// Texels along a side of the smallest blocks whose means are kept.
-pub(super) const BLOCK: usize = 4;
+pub const BLOCK: usize = 4;
 
 /// Bytes that each pixel of an image needs while it is kept; its means need less than what it was decoded to.
-pub(super) const BYTES_A_PIXEL: u64 = 4;
+pub const BYTES_A_PIXEL: u64 = 4;
 
 /// Texels of an image, and means of square blocks of 4, 8, 16 ... of them up to the whole.
 #[derive(Debug)]
-pub(super) struct Pyramid {
+pub struct Pyramid {
     /// Width and height, texels.
-    pub(super) size: [usize; 2],
+    pub size: [usize; 2],
     /// Rows from the top: sRGB colour and alpha, four bytes a texel.
     texels: Vec<u8>,
     /// Texels of less alpha are not there.
@@ -34,7 +34,7 @@ struct Level {
 
 impl Pyramid {
     /// `None` for an image without pixels. `rgba` holds `size[0]` x `size[1]` texels by rows.
-    pub(super) fn new(size: [usize; 2], texels: Vec<u8>, least_alpha: u16) -> Option<Pyramid> {
+    pub fn new(size: [usize; 2], texels: Vec<u8>, least_alpha: u16) -> Option<Pyramid> {
         if texels.is_empty() || texels.len() != 4 * size[0] * size[1] {
             return None;
         }
@@ -94,7 +94,7 @@ impl Pyramid {
     }
 
     /// One texel.
-    pub(super) fn texel(&self, x: usize, y: usize) -> Sums {
+    pub fn texel(&self, x: usize, y: usize) -> Sums {
         let at = 4 * (y * self.size[0] + x);
         let texel = &self.texels[at..at + 4];
         let (r, g, b, alpha) = (texel[0], texel[1], texel[2], texel[3]);
@@ -107,28 +107,28 @@ impl Pyramid {
     }
 
     /// The mean over a block of [`BLOCK`] x 2^level texels a side.
-    pub(super) fn block(&self, level: usize, i: usize, j: usize) -> Sums {
+    pub fn block(&self, level: usize, i: usize, j: usize) -> Sums {
         let level = &self.levels[level];
         level.means[j * level.size[0] + i].map(f64::from)
     }
 
     /// The number of the last level, whose one block is the whole image.
-    pub(super) fn top(&self) -> usize {
+    pub fn top(&self) -> usize {
         self.levels.len() - 1
     }
 
     /// How many blocks a level has along each axis.
-    pub(super) fn blocks(&self, level: usize) -> [usize; 2] {
+    pub fn blocks(&self, level: usize) -> [usize; 2] {
         self.levels[level].size
     }
 
     /// The mean over the whole image.
-    pub(super) fn mean(&self) -> Sums {
+    pub fn mean(&self) -> Sums {
         self.block(self.top(), 0, 0)
     }
 
     /// Bytes that it holds, about.
-    pub(super) fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         self.texels.len() * 3 / 2
     }
 }

@@ -259,8 +259,9 @@ fn checked_presence(node: &DraftNode) -> Result<Vec<(f64, bool)>, SceneError> {
     Ok(node.presence.clone())
 }
 
-/// Key times must be finite, not negative, strictly ascending, and match the values.
-pub(super) fn check_track(
+/// An error unless key times are finite, not negative, strictly ascending, and as many as the values allow (three for each
+/// key of a cubic spline).
+pub fn check_track(
     of: &str,
     times_s: &[f64],
     values: usize,

@@ -1,10 +1,8 @@
-//! Pictures of all directions: equirectangular, linear radiance (Radiance .hdr, OpenEXR).
+//! Pictures of all directions: equirectangular, linear radiance.
 //!
-//! The middle of the picture is north (-Z), its right half east (+X), its top the zenith (+Y). Must not know facets.
+//! The middle of the picture is north (-Z), its right half east (+X), its top the zenith (+Y). Must not know facets or files.
 
 use std::f64::consts::PI;
-use std::io::Cursor;
-use std::path::Path;
 
 use glam::DVec3;
 
@@ -27,9 +25,6 @@ impl std::fmt::Debug for Environment {
         write!(f, "Environment({}, {} x {})", self.name, self.width, self.height)
     }
 }
-
-/// Bytes that decoding takes for each pixel at most: as decoded, and as kept.
-const BYTES_PER_PIXEL: u64 = 16 + 12;
 
 impl Environment {
     /// Of pixels, row by row from the top: W/m2/sr, linear RGB.
@@ -57,54 +52,6 @@ impl Environment {
             return Err(fails(what, "write finite radiances of 0 or more"));
         }
         Ok(Environment { name: name.to_owned(), width, height, pixels, turned: [0.0, 1.0] })
-    }
-
-    /// Reads a .hdr or .exr file; `max_memory_bytes` as for scenes.
-    ///
-    /// # Errors
-    /// A file that is missing, damaged, too large, or something else.
-    pub fn read(path: &Path, max_memory_bytes: Option<u64>) -> Result<Environment, SceneError> {
-        let file = path.display().to_string();
-        let unreadable = |source| SceneError::Read {
-            file: file.clone(),
-            source,
-            remedy: "check its path and that it may be read".into(),
-        };
-        let too_large = |what: &str, needs_bytes| SceneError::TooLarge {
-            file: file.clone(),
-            what: what.into(),
-            needs_bytes,
-            limit_bytes: max_memory_bytes.unwrap_or(u64::MAX),
-            remedy: "raise --max-memory, or use a smaller picture".into(),
-        };
-        let damaged = |what: String| SceneError::Geometry {
-            subject: format!("environment `{file}`"),
-            what,
-            remedy: "give an equirectangular picture of radiance, .hdr or .exr".into(),
-        };
-        let limit = max_memory_bytes.unwrap_or(u64::MAX);
-        let len = std::fs::metadata(path).map_err(unreadable)?.len();
-        if len > limit {
-            return Err(too_large("the file", len));
-        }
-        let bytes = std::fs::read(path).map_err(unreadable)?;
-        let format = match bytes.get(..4) {
-            Some(b"#?RA" | b"#?RG") => image::ImageFormat::Hdr,
-            Some([0x76, 0x2f, 0x31, 0x01]) => image::ImageFormat::OpenExr,
-            _ => return Err(damaged("it is neither Radiance's .hdr nor OpenEXR".into())),
-        };
-        let reader = || image::ImageReader::with_format(Cursor::new(&bytes), format);
-        let said = |e: image::ImageError| damaged(format!("the picture cannot be decoded: {e}"));
-        let (width, height) = reader().into_dimensions().map_err(said)?;
-        let needs = u64::from(width) * u64::from(height) * BYTES_PER_PIXEL + len;
-        // Without a limit, as much as the largest pictures that are sold.
-        if needs > limit.min(PICTURE_MAX_BYTES) {
-            return Err(too_large(&format!("the picture of {width} x {height}"), needs));
-        }
-        let decoded = reader().decode().map_err(said)?.into_rgb32f();
-        let pixel = |p: &image::Rgb<f32>| p.0.map(|c| if c.is_nan() { 0.0 } else { c.max(0.0) });
-        let pixels = decoded.pixels().map(pixel).collect();
-        Environment::new(&file, (width, height), pixels)
     }
 
     /// The same turned about the vertical, counter-clockwise seen from above, degrees.
@@ -140,6 +87,3 @@ impl Environment {
         self.pixels[y as usize * self.width as usize + x as usize].map(f64::from)
     }
 }
-
-/// Bytes that a picture may take where no limit is given: 32,768 x 16,384 pixels.
-const PICTURE_MAX_BYTES: u64 = 16 << 30;

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use relume_picture::export::WholeFile;
+use relume::export::WholeFile;
 
 use crate::failure::Failure;
 use crate::interrupt;

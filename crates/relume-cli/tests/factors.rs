@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use crate::common::{json, relume, text};
 use glam::{DQuat, DVec3};
+use relume::export::write_glb;
 use relume::scene::{Interpolation, Scene, SceneBuilder, Track};
-use relume_picture::export::write_glb;
 use tempfile::TempDir;
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {

@@ -1,4 +1,4 @@
-//! Files of Relume: scenes, environments and logs of commands in.
+//! Files of Relume: scenes, environments and logs of commands in; scenes, tables and logs out.
 //!
 //! Readers hand a [`Draft`](relume_core::scene::draft::Draft) to the engine, which checks it. Programs use the crate `relume`,
 //! which re-exports all of this. Must not know how anything is solved or shown.
@@ -7,6 +7,7 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods, clippy::disallowed_types))]
 
 mod environment;
+pub mod export;
 pub mod flat;
 mod folder;
 mod gltf;

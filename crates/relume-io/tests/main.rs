@@ -3,4 +3,5 @@
 //! `cargo test -p relume-io --test tests NAME::` runs one module.
 
 mod environment;
+mod glb;
 mod import;

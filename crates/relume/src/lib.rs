@@ -65,6 +65,8 @@
 #[doc(hidden)]
 pub use relume_core::{element, event, geometry, pair, session, solver, transport};
 
+pub use relume_io::export;
+
 /// The plane: scenes that do not change along one direction, with that direction integrated out.
 pub mod flat {
     pub use relume_core::flat::*;

@@ -5,8 +5,8 @@
 
 use std::fmt::Write;
 
-use relume::scene::Scene;
-use relume::session::{Factors, Grouping};
+use relume_core::scene::Scene;
+use relume_core::session::{Factors, Grouping};
 
 /// Length of View3D's first line without its end.
 const HEADING: usize = 30;

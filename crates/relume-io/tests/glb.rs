@@ -3,11 +3,11 @@
 use std::f64::consts::PI;
 
 use glam::{DQuat, DVec3};
-use relume::scene::{
-    BodyId, ImportOptions, Interpolation, LightKind, Patch, Projection, RotationTrack, Scene,
-    SceneBuilder, Track, import,
+use relume_core::scene::{
+    BodyId, Interpolation, LightKind, Patch, Projection, RotationTrack, Scene, SceneBuilder, Track,
 };
-use relume_picture::export::{glb, write_glb};
+use relume_io::export::{glb, write_glb};
+use relume_io::{ImportOptions, import};
 use serde_json::Value;
 
 /// A bit of everything: nested nodes, two materials on one object, weak and strong emission, motion

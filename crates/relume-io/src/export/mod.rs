@@ -1,6 +1,6 @@
 //! Scenes, solutions and tables as files that other programs read.
 //!
-//! Every file appears whole or not at all.
+//! Every file appears whole or not at all. Must not know pictures.
 
 mod factors;
 mod file;

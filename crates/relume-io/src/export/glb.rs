@@ -10,8 +10,8 @@ use std::io;
 use std::path::Path;
 
 use glam::{DMat3, DQuat, DVec3};
-use relume::geometry::Pose;
-use relume::scene::{
+use relume_core::geometry::Pose;
+use relume_core::scene::{
     BodyId, Glow, Interpolation, Light, LightKind, Material, Node, NodeId, Patch, Projection,
     Scene, SurfaceId, Track,
 };

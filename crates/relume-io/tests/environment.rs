@@ -1,5 +1,8 @@
 //! Environments from files: what their pixels become, and what is said of bad ones.
 
+// Tests may use whatever the platform offers.
+#![allow(clippy::disallowed_methods)]
+
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;

@@ -63,7 +63,7 @@
 //! hidden: not part of the interface, and free to change.
 
 #[doc(hidden)]
-pub use relume_core::{element, event, geometry, pair, session, solver, transport};
+pub use relume_core::{element, pair, session};
 
 pub use relume_io::export;
 

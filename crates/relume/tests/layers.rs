@@ -14,8 +14,8 @@ const ROOMS: [&str; 9] =
 const CRATES: [(&str, &str); 5] = [
     ("relume-core", "relume_core"),
     ("relume-io", "relume_io"),
-    ("relume", "relume"),
     ("relume-picture", "relume_picture"),
+    ("relume", "relume"),
     ("relume-cli", "relume_cli"),
 ];
 

@@ -22,7 +22,7 @@ use super::{
 ///
 /// ```
 /// use glam::{DQuat, DVec3};
-/// use relume::scene::SceneBuilder;
+/// use relume_core::scene::SceneBuilder;
 ///
 /// let mut b = SceneBuilder::new("furnace");
 /// let wall = b.material("wall", [0.5; 3], [1.0; 3]);
@@ -30,7 +30,7 @@ use super::{
 /// b.cuboid_inward(room, "walls", wall, DVec3::ZERO, DVec3::ONE);
 /// let scene = b.build()?;
 /// assert_eq!(scene.patches.len(), 6);
-/// # Ok::<(), relume::scene::SceneError>(())
+/// # Ok::<(), relume_core::scene::SceneError>(())
 /// ```
 pub struct SceneBuilder {
     draft: Draft,

@@ -130,6 +130,30 @@ pub(crate) enum Command {
     /// Those of the plane are drawn by `relume flat figure`.
     #[command(after_help = "Example:  relume figure 0.5 -o docs/figures")]
     Figure(FigureArgs),
+    /// Print what makes a shell complete the names of commands, options and files.
+    #[command(
+        after_help = "Example:  relume completions bash > ~/.local/share/bash-completion/completions/relume"
+    )]
+    Completions(CompletionsArgs),
+    /// Write manual pages: relume.1 and one for each command, relume-render.1 ...
+    #[command(after_help = "Example:  relume man ~/.local/share/man/man1")]
+    Man(ManArgs),
+}
+
+/// `relume completions`
+#[derive(Debug, Args)]
+pub(crate) struct CompletionsArgs {
+    /// Which shell.
+    #[arg(value_enum)]
+    pub(crate) shell: clap_complete::Shell,
+}
+
+/// `relume man`
+#[derive(Debug, Args)]
+pub(crate) struct ManArgs {
+    /// Directory for the pages; made if missing.
+    #[arg(value_name = "DIR")]
+    pub(crate) directory: PathBuf,
 }
 
 /// `relume figure`

@@ -6,8 +6,8 @@
 
 use std::path::Path;
 
+use relume::export::{probe, write_atomically};
 use relume::session::Session;
-use relume_picture::export::{probe, write_atomically};
 use relume_picture::picture::{self, Exposure};
 
 use crate::args::{BenchArgs, ExposureFlag, MeasureFlags, PictureFlags, UpdateChoice, UpdateFlag};

@@ -4,9 +4,9 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use rayon::prelude::*;
+use relume::export::{self, Npz, WholeFile, probe, write_atomically};
 use relume::scene::Scene;
 use relume::session::{self, Closure, Factors, FrameReport, Grouping, PartFactors};
-use relume_picture::export::{self, Npz, WholeFile, probe, write_atomically};
 use serde::Serialize;
 
 use crate::args::{By, ClosureFlag, FactorFormat, FactorsArgs};

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use relume_picture::export::settle_unfinished;
+use relume::export::settle_unfinished;
 
 use crate::failure::Failure;
 use crate::output;

@@ -32,6 +32,7 @@ mod run;
 mod scene_file;
 mod sensors;
 mod sequence;
+mod shell;
 mod size;
 mod strategies;
 mod verify;
@@ -71,5 +72,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Solve(args) => interrupt::listen().and_then(|()| run::solve(args)),
         Command::Render(args) => interrupt::listen().and_then(|()| run::render(args)),
         Command::Demo(args) => interrupt::listen().and_then(|()| run::demo(args)),
+        Command::Completions(args) => shell::completions(&args),
+        Command::Man(args) => shell::man(&args),
     }
 }

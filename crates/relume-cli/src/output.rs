@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use relume_picture::export::WholeFile;
+use relume::export::WholeFile;
 
 use crate::failure::Failure;
 use crate::interrupt;
@@ -65,7 +65,8 @@ fn cut(text: &str, most: usize) -> String {
     }
 }
 
-fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
+/// Prints bytes as they are.
+pub(crate) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {

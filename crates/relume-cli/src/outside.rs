@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use clap::Args;
 use relume::scene::Scene;
-use relume::scene::outside::{Day, Environment, Outside, SUN_DIAMETER_DEG, Sky, Sun, SunPlace};
+use relume::scene::outside::{Day, Outside, SUN_DIAMETER_DEG, Sky, Sun, SunPlace};
 
 use crate::failure::Failure;
 use crate::memory;
@@ -122,7 +122,7 @@ impl OutsideFlags {
         }
         let environment = self.environment.as_ref().map(|path| {
             memory::at(format_args!("reading {}", path.display()));
-            let read = Environment::read(path, memory::limit_bytes());
+            let read = relume::read_environment(path, memory::limit_bytes());
             let turned = self.environment_turn.unwrap_or(0.0);
             read.map(|e| Sky::Environment(Arc::new(e.turned(turned)))).map_err(scene_file::failure)
         });

@@ -6,10 +6,10 @@ use std::path::Path;
 
 use glam::DVec3;
 use relume::element::ElementId;
+use relume::export::write_atomically;
 use relume::scene::{BodyId, Scene};
 use relume::session::Session;
 use relume_picture::drawing::{Drawing, Pen};
-use relume_picture::export::write_atomically;
 use relume_picture::picture::{self, Exposure, Outlines, View, Viewpoint};
 
 use crate::args::{DemoScene, Figure, FigureArgs, PictureFlags, Size, UpdateChoice, UpdateFlag};

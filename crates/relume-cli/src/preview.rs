@@ -6,8 +6,8 @@ use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use relume::export::write_atomically;
 use relume::scene::Scene;
-use relume_picture::export::write_atomically;
 use relume_picture::picture::{Exposure, Settings, Sketch, View};
 
 use crate::args::{ExposureFlag, PictureFlags, Shading};

@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use relume::export::write_atomically;
 use relume::scene::Scene;
 use relume::session::FrameReport;
-use relume_picture::export::write_atomically;
 use serde::{Deserialize, Serialize, Serializer};
 use serde_json::value::RawValue;
 

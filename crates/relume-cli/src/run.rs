@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
+use relume::export::{probe, write_atomically, write_glb};
 use relume::scene::{BodyId, Light, MaterialId, Scene};
 use relume::session::{Energy, Options, Session, SessionError, Snapshot};
-use relume_picture::export::{probe, write_atomically, write_glb};
 use relume_picture::picture::{self, Exposure};
 
 use crate::accuracy::Estimates;

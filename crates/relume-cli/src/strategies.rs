@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
+use relume::export::write_atomically;
 use relume::session::{missed, radiosity_error};
-use relume_picture::export::write_atomically;
 use serde::Serialize;
 
 use crate::args::{UpdateChoice, UpdateFlag};

@@ -7,8 +7,8 @@ use std::path::Path;
 
 use crate::common::{json, relume, room, text};
 use glam::{DQuat, DVec3};
+use relume::export::write_glb;
 use relume::scene::SceneBuilder;
-use relume_picture::export::write_glb;
 use serde_json::Value;
 
 fn frames_of(report: &Value) -> Vec<u64> {

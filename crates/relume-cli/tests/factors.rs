@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use crate::common::{json, relume, text};
 use glam::{DQuat, DVec3};
+use relume::export::write_glb;
 use relume::scene::{Interpolation, Scene, SceneBuilder, Track};
-use relume_picture::export::write_glb;
 use tempfile::TempDir;
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
@@ -177,7 +177,7 @@ fn closures_make_rows_sum_to_one_in_a_closed_scene_only() {
 #[test]
 fn sides_of_double_sided_surfaces_are_told_apart() {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../relume/tests/data/satellite_rotating_arrays.glb");
+        .join("../relume-core/tests/data/satellite_rotating_arrays.glb");
     let by = |by: &str| {
         let all = ["factors", text(&scene), "--by", by, "--frames", "0", "--tolerance", "0.1"];
         table(&relume(&all).succeeds().out)

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use crate::common::{json, relume, text};
 use glam::{DQuat, DVec3};
+use relume::export::write_glb;
 use relume::scene::SceneBuilder;
-use relume_picture::export::write_glb;
 use relume_picture::picture::is_whole_png;
 
 /// A dark room with a crate in it, of which nothing emits, in a file.

@@ -218,7 +218,7 @@ fn render_of(scene: &Path, options: &[&'static str]) -> Task {
 }
 
 fn data(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../relume/tests/data").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../relume-core/tests/data").join(name)
 }
 
 const SMALL: [&str; 6] = ["--tolerance", "0.1", "--size", "96x72", "--frames", "0-11"];

@@ -14,5 +14,6 @@ mod pictures;
 mod probe;
 mod readme;
 mod replay;
+mod shell;
 mod strategies;
 mod verify;

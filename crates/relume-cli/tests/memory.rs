@@ -8,8 +8,8 @@ use std::process::Command;
 
 use crate::common::{Ran, json, relume, room, text};
 use glam::{DQuat, DVec3};
+use relume::export::write_glb;
 use relume::scene::{NodeId, SceneBuilder};
-use relume_picture::export::write_glb;
 use tempfile::TempDir;
 
 const MIB: u64 = 1 << 20;

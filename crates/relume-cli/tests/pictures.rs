@@ -99,7 +99,7 @@ fn part_matches_whole(how: &[&str]) {
 fn any_number_of_threads_gives_the_same_pictures_and_links() {
     let scene = concat!(
         env!("CARGO_MANIFEST_DIR"),
-        "/../relume/tests/data/cornell_moving_box_and_lamp.glb"
+        "/../relume-core/tests/data/cornell_moving_box_and_lamp.glb"
     );
     let dir = tempfile::tempdir().unwrap();
     let run = |threads: &str| {

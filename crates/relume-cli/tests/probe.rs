@@ -7,7 +7,7 @@ use crate::common::{relume, room, text};
 
 /// A scene or reference that the engine's tests hold.
 fn shipped(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../relume/tests/data").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../relume-core/tests/data").join(name)
 }
 
 /// The rows of a table, with its heading taken off and compared.

@@ -8,8 +8,8 @@
 use std::path::Path;
 
 use glam::{DQuat, DVec3};
-use relume::scene::{Interpolation, MaterialId, NodeId, SceneBuilder, Track};
-use relume_picture::export::write_glb;
+use relume_core::scene::{Interpolation, MaterialId, NodeId, SceneBuilder, Track};
+use relume_io::export::write_glb;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "sliding_box.glb".into());

@@ -1,7 +1,6 @@
-//! Pictures and exports of Relume solutions: a snapshot in, pixels and files out.
+//! Pictures of Relume solutions: a snapshot in, pixels out.
 //!
 //! Nothing here is ever written back into the solution.
 
 pub mod drawing;
-pub mod export;
 pub mod picture;

@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use glam::DVec3;
-use relume::scene::{BodyId, Scene};
+use relume_core::scene::{BodyId, Scene};
 use relume_picture::picture::{Exposure, Overview, Settings, Shading, Tone, View, render};
 
 /// Shares of the picture that show fronts, backs and nothing, the nearest counting: found by

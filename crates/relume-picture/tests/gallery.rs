@@ -20,7 +20,7 @@ fn gallery() {
     ];
     for (name, without) in rooms {
         let mut scene = room(&without);
-        let white = scene.patches.last().map(|_| relume::scene::MaterialId(0)).unwrap();
+        let white = scene.patches.last().map(|_| relume_core::scene::MaterialId(0)).unwrap();
         solid(&mut scene, block.0, block.1, white);
         let snapshot =
             snapshot(&scene, |_, size, level| level < 4 || (level < 6 && size > 0.16), lit(block));

@@ -1,8 +1,7 @@
-//! The integration tests of pictures, lit glTF and written frames, one binary.
+//! The integration tests of pictures, one binary.
 
 mod automatic_views;
 mod common;
 mod gallery;
-mod glb;
 mod pictures;
 mod sky;

@@ -2,8 +2,8 @@
 
 use crate::common::*;
 use glam::{DQuat, DVec2, DVec3};
-use relume::scene::{BodyId, Held, Projection};
-use relume::session::Snapshot;
+use relume_core::scene::{BodyId, Held, Projection};
+use relume_core::session::Snapshot;
 use relume_picture::picture::{
     Exposure, Image, Metered, Settings, Shading, Tone, View, Viewpoint, render,
 };
@@ -228,7 +228,7 @@ fn exposure_stops_at_what_the_solution_tells() {
     let view = View::look_at(v(2.0, 1.5, 4.9), v(2.0, 0.0, 0.0), 0.8);
     let metered = |radiosity: f32| {
         let dim = snapshot(&scene, uneven, |_, _, _| [radiosity; 3]);
-        let dim = relume::session::Snapshot { error_w_m2: 0.01, ..dim };
+        let dim = relume_core::session::Snapshot { error_w_m2: 0.01, ..dim };
         Exposure::metered(&dim, &view)
     };
     let scale = |m: Metered| match m.exposure {
@@ -282,7 +282,7 @@ fn a_rotated_camera_looks_where_it_points() {
     let quarter = DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2);
     let node = node(&mut scene, DVec3::ZERO, quarter);
     let projection = Projection::Perspective { yfov: 1.0, aspect: None };
-    scene.cameras.push(relume::scene::Camera { name: "side".into(), node, projection });
+    scene.cameras.push(relume_core::scene::Camera { name: "side".into(), node, projection });
     let view = Viewpoint::new(&scene, None).unwrap().at(&scene, 0.0).unwrap();
     let pixel = view.project(v(-3.0, 0.0, 0.0), 640, 480).unwrap();
     assert!(pixel.distance(DVec2::new(320.0, 240.0)) < 1e-9);

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
-use relume::scene::outside::{Outside, Sky, Sun, SunPlace};
-use relume::scene::{Scene, SceneBuilder};
-use relume::session::{Options, Session};
+use relume_core::scene::outside::{Outside, Sky, Sun, SunPlace};
+use relume_core::scene::{Scene, SceneBuilder};
+use relume_core::session::{Options, Session};
 use relume_picture::picture::{Exposure, Image, Settings, Tone, View, render};
 
 fn block() -> Scene {

@@ -9,7 +9,7 @@
 //! ```
 //! use relume::{ImportOptions, Options, Session, import};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/box_room.glb");
+//! # let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/box_room.glb");
 //! let scene = import(file, &ImportOptions::default())?;
 //! let mut session = Session::new(scene, Options { tolerance: 0.1, ..Options::default() })?;
 //! for k in 0..3 {
@@ -59,48 +59,36 @@
 //! rayon's global pool; inside `ThreadPool::install` on that pool. Results are the same on any. [`Session::watch`] shows a
 //! solve under way to other threads, and calls it off.
 //!
-//! Not part of the interface, and free to change: the modules that are hidden here, which the command and the tests of this
-//! repository use.
+//! The engine is the crate `relume-core`. Its rooms are re-exported here for the command and the tests of this repository,
+//! hidden: not part of the interface, and free to change.
 
-// Tests may measure and compare with whatever the platform offers: what they compute decides nothing.
-#![cfg_attr(test, allow(clippy::disallowed_methods, clippy::disallowed_types))]
+#[doc(hidden)]
+pub use relume_core::{element, pair, session, space};
 
-// The rooms, from the ground up; each may use those above it in this list and no other (`tests/layers.rs` checks it).
-#[doc(hidden)]
-pub mod element; // the element forest: clusters, patches and their quadtrees
-#[doc(hidden)]
-pub mod event; // what the known motion allows within the coming time, and until when
-pub mod flat; // the plane: another space for the same pairs, events, solver and frames
-#[doc(hidden)]
-pub mod follow; // the phases of a frame, in any space
-#[doc(hidden)]
-pub mod geometry; // polygons, bounds, shafts, rigid motion: pure functions
-#[doc(hidden)]
-pub mod pair; // the pair tree, oracles and verdicts
-#[doc(hidden)]
-pub mod read; // what is read from a solution
-#[doc(hidden)]
-pub mod scene; // files in; bodies, patches, materials, motion, and worlds made of them
-#[doc(hidden)]
-pub mod session; // owns all state; commands in, frames out
-#[doc(hidden)]
-pub mod solver; // gather, push, pull, residual
-#[doc(hidden)]
-pub mod space; // polygons, their light and their places, as followers see them
-#[doc(hidden)]
-pub mod transport; // exchange area and visibility of two elements: pure queries
+pub use relume_io::export;
 
-pub use geometry::Pose;
-pub use glam;
-pub use scene::{
-    Body, BodyId, Camera, Edits, Held, ImportOptions, Interpolation, Light, LightId, LightKind,
-    Material, MaterialId, NewBody, Note, Patch, PatchId, Projection, RotationTrack, Scene,
-    SceneBuilder, SceneError, Severity, Surface, SurfaceId, TakenBody, Track, World, import,
-    outside,
+/// The plane: scenes that do not change along one direction, with that direction integrated out.
+pub mod flat {
+    pub use relume_core::flat::*;
+    pub use relume_io::flat::{SvgError, TextError, parse, parse_svg};
+}
+
+#[doc(hidden)]
+pub mod scene {
+    pub use relume_core::scene::*;
+    pub use relume_io::{ImportOptions, import};
+}
+
+pub use relume_core::geometry::Pose;
+pub use relume_core::glam;
+pub use relume_core::scene::{
+    Body, BodyId, Camera, Edits, Held, Interpolation, Light, LightId, LightKind, Material,
+    MaterialId, NewBody, Note, Patch, PatchId, Projection, RotationTrack, Scene, SceneBuilder,
+    SceneError, Severity, Surface, SurfaceId, TakenBody, Track, World, outside,
 };
-pub use session::{
+pub use relume_core::session::{
     Accuracy, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Frame,
-    FrameReport, Grouping, Hash, Leaf, Log, LogError, Memory, Mesh, Open, Options, Oracle,
-    PairCounts, Removed, RowSumError, Seconds, Sensor, Session, SessionError, Snapshot, Update,
-    Watch,
+    FrameReport, Grouping, Hash, Leaf, Memory, Mesh, Open, Options, Oracle, PairCounts, Removed,
+    RowSumError, Seconds, Sensor, Session, SessionError, Snapshot, Update, Watch,
 };
+pub use relume_io::{ImportOptions, Log, LogError, import, read_environment};

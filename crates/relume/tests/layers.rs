@@ -26,8 +26,13 @@ const ROOMS: [&str; 12] = [
 const NOT_OF_FRAMES: [&str; 3] = ["geometry", "scene", "transport"];
 
 /// The crates from the ground up, with the names they have in source text.
-const CRATES: [(&str, &str); 3] =
-    [("relume", "relume"), ("relume-picture", "relume_picture"), ("relume-cli", "relume_cli")];
+const CRATES: [(&str, &str); 5] = [
+    ("relume-core", "relume_core"),
+    ("relume-io", "relume_io"),
+    ("relume-picture", "relume_picture"),
+    ("relume", "relume"),
+    ("relume-cli", "relume_cli"),
+];
 
 /// The crate of references: it uses none of those above, and only their tests may use it.
 const JUDGE: (&str, &str) = ("relume-judge", "relume_judge");
@@ -131,7 +136,7 @@ fn crates_dir() -> PathBuf {
 
 #[test]
 fn each_room_uses_only_rooms_above_it() {
-    let src = crates_dir().join("relume/src");
+    let src = crates_dir().join("relume-core/src");
     let mut wrong = Vec::new();
     let mut rooms_seen = 0;
     for file in sources(&src) {
@@ -167,10 +172,9 @@ fn each_crate_uses_only_crates_above_it() {
     let mut wrong = Vec::new();
     for (level, (dir, _)) in CRATES.iter().enumerate() {
         let manifest = fs::read_to_string(crates_dir().join(dir).join("Cargo.toml")).unwrap();
-        let dependencies =
-            manifest.split_once("[dependencies]").map_or("", |(_, rest)| rest).to_owned();
+        let dependencies = entries(&manifest, "dependencies");
         for (below, ident) in &CRATES[level + 1..] {
-            if dependencies.contains(below) {
+            if dependencies.iter().any(|name| name == below) {
                 wrong.push(format!("{dir}/Cargo.toml depends on {below}, which is below it"));
             }
             for file in sources(&crates_dir().join(dir).join("src")) {
@@ -182,6 +186,48 @@ fn each_crate_uses_only_crates_above_it() {
         }
     }
     assert!(wrong.is_empty(), "crates out of order:\n{}", wrong.join("\n"));
+}
+
+/// What the engine may depend on: nothing that reads or writes a format of files.
+const ENGINE_NEEDS: [&str; 9] = [
+    "fearless_simd",
+    "glam",
+    "libm",
+    "obvhs",
+    "rayon",
+    "serde",
+    "solar-positioning",
+    "strsim",
+    "thiserror",
+];
+
+/// Ways to files that the engine does not take.
+const FILES: [&str; 5] = ["std::fs", "fs::", "File::", "OpenOptions", "include_bytes!"];
+
+/// The names of the dependencies in one table of a manifest.
+fn entries(manifest: &str, name: &str) -> Vec<String> {
+    let of_line = |line: &str| line.split(['.', '=', ' ']).next().unwrap_or("").to_owned();
+    let names = table(manifest, name).lines().map(of_line).collect::<Vec<_>>();
+    names.into_iter().filter(|name| !name.is_empty() && !name.starts_with('#')).collect()
+}
+
+#[test]
+fn the_engine_knows_no_files() {
+    let engine = crates_dir().join("relume-core");
+    let manifest = fs::read_to_string(engine.join("Cargo.toml")).unwrap();
+    assert_eq!(entries(&manifest, "dependencies"), ENGINE_NEEDS);
+    for file in sources(&engine.join("src")) {
+        let text = without_comments(&fs::read_to_string(&file).unwrap());
+        for way in FILES {
+            assert!(!text.contains(way), "{} uses {way}", file.display());
+        }
+    }
+}
+
+#[test]
+fn crates_that_compute_ban_the_same_calls() {
+    let bans = |dir: &str| fs::read_to_string(crates_dir().join(dir).join("clippy.toml")).unwrap();
+    assert_eq!(bans("relume-core"), bans("relume-io"));
 }
 
 /// The entries of one table of a manifest.
@@ -207,7 +253,7 @@ fn the_judge_is_independent_and_for_tests_only() {
             assert!(!without_comments(&text).contains(JUDGE.1), "{} uses it", file.display());
         }
     }
-    assert!(table(&read("relume"), "dev-dependencies").contains(JUDGE.0));
+    assert!(table(&read("relume-core"), "dev-dependencies").contains(JUDGE.0));
 }
 
 #[test]

@@ -1,36 +1,4 @@
-//! The integration tests of the engine, one binary: known answers first, then laws on random input, then whole runs.
-//!
-//! `cargo test -p relume --test tests NAME::` runs one module.
+//! The tests of the face, and of the order of all crates.
 
-mod accuracy;
-mod analytic;
-mod commands;
-mod common;
-mod compare;
-mod covered;
-mod dark_sides;
-mod determinism;
-mod emission;
-mod exact_rows;
-mod flat;
-mod furnace;
-mod gather;
-mod groups;
-mod import;
-mod incremental;
-mod kept;
-mod laws;
 mod layers;
-mod lights;
-mod limits;
-mod memory;
-mod monte_carlo;
-mod outside;
-mod parts;
-mod prediction;
-mod random_motion;
-mod reference;
-mod regressions;
-mod sky;
-mod validation;
-mod work;
+mod program;

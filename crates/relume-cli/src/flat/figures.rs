@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use glam::DVec2;
 use relume::element::ElementId;
+use relume::export::write_atomically;
 use relume::flat::{FlatFrame, FlatLink, FlatOptions, FlatScene, FlatSession, parse};
 use relume_picture::drawing::{Drawing, Pen, animation};
-use relume_picture::export::write_atomically;
 
 use crate::args::FlatFigure;
 use crate::failure::Failure;

@@ -8,12 +8,12 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
+use relume::export::write_atomically;
 use relume::flat::{
     FlatFrame, FlatOptions, FlatScene, FlatSession, SvgError, Wall, parse, parse_svg,
 };
 use relume::session::FrameReport;
 use relume_picture::drawing::Pen;
-use relume_picture::export::write_atomically;
 use serde::Serialize;
 
 use crate::args::{FlatArgs, FlatCommand, FlatPrint, UpdateChoice};

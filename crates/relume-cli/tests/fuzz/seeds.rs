@@ -307,23 +307,23 @@ pub(crate) fn all() -> Vec<Seed> {
         text("roof.ply", Format::Ply, PLY),
         ring(
             "draco, in order",
-            include_bytes!("../../../relume/tests/data/packed/ring-draco-sequential.glb"),
+            include_bytes!("../../../relume-io/tests/data/packed/ring-draco-sequential.glb"),
         ),
         ring(
             "draco, standard",
-            include_bytes!("../../../relume/tests/data/packed/ring-draco-standard.glb"),
+            include_bytes!("../../../relume-io/tests/data/packed/ring-draco-standard.glb"),
         ),
         ring(
             "draco, valence",
-            include_bytes!("../../../relume/tests/data/packed/ring-draco-valence.glb"),
+            include_bytes!("../../../relume-io/tests/data/packed/ring-draco-valence.glb"),
         ),
         ring(
             "meshopt, older",
-            include_bytes!("../../../relume/tests/data/packed/ring-meshopt-ext.glb"),
+            include_bytes!("../../../relume-io/tests/data/packed/ring-meshopt-ext.glb"),
         ),
         ring(
             "meshopt, newer",
-            include_bytes!("../../../relume/tests/data/packed/ring-meshopt-khr.glb"),
+            include_bytes!("../../../relume-io/tests/data/packed/ring-meshopt-khr.glb"),
         ),
     ]
 }

@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
-use relume::scene::{Patch, PatchId};
-use relume::session::{Leaf, Snapshot};
+use relume_core::scene::{Patch, PatchId};
+use relume_core::session::{Leaf, Snapshot};
 
 use super::gouraud::{self, Triangle};
 use super::printed::Shown;

@@ -3,8 +3,8 @@
 //! Must not know pixels, leaves or light.
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
-use relume::geometry::Pose;
-use relume::scene::{Projection, Scene};
+use relume_core::geometry::Pose;
+use relume_core::scene::{Projection, Scene};
 
 use super::overview::Overview;
 use super::project::Projector;

@@ -4,8 +4,8 @@
 
 use std::f64::consts::PI;
 
-use relume::scene::PatchId;
-use relume::session::Snapshot;
+use relume_core::scene::PatchId;
+use relume_core::session::Snapshot;
 
 use super::assemble::Drawing;
 use super::camera::View;

@@ -9,7 +9,7 @@
 //! not further from the leaf's radiosity than 1.5 times its largest step to a neighbour.
 
 use glam::{DMat2, DVec2};
-use relume::session::Leaf;
+use relume_core::session::Leaf;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 /// Leaf corners closer to the boundary than this, relative to the patch's extent, lie on it.

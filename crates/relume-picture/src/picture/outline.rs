@@ -71,8 +71,8 @@ impl Outlines {
 #[cfg(test)]
 mod tests {
     use glam::DMat3;
-    use relume::geometry::Pose;
-    use relume::scene::Projection;
+    use relume_core::geometry::Pose;
+    use relume_core::scene::Projection;
 
     use super::*;
 

@@ -6,8 +6,8 @@
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
-use relume::scene::{Frame, PatchId, Print};
-use relume::session::Snapshot;
+use relume_core::scene::{Frame, PatchId, Print};
+use relume_core::session::Snapshot;
 
 use super::project::SeenPlane;
 

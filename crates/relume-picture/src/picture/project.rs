@@ -6,8 +6,8 @@
 //! interpolation are plain linear algebra.
 
 use glam::{DMat3, DVec2, DVec3, DVec4};
-use relume::geometry::Pose;
-use relume::scene::Projection;
+use relume_core::geometry::Pose;
+use relume_core::scene::Projection;
 
 use super::camera::View;
 

@@ -4,8 +4,8 @@
 
 use std::f64::consts::PI;
 
-use relume::scene::outside::OutsideNow;
-use relume::session::Snapshot;
+use relume_core::scene::outside::OutsideNow;
+use relume_core::session::Snapshot;
 
 use super::assemble::{Drawing, Fill};
 use super::camera::View;

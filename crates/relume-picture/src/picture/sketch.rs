@@ -8,9 +8,9 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
-use relume::geometry::Pose;
-use relume::scene::outside::OutsideNow;
-use relume::scene::{BodyId, PatchId, Scene};
+use relume_core::geometry::Pose;
+use relume_core::scene::outside::OutsideNow;
+use relume_core::scene::{BodyId, PatchId, Scene};
 
 use super::camera::View;
 use super::exposure::{Exposure, Metered};
@@ -272,8 +272,8 @@ fn spread(normal: Vec3, turn: f64) -> impl Iterator<Item = Vec3> {
 #[cfg(test)]
 mod tests {
     use glam::DQuat;
-    use relume::scene::SceneBuilder;
-    use relume::scene::outside::{Outside, Sky};
+    use relume_core::scene::SceneBuilder;
+    use relume_core::scene::outside::{Outside, Sky};
 
     use super::super::tone::Tone;
     use super::*;

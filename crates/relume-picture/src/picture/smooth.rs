@@ -6,8 +6,8 @@
 use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
-use relume::scene::{BodyId, PatchId};
-use relume::session::{Leaf, Snapshot};
+use relume_core::scene::{BodyId, PatchId};
+use relume_core::session::{Leaf, Snapshot};
 
 /// Cosine of the angle between neighbours up to which they stand for one curved surface: 35 degrees. A prism of twelve sides
 /// is a cylinder, a bevel of 45 degrees is an edge.

@@ -4,11 +4,11 @@
 use std::sync::Arc;
 
 use glam::{DQuat, DVec2, DVec3};
-use relume::scene::{
+use relume_core::scene::{
     Body, BodyId, Camera, Frame, Material, MaterialId, Motion, Node, NodeId, Patch, PatchId, Scene,
     Surface, SurfaceId,
 };
-use relume::session::{Leaf, Snapshot};
+use relume_core::session::{Leaf, Snapshot};
 
 pub(crate) fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
@@ -63,7 +63,7 @@ pub(crate) fn camera(
     scene: &mut Scene,
     name: &str,
     at: DVec3,
-    projection: relume::scene::Projection,
+    projection: relume_core::scene::Projection,
 ) {
     let node = node(scene, at, DQuat::IDENTITY);
     scene.cameras.push(Camera { name: name.into(), node, projection });

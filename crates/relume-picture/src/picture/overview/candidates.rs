@@ -3,7 +3,7 @@
 //! Must not know how they are judged, apart from what is in sight around a point.
 
 use glam::{DVec2, DVec3};
-use relume::scene::{BodyId, Scene};
+use relume_core::scene::{BodyId, Scene};
 
 use super::super::camera::View;
 use super::score::Stage;

@@ -8,8 +8,8 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use obvhs::ray::{INVALID_ID, Ray, RayHit};
-use relume::geometry::Pose;
-use relume::scene::{PatchId, Scene};
+use relume_core::geometry::Pose;
+use relume_core::scene::{PatchId, Scene};
 
 /// How far off a surface rays start, in units of the scene.
 pub(in super::super) const LIFT: f32 = 1e-5;

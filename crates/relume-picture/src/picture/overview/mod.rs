@@ -20,7 +20,7 @@ mod score;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use relume::scene::Scene;
+use relume_core::scene::Scene;
 
 use super::camera::View;
 use candidates::{Bounds, Candidate};

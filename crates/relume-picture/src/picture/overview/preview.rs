@@ -9,9 +9,9 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
-use relume::geometry::Pose;
-use relume::scene::outside::OutsideNow;
-use relume::scene::{Light, LightKind, Patch, PatchId, Scene};
+use relume_core::geometry::Pose;
+use relume_core::scene::outside::OutsideNow;
+use relume_core::scene::{Light, LightKind, Patch, PatchId, Scene};
 
 use super::super::tone::luminance;
 use super::caster::{Caster, LIFT};
@@ -414,7 +414,7 @@ fn lights(scene: &Scene, time_s: f64, caster: &Caster) -> Vec<(Vec3, Vec3, Light
 #[cfg(test)]
 mod tests {
     use glam::DQuat;
-    use relume::scene::{BodyId, SceneBuilder};
+    use relume_core::scene::{BodyId, SceneBuilder};
 
     use super::*;
 

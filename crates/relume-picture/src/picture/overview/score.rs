@@ -9,9 +9,9 @@
 //! the camera. Must not know which views there are.
 
 use glam::{DVec3, Vec3};
-use relume::geometry::Pose;
-use relume::scene::outside::Outside;
-use relume::scene::{BodyId, Projection, Scene};
+use relume_core::geometry::Pose;
+use relume_core::scene::outside::Outside;
+use relume_core::scene::{BodyId, Projection, Scene};
 
 use super::super::camera::View;
 use super::candidates::{ASPECT, Bounds};

@@ -1,0 +1,138 @@
+//! What a solution says of its own errors, beside the judge's path tracer.
+
+use crate::common::{at_tolerance, facing_up, flipped, judged, lit_room, v};
+use glam::{DQuat, DVec3};
+use relume_core::scene::{MaterialId, Scene, SceneBuilder};
+use relume_core::session::{Sensor, Session};
+use relume_judge::path::{self, Site};
+use relume_judge::{Random, World};
+
+use std::sync::Arc;
+
+/// Two rooms of 4 x 3 m, 2.5 m high, with a wall between them that leaves 0.4 m open; the lamp is in the first.
+fn behind_a_slit() -> Scene {
+    let mut b = SceneBuilder::new("slit");
+    let grey = b.material("grey", [0.6; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.0; 3], [100.0; 3]);
+    let node = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.cuboid_inward(node, "room", grey, DVec3::ZERO, v(8.0, 3.0, 2.5));
+    b.cuboid(node, "wall", grey, v(3.95, 0.0, 0.0), v(4.05, 2.6, 2.5));
+    b.polygon(node, "lamp", glow, &flipped(facing_up([1.0, 1.8], [1.0, 1.8], 2.4)));
+    b.build().unwrap()
+}
+
+/// A room with a row of narrow blocks along it, 0.3 m apart, lit from one end.
+fn between_blocks() -> Scene {
+    let mut b = SceneBuilder::new("blocks");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.0; 3], [60.0; 3]);
+    let node = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.cuboid_inward(node, "room", grey, DVec3::ZERO, v(5.0, 4.0, 3.0));
+    let add = |b: &mut SceneBuilder, k: u32, grey: MaterialId| {
+        let x = 0.8 + 0.7 * f64::from(k);
+        b.cuboid(node, &format!("block {k}"), grey, v(x, 1.0, 0.01), v(x + 0.4, 3.0, 2.0));
+    };
+    (0..5).for_each(|k| add(&mut b, k, grey));
+    b.polygon(node, "lamp", glow, &flipped(facing_up([0.5, 4.5], [0.2, 0.7], 2.9)));
+    b.build().unwrap()
+}
+
+/// Places on the surfaces of a scene, drawn evenly by patch, a little off them.
+fn places(scene: &Scene, count: usize, random: &mut Random) -> Vec<Sensor> {
+    let polygons = judged::polygons(scene, 0.0);
+    let lit: Vec<_> = polygons.iter().filter(|p| p.exitance == [0.0; 3]).collect();
+    (0..count)
+        .map(|k| {
+            let corners = &lit[k * lit.len() / count].corners;
+            let [a, b, d] = [corners[0], corners[1], corners[corners.len() - 1]];
+            let (s, t) = (random.unit(), random.unit());
+            let normal = (b - a).cross(d - a).normalize();
+            Sensor { at: a + (b - a) * s + (d - a) * t * 0.999 + normal * 1e-6, normal }
+        })
+        .collect()
+}
+
+#[test]
+fn a_solution_knows_its_own_error() {
+    let scenes = [(lit_room(), 0.9), (behind_a_slit(), 0.5), (between_blocks(), 0.5)];
+    let all = |e: [f64; 3]| e.iter().sum::<f64>();
+    let mut found_alike = Vec::new();
+    for (scene, tolerance) in scenes {
+        let scene = Arc::new(scene);
+        let sensors = places(&scene, 128, &mut Random::of_part(5, 0));
+        let world = World::new(judged::polygons(&scene, 0.0));
+        let sites: Vec<Site> = sensors.iter().map(|s| Site::point(s.at, s.normal)).collect();
+        let truth = path::irradiance(&world, &sites, 400, 1);
+        // Not in the dark of gaps, where the error of a few would be all that is seen.
+        let mean = truth.iter().map(|t| all(t.irradiance)).sum::<f64>() / truth.len() as f64;
+        let lit = |k: &usize| all(truth[*k].irradiance) > 0.1 * mean;
+        let chosen: Vec<usize> = (0..sensors.len()).filter(lit).collect();
+        let sensors: Vec<Sensor> = chosen.iter().map(|&k| sensors[k]).collect();
+        let mut session = Session::new(Arc::clone(&scene), at_tolerance(tolerance)).unwrap();
+        session.step(0, 0.0).unwrap();
+        let said = session.frame().unwrap().accuracy_at(&sensors);
+        let everywhere = session.frame().unwrap().accuracy(32);
+        let found = session.frame().unwrap().irradiances_at(&sensors);
+        let square = |(e, &k): (&[f64; 3], &usize)| {
+            let right = all(truth[k].irradiance);
+            let noise: f64 = truth[k].standard_error.iter().map(|s| s * s).sum();
+            (all(*e) / right - 1.0).powi(2) - 3.0 * noise / (right * right)
+        };
+        let squares: f64 = found.iter().zip(&chosen).map(square).sum();
+        let rms = (squares / found.len() as f64).max(0.0).sqrt();
+        println!(
+            "{} at {tolerance}: RMS {:.2} %, said {:.2} % (resolved {:.2} %, largest {:+.1} %); everywhere {:.2} %, meshes {:.2} %",
+            scene.name,
+            100.0 * rms,
+            100.0 * said.rms,
+            100.0 * said.resolved,
+            100.0 * said.largest,
+            100.0 * everywhere.rms,
+            100.0 * everywhere.mesh_rms.unwrap()
+        );
+        found_alike
+            .push(said.rms < 2.0 * rms + said.resolved && rms < 2.0 * said.rms.max(said.resolved));
+    }
+    assert!(found_alike.iter().all(|alike| *alike), "{found_alike:?}");
+}
+
+/// A closed room of 5 x 4 x 3 m in which every surface emits 1 W/m2 and reflects 0.8: with blocks that stand 0.3 m apart, all
+/// of it has irradiance 5.
+fn furnace() -> Scene {
+    let mut b = SceneBuilder::new("furnace");
+    let all = b.material("all", [0.8; 3], [1.0; 3]);
+    let node = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.cuboid_inward(node, "room", all, DVec3::ZERO, v(5.0, 4.0, 3.0));
+    for k in 0..5 {
+        let x = 0.8 + 0.7 * f64::from(k);
+        b.cuboid(node, &format!("block {k}"), all, v(x, 1.0, 0.5), v(x + 0.4, 3.0, 2.0));
+    }
+    b.build().unwrap()
+}
+
+#[test]
+fn what_is_reflected_again_and_again_is_followed() {
+    let scene = Arc::new(furnace());
+    let mut random = Random::of_part(9, 0);
+    let walls = |_: usize| Sensor {
+        at: v(random.between(0.1, 4.9), random.between(0.1, 3.9), 0.0),
+        normal: DVec3::Z,
+    };
+    let sensors: Vec<Sensor> = (0..256).map(walls).collect();
+    for tolerance in [0.9, 0.3] {
+        let mut session = Session::new(Arc::clone(&scene), at_tolerance(tolerance)).unwrap();
+        session.step(0, 0.0).unwrap();
+        let count = sensors.len() as f64;
+        let off = session
+            .frame()
+            .unwrap()
+            .irradiances_at(&sensors)
+            .iter()
+            .map(|e| e[0] / 5.0 - 1.0)
+            .sum::<f64>()
+            / count;
+        let said = session.frame().unwrap().accuracy_at(&sensors).mean;
+        println!("furnace at {tolerance}: {:+.2} % off, said {:+.2} %", 100.0 * off, 100.0 * said);
+        assert!((said - off).abs() < 0.007, "{said} of {off}");
+    }
+}

@@ -1,0 +1,624 @@
+//! Commands: any log and its inverses lead back, and the state after any log is that of a cold build.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use crate::common::{Random, at_tolerance, form_factor_oracle, shipped, v};
+use glam::{DQuat, DVec3};
+use relume_core::geometry::Pose;
+use relume_core::scene::{BodyId, LightId, LightKind, MaterialId, NewBody, Scene, SceneBuilder};
+use relume_core::session::{Command, CommandError, Frame, Options, Session};
+use relume_io::Log;
+
+/// A cube about the origin, seen from outside or from inside.
+pub(crate) fn cube(half: f64, inward: bool) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let corner = |k: u32| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { half } else { -half });
+    let sides: [[u32; 4]; 6] =
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let turned = |[a, b, c]: [u32; 3]| if inward { [a, c, b] } else { [a, b, c] };
+    let of_side = |[a, b, c, d]: [u32; 4]| [turned([a, b, c]), turned([a, c, d])];
+    ((0..8).map(corner).collect(), sides.into_iter().flat_map(of_side).collect())
+}
+
+/// A room with a lamp, two crates and a bulb, all of them still.
+pub(crate) fn room() -> Scene {
+    let mut b = SceneBuilder::new("room");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let red = b.material("red", [0.7, 0.2, 0.1], [0.0; 3]);
+    let glow = b.material("glow", [0.1; 3], [9.0, 8.0, 7.0]);
+    let (walls, lamp) = (b.body("walls"), b.body("lamp"));
+    let (one, two) = (b.body("one"), b.body("two"));
+    let (corners, triangles) = cube(1.0, true);
+    b.mesh(walls, "walls", grey, &corners, &triangles);
+    let (corners, triangles) = cube(0.1, false);
+    b.mesh(lamp, "lamp", glow, &corners, &triangles);
+    b.mesh(one, "one", red, &corners, &triangles);
+    b.mesh(two, "two", grey, &corners, &triangles);
+    let hook = b.node("hook", None, v(-0.5, -0.5, 0.5), DQuat::IDENTITY);
+    b.light("bulb", hook, LightKind::Point, [0.3; 3]);
+    b.build().unwrap()
+}
+
+/// A room full of small crates: enough for groups of patches.
+pub(crate) fn clutter() -> Scene {
+    let mut b = SceneBuilder::new("clutter");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let red = b.material("red", [0.7, 0.2, 0.1], [0.0; 3]);
+    let glow = b.material("glow", [0.1; 3], [9.0, 8.0, 7.0]);
+    let walls = b.body("walls");
+    let (corners, triangles) = cube(1.0, true);
+    b.mesh(walls, "walls", grey, &corners, &triangles);
+    let (corners, triangles) = cube(0.045, false);
+    for k in 0..24 {
+        let at = [k % 3, k / 3 % 3, k / 9].map(|n| 0.5 * f64::from(n) - 0.5);
+        let corners: Vec<[f64; 3]> =
+            corners.iter().map(|c| [0, 1, 2].map(|axis| c[axis] + at[axis])).collect();
+        let body = b.body(&format!("crate {k}"));
+        let material = if k == 13 { glow } else { red };
+        b.mesh(body, "crate", material, &corners, &triangles);
+    }
+    b.build().unwrap()
+}
+
+/// The first poses: nothing inside anything else.
+pub(crate) fn start(session: &mut Session) {
+    for (body, at) in [(1, v(0.0, 0.0, 0.8)), (2, v(-0.4, 0.3, -0.6)), (3, v(0.5, -0.3, 0.0))] {
+        session.apply(Command::set_pose(BodyId(body), Pose::translation(at))).unwrap();
+    }
+}
+
+/// A session that is given the world of another one at once.
+pub(crate) fn cold(session: &Session) -> Session {
+    let mut cold = Session::new(Arc::clone(session.scene()), session.options().clone()).unwrap();
+    let held = session.held();
+    let mut apply = |command| drop(cold.apply(command).unwrap());
+    held.poses.iter().for_each(|(&b, &p)| apply(Command::SetPose(b, Some(p))));
+    held.presence.iter().for_each(|(&b, &p)| apply(Command::SetPresence(b, Some(p))));
+    held.reflectances.iter().for_each(|(&m, &r)| apply(Command::SetReflectance(m, Some(r))));
+    held.exitances.iter().for_each(|(&m, &e)| apply(Command::SetExitance(m, Some(e))));
+    held.intensities.iter().for_each(|(&l, &i)| apply(Command::SetIntensity(l, Some(i))));
+    apply(Command::SetTime(session.time_s()));
+    cold
+}
+
+/// Asserts that a session is where one is that starts from its world.
+pub(crate) fn check(session: &mut Session, why: &str) {
+    let mut other = cold(session);
+    assert_eq!(session.world(), other.world(), "{why}");
+    let (rho, options) = (0.95, session.options().clone());
+    let (warm, cold) = (session.solve().unwrap(), other.solve().unwrap());
+    let (one, two) = (warm.report(), cold.report());
+    assert_eq!((warm.hash(), one.links), (cold.hash(), two.links), "{why}");
+    assert_eq!(
+        (one.elements, one.leaves, one.pairs.refined, one.pairs.culled),
+        (two.elements, two.leaves, two.pairs.refined, two.pairs.culled),
+        "{why}"
+    );
+    let (a, b) = (warm.snapshot(), cold.snapshot());
+    assert_eq!(a.corners, b.corners, "{why}");
+    let mean = b.radiosity.iter().flatten().sum::<f32>() / (3 * b.radiosity.len()) as f32;
+    let bound = (options.tolerance / (1.0 - rho)) as f32 * mean.max(1e-3);
+    for (x, y) in a.radiosity.iter().flatten().zip(b.radiosity.iter().flatten()) {
+        assert!((x - y).abs() <= bound, "{why}: {x} {y}, mean {mean}");
+    }
+}
+
+/// A command drawn at random, of any kind that does not change the scene.
+pub(crate) fn draw(r: &mut Random, scene: &Scene) -> Command {
+    let one_of = |r: &mut Random, n: usize| (r.unit() * n as f64) as u32 % n as u32;
+    let body = BodyId(1 + one_of(r, scene.bodies.len() - 1));
+    let material = MaterialId(one_of(r, scene.materials.len()));
+    match one_of(r, 12) {
+        0..5 => {
+            let at = DVec3::from_array([0; 3].map(|_| r.between(-0.85, 0.85)));
+            let axis = v(r.unit(), r.unit(), 1.0).normalize();
+            let turn = if r.unit() < 0.5 { 0.0 } else { r.between(0.0, 3.0) };
+            Command::set_pose(body, Pose::new(DQuat::from_axis_angle(axis, turn), at))
+        }
+        5 => Command::SetPose(body, None),
+        6 => Command::hide(body),
+        7 => Command::SetPresence(body, [None, Some(true)][one_of(r, 2) as usize]),
+        8 => {
+            let to = if r.unit() < 0.3 { None } else { Some([r.unit() * 0.9; 3]) };
+            Command::SetReflectance(material, to)
+        }
+        9 => {
+            let to = [None, Some([0.0; 3]), Some([r.unit(), 2.0, 3.0])][one_of(r, 3) as usize];
+            Command::SetExitance(material, to)
+        }
+        10 if !scene.lights.is_empty() => {
+            let to = [None, Some([0.0; 3]), Some([r.unit(); 3])][one_of(r, 3) as usize];
+            Command::SetIntensity(LightId(0), to)
+        }
+        _ => Command::SetTime(r.between(0.0, 1.5)),
+    }
+}
+
+pub(crate) fn insertion(r: &mut Random) -> Command {
+    let (corners, triangles) = cube(0.02 + 0.1 * r.unit(), false);
+    let shift = [0; 3].map(|_| r.between(-0.8, 0.8));
+    let corners: Vec<[f64; 3]> =
+        corners.iter().map(|c| [0, 1, 2].map(|k| c[k] + shift[k])).collect();
+    let material = MaterialId((3.0 * r.unit()) as u32 % 3);
+    Command::Insert(NewBody::new("new").with_mesh("new", material, &corners, &triangles))
+}
+
+pub(crate) fn kinds() -> [Options; 2] {
+    [at_tolerance(0.4), form_factor_oracle(0.2, 0.02)]
+}
+
+/// Follows logs: each state against a cold build, and the way back.
+fn follow(scene: &Scene, seeds: std::ops::Range<u64>, steps: usize, insert: f64) {
+    for seed in seeds {
+        let mut r = Random(seed);
+        let options = kinds()[(seed % 2) as usize].clone();
+        let mut session = Session::new(scene.clone(), options).unwrap();
+        if scene.name == "room" {
+            start(&mut session);
+        }
+        let first = session.solve().unwrap().hash();
+        let mut inverses = Vec::new();
+        for step in 0..steps {
+            for _ in 0..=(2.0 * r.unit()) as usize {
+                let command = match r.unit() < insert {
+                    true if r.unit() < 0.5 => insertion(&mut r),
+                    true => Command::Remove(BodyId(1 + (r.unit() * 6.0) as u32)),
+                    false => draw(&mut r, session.scene()),
+                };
+                match session.apply(command) {
+                    Ok(inverse) => inverses.push(inverse),
+                    Err(CommandError::Unknown { .. }) => {}
+                    Err(error) => panic!("{seed}: {error}"),
+                }
+            }
+            check(&mut session, &format!("{} {seed}, step {step}", scene.name));
+        }
+        while let Some(inverse) = inverses.pop() {
+            session.apply(inverse).unwrap();
+            if r.unit() < 0.2 {
+                session.solve().unwrap();
+            }
+        }
+        assert_eq!(session.solve().unwrap().hash(), first, "{} {seed}: back", scene.name);
+    }
+}
+
+#[test]
+fn any_log_equals_a_cold_build_and_leads_back() {
+    follow(&room(), 0..6, 6, 0.0);
+}
+
+#[test]
+fn bodies_leave_groups_of_patches_and_come_back() {
+    follow(&clutter(), 400..403, 5, 0.1);
+}
+
+#[test]
+fn bodies_come_and_go() {
+    follow(&room(), 100..104, 6, 0.4);
+}
+
+#[test]
+fn hands_take_hold_of_a_clip_that_plays() {
+    for name in ["box_room.glb", "cornell_moving_box_and_lamp.glb"] {
+        follow(&shipped(name), 200..202, 5, 0.1);
+    }
+}
+
+#[test]
+fn a_promise_that_is_broken_while_time_goes_on_is_forgotten() {
+    let scene = shipped("cornell_moving_box_and_lamp.glb");
+    let mover = (0..scene.bodies.len() as u32).map(BodyId).find(|&b| scene.moves(b)).unwrap();
+    let mut session = Session::new(scene, at_tolerance(0.3)).unwrap();
+    let mut held = None;
+    for frame in 0..12 {
+        let time_s = f64::from(frame) / 24.0;
+        if frame == 5 || frame == 8 {
+            let aside = Pose { translation: v(0.3, 0.1, 0.2), ..Pose::IDENTITY };
+            let command = if frame == 5 { Some(aside) } else { held.take() };
+            session.apply(Command::SetPose(mover, command)).unwrap();
+        }
+        session.apply(Command::SetTime(time_s)).unwrap();
+        check(&mut session, &format!("frame {frame}"));
+    }
+}
+
+#[test]
+fn a_light_moves_with_the_body_it_hangs_on() {
+    let mut b = SceneBuilder::new("lantern");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let lantern = b.node("lantern", None, v(0.0, 0.0, 0.5), DQuat::IDENTITY);
+    let bulb = b.node("bulb", Some(lantern), v(0.0, 0.0, 0.1), DQuat::IDENTITY);
+    b.cuboid(lantern, "base", grey, v(-0.1, -0.1, -0.1), v(0.1, 0.1, 0.0));
+    b.light("bulb", bulb, LightKind::Point, [1.0; 3]);
+    let scene = b.build().unwrap();
+    let body = scene.body_named("lantern").unwrap();
+    let mut session = Session::new(scene, at_tolerance(0.4)).unwrap();
+    session.solve().unwrap();
+    let by = Pose::translation([0.2, 0.0, 0.0]);
+    let undo = session.apply(Command::set_pose(body, by)).unwrap();
+    let at = session.world().light_pose(LightId(0)).unwrap().translation;
+    assert!(at.distance(v(0.2, 0.0, 0.6)) < 1e-12, "{at}");
+    check(&mut session, "moved");
+    session.apply(Command::hide(body)).unwrap();
+    assert_eq!(session.world().light_pose(LightId(0)), None);
+    check(&mut session, "hidden");
+    session.apply(Command::SetPresence(body, None)).unwrap();
+    session.apply(undo).unwrap();
+    assert_eq!(session.world().light_pose(LightId(0)).unwrap().translation, v(0.0, 0.0, 0.6));
+}
+
+#[test]
+fn a_move_by_hand_costs_as_a_move_of_the_clip() {
+    let mut session = Session::new(room(), at_tolerance(0.2)).unwrap();
+    start(&mut session);
+    let all = session.solve().unwrap().report().examined;
+    session.apply(Command::set_pose(BodyId(3), Pose::translation([0.5, -0.3, 0.02]))).unwrap();
+    let report = session.solve().unwrap().report().clone();
+    assert_eq!(report.moved, ["two"]);
+    assert!(report.examined < all / 3, "{} of {all} pairs", report.examined);
+    let still = session.solve().unwrap().report().clone();
+    assert_eq!((still.examined, still.gathers), (0, 0));
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_and_changes_nothing() {
+    let mut session = Session::new(room(), at_tolerance(0.4)).unwrap();
+    start(&mut session);
+    let before = session.world();
+    let (points, triangles) = cube(0.1, false);
+    let nan = Pose::translation([f64::NAN, 0.0, 0.0]);
+    let large = Pose { rotation: 2.0 * Pose::IDENTITY.rotation, ..Pose::IDENTITY };
+    let flat = NewBody::new("flat").with_mesh("flat", MaterialId(0), &points, &[[0, 0, 1]]);
+    let other = NewBody::new("x").with_mesh("x", MaterialId(9), &points, &triangles);
+    for (command, says) in [
+        (Command::set_pose(BodyId(9), Pose::IDENTITY), "there is no body 9: the scene has 4"),
+        (Command::set_pose(BodyId(1), nan), "pose of body `lamp`"),
+        (Command::set_pose(BodyId(1), large), "without scale"),
+        (Command::set_reflectance(MaterialId(0), [1.0; 3]), "material `grey`"),
+        (Command::set_exitance(MaterialId(7), [1.0; 3]), "there is no material 7"),
+        (Command::set_intensity(LightId(0), [-1.0; 3]), "light `bulb`"),
+        (Command::SetTime(f64::INFINITY), "the time"),
+        (Command::Insert(flat), "no triangle with an area"),
+        (Command::Insert(other), "material 9 does not exist"),
+    ] {
+        let refused = session.apply(command).unwrap_err().to_string();
+        assert!(refused.contains(says), "{refused}");
+        assert_eq!(session.world(), before);
+    }
+    let (corners, triangles) = cube(0.1, false);
+    let new = |name| NewBody::new(name).with_mesh(name, MaterialId(0), &corners, &triangles);
+    session.apply(Command::Insert(new("x"))).unwrap();
+    let back = session.apply(Command::Remove(BodyId(4))).unwrap();
+    session.apply(Command::Insert(new("y"))).unwrap();
+    let refused = session.apply(back).unwrap_err().to_string();
+    assert!(refused.contains("reverse order"), "{refused}");
+}
+
+#[test]
+fn sessions_can_be_sent_and_shared() {
+    fn both<T: Send + Sync>() {}
+    both::<Session>();
+    both::<Scene>();
+    both::<Command>();
+}
+
+#[test]
+fn logs_are_undone_redone_and_replayed() {
+    for seed in 300..304 {
+        let mut r = Random(seed);
+        let scene = Arc::new(room());
+        let options = kinds()[(seed % 2) as usize].clone();
+        let mut session = Session::new(Arc::clone(&scene), options.clone()).unwrap();
+        let mut log = Log::new();
+        for (body, at) in [(1, v(0.0, 0.0, 0.8)), (2, v(-0.4, 0.3, -0.6))] {
+            let command = Command::set_pose(BodyId(body), Pose::translation(at));
+            log.apply(&mut session, command).unwrap();
+        }
+        let mut hashes = vec![log.solve(&mut session).unwrap().hash().to_string()];
+        for _ in 0..12 {
+            match r.unit() {
+                x if x < 0.2 => assert!(log.undo(&mut session).is_ok()),
+                x if x < 0.3 => assert!(log.redo(&mut session).is_ok()),
+                x if x < 0.5 => log.apply(&mut session, insertion(&mut r)).unwrap(),
+                x if x < 0.6 => drop(log.apply(&mut session, Command::Remove(BodyId(4)))),
+                _ => {
+                    let command = draw(&mut r, session.scene());
+                    // A body that was removed cannot be moved.
+                    let _ = log.apply(&mut session, command);
+                }
+            }
+            hashes.push(log.solve(&mut session).unwrap().hash().to_string());
+        }
+        let mut text = Vec::new();
+        log.write(&mut text).unwrap();
+        let mut other = Session::new(scene, options).unwrap();
+        let mut again = Vec::new();
+        let each = |frame: Frame<'_>, hash: Option<&str>| {
+            assert_eq!(Some(frame.hash().to_string().as_str()), hash);
+            again.push(frame.hash().to_string());
+        };
+        let replayed = Log::replay(&text[..], &mut other, each).unwrap();
+        assert_eq!(again, hashes, "{seed}");
+        let mut twice = Vec::new();
+        replayed.write(&mut twice).unwrap();
+        assert_eq!(String::from_utf8(twice), String::from_utf8(text), "{seed}");
+        while log.undo(&mut session).unwrap() {}
+        let fresh = Session::new(Arc::clone(session.scene()), at_tolerance(0.4)).unwrap();
+        assert_eq!(session.world(), fresh.world(), "{seed}");
+    }
+}
+
+#[test]
+fn lines_of_a_log_that_make_no_sense_are_named() {
+    let mut session = Session::new(room(), at_tolerance(0.4)).unwrap();
+    for (text, says) in [
+        ("{\"undo\":{}}", "line 1: there is nothing to undo"),
+        ("\n{\"set_time\":{\"to\":1}}\nx", "line 3: expected value"),
+        ("{\"remove\":{\"body\":\"sofa\"}}", "line 1: the scene has no body `sofa`"),
+        ("{\"set_exitance\":{\"material\":\"red\",\"to\":[-1,0,0]}}", "line 1: material `red`"),
+    ] {
+        let error = Log::replay(text.as_bytes(), &mut session, |_, _| {}).unwrap_err();
+        assert!(error.to_string().contains(says), "{error}");
+    }
+}
+
+#[test]
+fn a_solve_is_called_off_and_the_next_one_is_not() {
+    let mut session = Session::new(room(), at_tolerance(0.02)).unwrap();
+    start(&mut session);
+    session.watch().cancel();
+    let error = session.solve().map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("called off"), "{error}");
+    assert!(session.frame().is_none());
+    let hash = session.solve().unwrap().hash();
+    assert_eq!(hash, cold(&session).solve().unwrap().hash());
+    assert_eq!(session.frame().map(|frame| frame.hash()), Some(hash));
+    let mut r = Random(3);
+    for _ in 0..2 {
+        session.apply(insertion(&mut r)).unwrap();
+    }
+    session.solve().unwrap();
+    for command in [Command::Remove(BodyId(4)), insertion(&mut r), Command::Remove(BodyId(2))] {
+        session.apply(command).unwrap();
+    }
+    session.watch().cancel();
+    assert!(session.solve().is_err());
+    check(&mut session, "called off while bodies come and go");
+}
+
+#[test]
+#[ignore = "minutes: a thousand logs"]
+fn a_thousand_logs() {
+    follow(&room(), 1_000..1_800, 8, 0.15);
+    follow(&shipped("box_room.glb"), 2_000..2_100, 8, 0.1);
+    follow(&shipped("cornell_moving_box_and_lamp.glb"), 3_000..3_100, 8, 0.1);
+}
+
+#[test]
+#[ignore = "minutes: ten thousand commands"]
+fn ten_thousand_commands_leave_no_trace() {
+    let mut session = Session::new(room(), at_tolerance(0.4)).unwrap();
+    start(&mut session);
+    let hash = session.solve().unwrap().hash();
+    let (mut r, mut bytes) = (Random(7), Vec::new());
+    for _ in 0..100 {
+        let mut inverses = Vec::new();
+        for step in 0..100 {
+            let command = match step % 25 {
+                7 => insertion(&mut r),
+                _ => draw(&mut r, session.scene()),
+            };
+            inverses.extend(session.apply(command).ok());
+            if step % 50 == 10 {
+                check(&mut session, &format!("step {step}"));
+            } else if step % 5 == 0 {
+                session.solve().unwrap();
+            }
+        }
+        inverses.into_iter().rev().for_each(|back| drop(session.apply(back).unwrap()));
+        check(&mut session, "back");
+        assert_eq!(session.solve().unwrap().hash(), hash);
+        bytes.push(session.memory_bytes());
+    }
+    println!("bytes {bytes:?}");
+    let half = bytes.len() / 2;
+    let most = |bytes: &[u64]| *bytes.iter().max().unwrap();
+    assert!(most(&bytes[half..]) <= most(&bytes[..half]) + most(&bytes[..half]) / 20);
+}
+
+#[test]
+fn the_floor_under_a_crate_that_is_taken_away_is_lit() {
+    let scene = |crate_at: Option<f64>| {
+        let mut b = SceneBuilder::new("cellar");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let glow = b.material("glow", [0.0; 3], [5.0; 3]);
+        let place =
+            |b: &mut SceneBuilder, name: &str| b.node(name, None, DVec3::ZERO, DQuat::IDENTITY);
+        let walls = place(&mut b, "walls");
+        b.cuboid_inward(walls, "walls", grey, v(0.0, 0.0, 0.0), v(4.0, 3.0, 4.0));
+        let lamp = place(&mut b, "lamp");
+        b.cuboid(lamp, "lamp", glow, v(1.0, 2.5, 1.0), v(3.0, 2.7, 3.0));
+        if let Some(x) = crate_at {
+            let one = place(&mut b, "crate");
+            b.cuboid(one, "crate", grey, v(x, 0.0, 1.5), v(x + 1.0, 1.0, 2.5));
+        }
+        b.build().unwrap()
+    };
+    let floor = |session: &mut Session, x: f64| {
+        session.solve().unwrap().irradiance_at([x, 0.0, 2.1], [0.0, 1.0, 0.0])[0]
+    };
+    let mut session = Session::new(scene(Some(0.5)), at_tolerance(0.1)).unwrap();
+    let beside = floor(&mut session, 3.0);
+    let body = session.scene().body_named("crate").unwrap();
+    session.apply(Command::set_pose(body, Pose::translation([2.0, 0.0, 0.0]))).unwrap();
+    let uncovered = floor(&mut session, 1.0);
+    check(&mut session, "moved");
+    let mut there = Session::new(scene(Some(2.5)), at_tolerance(0.1)).unwrap();
+    let expected = floor(&mut there, 1.0);
+    assert!((uncovered / expected - 1.0).abs() < 0.05, "{uncovered} {expected} {beside}");
+    session.apply(Command::hide(body)).unwrap();
+    let empty = floor(&mut Session::new(scene(None), at_tolerance(0.1)).unwrap(), 1.0);
+    let hidden = floor(&mut session, 1.0);
+    assert!((hidden / empty - 1.0).abs() < 0.05, "{hidden} {empty}");
+    check(&mut session, "hidden");
+    session.apply(Command::SetPresence(body, None)).unwrap();
+    session.apply(Command::SetPose(body, None)).unwrap();
+    assert!((floor(&mut session, 3.0) / beside - 1.0).abs() < 1e-3);
+}
+
+/// A room with many boxes, a small one among them; its fifth body.
+fn hall(boxes: u32) -> Scene {
+    let mut b = SceneBuilder::new("hall");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.1; 3], [9.0, 8.0, 7.0]);
+    let walls = b.body("walls");
+    let (corners, triangles) = cube(1.0, true);
+    b.mesh(walls, "walls", grey, &corners, &triangles);
+    b.material("red", [0.7, 0.2, 0.1], [0.0; 3]);
+    let mut r = Random(5);
+    for k in 0..boxes {
+        let half = if k == 3 { 0.02 } else { 0.04 + 0.04 * r.unit() };
+        let at = [k % 4, k / 4 % 4, k / 16].map(|n| 0.42 * f64::from(n) - 0.63 + 0.1 * r.unit());
+        let (corners, triangles) = cube(half, false);
+        let corners: Vec<[f64; 3]> =
+            corners.iter().map(|c| [0, 1, 2].map(|axis| c[axis] + at[axis])).collect();
+        let body = b.body(&format!("box {k}"));
+        b.mesh(body, "box", if k == 7 { glow } else { grey }, &corners, &triangles);
+    }
+    b.build().unwrap()
+}
+
+/// Solves, and says what it cost: pairs looked at, and seconds.
+#[allow(clippy::disallowed_methods)] // seconds are printed, and decide nothing
+fn cost(session: &mut Session, what: &str) -> u64 {
+    let start = Instant::now();
+    let report = session.solve().unwrap().report().clone();
+    let (pairs, all) = (report.examined + report.coarse_examined, start.elapsed().as_secs_f64());
+    let (links, of_pairs) = (report.links, report.seconds.evaluate);
+    println!("{what}: {pairs} pairs looked at, {of_pairs:.2} s; {all:.2} s in all, {links} links");
+    pairs
+}
+
+/// Costs of a cold build; of moving, inserting and removing a small body; of taking a box up and putting it down again.
+fn costs_of_edits(scene: &Scene, options: Options) -> [u64; 8] {
+    let mut session = Session::new(scene.clone(), options).unwrap();
+    let all = cost(&mut session, "cold");
+    let move_to = |session: &mut Session, x: f64, what: &str| {
+        let pose = Pose::translation([x, 0.02, -0.01]);
+        session.apply(Command::set_pose(BodyId(4), pose)).unwrap();
+        cost(session, what)
+    };
+    let first = move_to(&mut session, 0.03, "take hold of it");
+    let again = move_to(&mut session, 0.06, "move it");
+    let (corners, triangles) = cube(0.02, false);
+    let shifted: Vec<[f64; 3]> = corners.iter().map(|c| [c[0] + 0.05, c[1], c[2]]).collect();
+    let new = NewBody::new("new").with_mesh("new", MaterialId(0), &shifted, &triangles);
+    let back = session.apply(Command::Insert(new)).unwrap();
+    let inserted = cost(&mut session, "insert one");
+    session.apply(back).unwrap();
+    let removed = cost(&mut session, "remove it");
+    let back = session.apply(Command::Remove(BodyId(4))).unwrap();
+    let made = cost(&mut session, "remove the other");
+    session.apply(back).unwrap();
+    let returned = cost(&mut session, "put it back");
+    session.apply(Command::SetPose(BodyId(4), None)).unwrap();
+    [all, first, again, inserted, removed, made, returned, cost(&mut session, "let it go")]
+}
+
+#[test]
+#[ignore = "half a minute: 184,000 links"]
+fn what_edits_cost_in_a_room_of_many_boxes() {
+    costs_of_edits(&hall(60), Options { groups: false, ..at_tolerance(0.02) });
+}
+
+#[test]
+fn a_body_that_comes_or_goes_costs_as_one_that_moves() {
+    let [cold, hold, moved, inserted, removed, taken, back, release] =
+        costs_of_edits(&hall(8), at_tolerance(0.1));
+    assert!(4 * moved < cold, "{moved} of {cold} pairs");
+    for cost in [hold, inserted, removed, taken, back, release] {
+        assert!(cost <= 2 * moved, "{cost}, and {moved} for a move");
+    }
+}
+
+#[test]
+fn a_body_of_many_patches_is_taken_up_where_it_rests() {
+    let mut b = SceneBuilder::new("shop");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.1; 3], [9.0, 8.0, 7.0]);
+    let bodies = ["walls", "lamp", "ball", "other"].map(|name| b.body(name));
+    let (corners, triangles) = cube(1.0, true);
+    b.mesh(bodies[0], "walls", grey, &corners, &triangles);
+    let (corners, triangles) = cube(0.1, false);
+    b.mesh(bodies[1], "lamp", glow, &corners, &triangles);
+    for (body, x) in [(bodies[2], -0.4), (bodies[3], 0.5)] {
+        let (points, faces) = ball(v(x, 0.2, -0.8), 0.2);
+        b.mesh(body, "ball", grey, &points, &faces);
+    }
+    let scene = b.build().unwrap();
+    let mut session = Session::new(scene, at_tolerance(0.3)).unwrap();
+    let first = session.solve().unwrap();
+    let (all, hash) = (first.report().examined, first.hash());
+    assert!(first.report().link_kinds.is_some(), "there are groups");
+    let undo = Command::set_pose(bodies[2], Pose::translation([0.02, 0.01, 0.0]));
+    let undo = session.apply(undo).unwrap();
+    check(&mut session, "taken up");
+    let taken = session.frame().unwrap().report().examined;
+    let (points, faces) = ball(v(0.0, -0.5, 0.3), 0.1);
+    let new = NewBody::new("new").with_mesh("new", MaterialId(0), &points, &faces);
+    let out = session.apply(Command::Insert(new)).unwrap();
+    check(&mut session, "another one comes");
+    session.apply(out).unwrap();
+    session.apply(undo).unwrap();
+    check(&mut session, "and leaves, and the first is put down");
+    assert_eq!(session.solve().unwrap().hash(), hash);
+    assert!(2 * taken < all, "{taken} of {all} pairs");
+}
+
+/// A ball of 12 by 8 quadrilaterals, each of two triangles.
+fn ball(at: DVec3, radius: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let (around, up) = (12, 8);
+    let point = |i: u32, k: u32| {
+        let turn = 2.0 * std::f64::consts::PI * f64::from(i % around) / f64::from(around);
+        let rise = std::f64::consts::PI * (f64::from(k) / f64::from(up) - 0.5);
+        let out = libm::cos(rise);
+        let d = v(out * libm::cos(turn), out * libm::sin(turn), libm::sin(rise));
+        (at + radius * d).to_array()
+    };
+    let quads = (0..around).flat_map(|i| (0..up).map(move |k| (i, k)));
+    let mut out = (Vec::new(), Vec::new());
+    for (i, k) in quads {
+        let first = out.0.len() as u32;
+        out.0.extend([point(i, k), point(i + 1, k), point(i + 1, k + 1), point(i, k + 1)]);
+        out.1.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    }
+    out
+}
+
+#[test]
+fn edits_come_to_the_same_on_any_number_of_threads() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut session = Session::new(hall(5), at_tolerance(0.2)).unwrap();
+            let mut r = Random(9);
+            let mut hashes = vec![session.solve().unwrap().hash()];
+            let mut inverses = Vec::new();
+            for command in [insertion(&mut r), Command::Remove(BodyId(2)), insertion(&mut r)] {
+                inverses.push(session.apply(command).unwrap());
+                hashes.push(session.solve().unwrap().hash());
+            }
+            for inverse in inverses.into_iter().rev() {
+                session.apply(inverse).unwrap();
+                hashes.push(session.solve().unwrap().hash());
+            }
+            hashes
+        })
+    };
+    let one = run(1);
+    assert_eq!(one[0], one[6]);
+    assert_eq!(one[1], one[5]);
+    assert_eq!(one[2], one[4]);
+    assert_eq!((run(2), run(8)), (one.clone(), one));
+}

@@ -1,0 +1,73 @@
+//! Scenes from files: which reader a file is for, by its name.
+//!
+//! Must not know what is in files.
+
+use std::path::Path;
+
+use crate::mesh_file::Format;
+use crate::{gltf, mesh_file, view3d};
+use relume_core::scene::draft::Draft;
+use relume_core::scene::{Edits, Scene, SceneError};
+
+/// What to read of a file.
+#[derive(Clone, Debug, Default)]
+pub struct ImportOptions {
+    /// Name of the one animation to play; `None` plays all together, as exporters that write one
+    /// for each object mean it, but of those that move the same properties the first alone.
+    pub animation: Option<String>,
+    /// Whether buffers and images may be anywhere: outside the file's folder, and devices or pipes.
+    pub allow_outside: bool,
+    /// Whether images are kept for pictures, as [`Patch::print`](relume_core::scene::Patch::print); the solution does not need them.
+    pub pictures: bool,
+    /// Bytes that a file, an image or a list of numbers may need, each by itself: what needs more is refused
+    /// before memory is asked for. `None` for no limit.
+    pub max_memory_bytes: Option<u64>,
+    /// What of the scene is changed before it is built.
+    pub edits: Edits,
+}
+
+/// Reads a scene from a .glb or .gltf file (glTF 2.0; external, embedded and compressed buffers), a .vs3 file
+/// of View3D, or an .obj, .stl or .ply file.
+///
+/// Of the last three: a body at rest for each object or group, in metres as the numbers are. Materials of OBJ have Kd
+/// as reflectance and Ke as radiance in W/m2/sr; what has none is a middle grey; all but what emits is double-sided.
+/// Of View3D: one body at rest with a surface for each of the file's, in its order and by its name;
+/// reflectance is 1 minus emittance, subsurfaces and null surfaces are cut out of their base, combined
+/// surfaces are one, obstructions are in [`Scene::obstructions`]. Of glTF:
+///
+/// Units are metres, seconds and W: emissive factors are radiances in W/m2/sr, punctual lights are
+/// converted ([`Light::conversion`](relume_core::scene::Light::conversion)). Emissions and visibility may be animated
+/// (KHR_animation_pointer). Extensions without effect on diffuse light are
+/// ignored; what is read otherwise than the file says is in [`Scene::notes`]. Skins whose triangles hang on one
+/// joint each move with their joints; other skins are held in their pose at the start, moving morph targets in their
+/// rest shape, and scales that change at their first size, each with a warning that names the node. Only files in the scene's own folder and below are opened,
+/// unless [`ImportOptions::allow_outside`] says otherwise.
+///
+/// # Errors
+/// A file that is missing, damaged or needs what is not supported, a
+/// scene without polygons: each names the file, node or mesh, and the remedy.
+pub fn import(path: impl AsRef<Path>, options: &ImportOptions) -> Result<Scene, SceneError> {
+    let path = path.as_ref();
+    if view3d::is_view3d(path) {
+        return match &options.animation {
+            None => view3d::import(path, options),
+            Some(name) => Err(no_animation(name, "View3D")),
+        };
+    }
+    if let Some(format) = Format::of(path) {
+        return match &options.animation {
+            None => mesh_file::import(path, format, options),
+            Some(name) => Err(no_animation(name, format.name())),
+        };
+    }
+    let draft = gltf::draft(path, options)?;
+    Scene::from_draft(Draft { edits: options.edits.clone(), ..draft })
+}
+
+fn no_animation(name: &str, format: &str) -> SceneError {
+    SceneError::Animation {
+        animation: name.to_owned(),
+        what: format!("files of {format} have no animation"),
+        remedy: "leave out --animation".into(),
+    }
+}

@@ -1,0 +1,21 @@
+//! Files of Relume: scenes, environments and logs of commands in; scenes, tables and logs out.
+//!
+//! Readers hand a [`Draft`](relume_core::scene::draft::Draft) to the engine, which checks it. Programs use the crate `relume`,
+//! which re-exports all of this. Must not know how anything is solved or shown.
+
+// Tests may measure and compare with whatever the platform offers: what they compute decides nothing.
+#![cfg_attr(test, allow(clippy::disallowed_methods, clippy::disallowed_types))]
+
+mod environment;
+pub mod export;
+pub mod flat;
+mod folder;
+mod gltf;
+mod import;
+mod log;
+mod mesh_file;
+mod view3d;
+
+pub use environment::read_environment;
+pub use import::{ImportOptions, import};
+pub use log::{Log, LogError};

@@ -1,0 +1,277 @@
+//! Logs of commands: undo and redo, and files that say what was done, to be done again.
+//!
+//! One line of JSON for each command or solve; bodies, materials and lights by name. Must not know how a command is
+//! carried out.
+
+use std::io::{BufRead, Write};
+
+use glam::DMat3;
+use serde::{Deserialize, Serialize};
+
+use relume_core::geometry::Pose;
+use relume_core::scene::{BodyId, LightId, MaterialId, NewBody, Scene};
+use relume_core::session::{Command, CommandError, Frame, Session, SessionError};
+
+/// What was done to a session, one entry for each command, undo, redo and solve.
+#[derive(Debug, Default)]
+pub struct Log {
+    entries: Vec<Entry>,
+    /// Inverses of the commands that stand, the last one last.
+    done: Vec<Command>,
+    /// Inverses of those.
+    undone: Vec<Command>,
+}
+
+/// One entry of a [`Log`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+enum Entry {
+    SetTime { to: f64 },
+    SetPose { body: String, to: Option<Placed> },
+    SetPresence { body: String, to: Option<bool> },
+    SetReflectance { material: String, to: Option<[f64; 3]> },
+    SetExitance { material: String, to: Option<[f64; 3]> },
+    SetIntensity { light: String, to: Option<[f64; 3]> },
+    Insert(NewBody),
+    Remove { body: String },
+    Undo {},
+    Redo {},
+    Solve { hash: Option<String> },
+}
+
+/// A pose in a log.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Placed {
+    /// Axes of the body in the world, one after the other.
+    axes: [[f64; 3]; 3],
+    /// Metres.
+    translation: [f64; 3],
+}
+
+/// Why a log could not be read or followed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LogError {
+    /// The log cannot be read.
+    #[error("the log cannot be read: {0}")]
+    Read(#[from] std::io::Error),
+    /// A line makes no sense.
+    #[error("line {line}: {what}")]
+    Line {
+        /// From 1.
+        line: usize,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A command was refused.
+    #[error("line {line}: {source}")]
+    Refused {
+        /// From 1.
+        line: usize,
+        /// Why.
+        source: CommandError,
+    },
+    /// A world could not be solved.
+    #[error("line {line}: {source}")]
+    Unsolved {
+        /// From 1.
+        line: usize,
+        /// Why.
+        source: SessionError,
+    },
+}
+
+impl Log {
+    /// An empty log.
+    pub fn new() -> Log {
+        Log::default()
+    }
+
+    /// Applies a command to a session; what was undone can be redone no more.
+    ///
+    /// # Errors
+    /// As [`Session::apply`]; a command that was refused is not logged.
+    pub fn apply(&mut self, session: &mut Session, command: Command) -> Result<(), CommandError> {
+        let Some(entry) = Entry::of(session.scene(), &command) else {
+            return Err(CommandError::Value {
+                subject: "a log".into(),
+                what: "it holds what was done, not what was taken back".into(),
+                remedy: "use `Log::undo`".into(),
+            });
+        };
+        self.done.push(session.apply(command)?);
+        self.undone.clear();
+        self.entries.push(entry);
+        Ok(())
+    }
+
+    /// Takes the last command that stands back; whether there was one.
+    ///
+    /// # Errors
+    /// [`CommandError`] if commands beside this log have changed what it would change.
+    pub fn undo(&mut self, session: &mut Session) -> Result<bool, CommandError> {
+        let found = turn_back(session, &mut self.done, &mut self.undone)?;
+        self.entries.extend(found.then_some(Entry::Undo {}));
+        Ok(found)
+    }
+
+    /// Applies the last command that was undone again; whether there was one.
+    ///
+    /// # Errors
+    /// As [`Log::undo`].
+    pub fn redo(&mut self, session: &mut Session) -> Result<bool, CommandError> {
+        let found = turn_back(session, &mut self.undone, &mut self.done)?;
+        self.entries.extend(found.then_some(Entry::Redo {}));
+        Ok(found)
+    }
+
+    /// Solves the session's world, and logs the hash.
+    ///
+    /// # Errors
+    /// As [`Session::solve`]; nothing is logged then.
+    pub fn solve<'a>(&mut self, session: &'a mut Session) -> Result<Frame<'a>, SessionError> {
+        let frame = session.solve()?;
+        self.entries.push(Entry::Solve { hash: Some(frame.hash().to_string()) });
+        Ok(frame)
+    }
+
+    /// Writes the log, a line for each entry.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write(&self, mut to: impl Write) -> std::io::Result<()> {
+        for entry in &self.entries {
+            serde_json::to_writer(&mut to, entry)?;
+            writeln!(to)?;
+        }
+        Ok(())
+    }
+
+    /// Does to a session what a log says was done to another; after each solve `each` is told the frame and the hash that
+    /// the log has for it. Returns the log of what was done.
+    ///
+    /// # Errors
+    /// [`LogError`], with the number of the line; what was done before stays.
+    pub fn replay(
+        from: impl BufRead,
+        session: &mut Session,
+        mut each: impl FnMut(Frame<'_>, Option<&str>),
+    ) -> Result<Log, LogError> {
+        let mut log = Log::new();
+        for (number, text) in from.lines().enumerate() {
+            let (line, text) = (number + 1, text?);
+            if text.trim().is_empty() {
+                continue;
+            }
+            let fail = |what: String| LogError::Line { line, what };
+            let refused = |source| LogError::Refused { line, source };
+            let entry: Entry = serde_json::from_str(&text).map_err(|e| fail(e.to_string()))?;
+            match &entry {
+                Entry::Undo {} => match log.undo(session).map_err(refused)? {
+                    true => {}
+                    false => return Err(fail("there is nothing to undo".into())),
+                },
+                Entry::Redo {} => match log.redo(session).map_err(refused)? {
+                    true => {}
+                    false => return Err(fail("there is nothing to redo".into())),
+                },
+                Entry::Solve { hash } => {
+                    let frame = log.solve(session);
+                    let frame = frame.map_err(|source| LogError::Unsolved { line, source })?;
+                    each(frame, hash.as_deref());
+                }
+                other => {
+                    let command = other.command(session.scene()).map_err(fail)?;
+                    log.apply(session, command).map_err(refused)?;
+                }
+            }
+        }
+        Ok(log)
+    }
+}
+
+/// Applies the last command of one stack and puts its inverse on another.
+fn turn_back(
+    session: &mut Session,
+    from: &mut Vec<Command>,
+    to: &mut Vec<Command>,
+) -> Result<bool, CommandError> {
+    let Some(command) = from.last() else { return Ok(false) };
+    to.push(session.apply(command.clone())?);
+    from.pop();
+    Ok(true)
+}
+
+impl Entry {
+    /// What a log says of a command; nothing of one that puts back.
+    fn of(scene: &Scene, command: &Command) -> Option<Entry> {
+        // What does not exist is refused when the command is applied.
+        let body = |id: &BodyId| scene.bodies.get(id.0 as usize).map(|b| b.name.clone());
+        let material = |id: &MaterialId| scene.materials.get(id.0 as usize).map(|m| m.name.clone());
+        let light = |id: &LightId| scene.lights.get(id.0 as usize).map(|l| l.name.clone());
+        Some(match command {
+            Command::SetTime(to) => Entry::SetTime { to: *to },
+            Command::SetPose(id, to) => Entry::SetPose {
+                body: body(id).unwrap_or_default(),
+                to: to.map(|pose| Placed {
+                    axes: pose.rotation.to_cols_array_2d(),
+                    translation: pose.translation.to_array(),
+                }),
+            },
+            Command::SetPresence(id, to) => {
+                Entry::SetPresence { body: body(id).unwrap_or_default(), to: *to }
+            }
+            Command::SetReflectance(id, to) => {
+                Entry::SetReflectance { material: material(id).unwrap_or_default(), to: *to }
+            }
+            Command::SetExitance(id, to) => {
+                Entry::SetExitance { material: material(id).unwrap_or_default(), to: *to }
+            }
+            Command::SetIntensity(id, to) => {
+                Entry::SetIntensity { light: light(id).unwrap_or_default(), to: *to }
+            }
+            Command::Insert(new) => Entry::Insert(new.clone()),
+            Command::Remove(id) => Entry::Remove { body: body(id).unwrap_or_default() },
+            // What puts back, and commands that are newer than this page.
+            _ => return None,
+        })
+    }
+
+    /// The command that an entry says; it is one.
+    fn command(&self, scene: &Scene) -> Result<Command, String> {
+        let body = |name: &String| {
+            scene.body_named(name).ok_or_else(|| format!("the scene has no body `{name}`"))
+        };
+        let material = |name: &String| {
+            let at = scene.materials.iter().position(|m| m.name == *name);
+            let id = at.map(|k| MaterialId(k as u32));
+            id.ok_or_else(|| format!("the scene has no material `{name}`"))
+        };
+        let light = |name: &String| {
+            let at = scene.lights.iter().position(|l| l.name == *name);
+            at.map(|k| LightId(k as u32)).ok_or_else(|| format!("the scene has no light `{name}`"))
+        };
+        Ok(match self {
+            Entry::SetTime { to } => Command::SetTime(*to),
+            Entry::SetPose { body: name, to } => Command::SetPose(
+                body(name)?,
+                to.map(|Placed { axes, translation }| Pose {
+                    rotation: DMat3::from_cols_array_2d(&axes),
+                    translation: translation.into(),
+                }),
+            ),
+            Entry::SetPresence { body: name, to } => Command::SetPresence(body(name)?, *to),
+            Entry::SetReflectance { material: name, to } => {
+                Command::SetReflectance(material(name)?, *to)
+            }
+            Entry::SetExitance { material: name, to } => Command::SetExitance(material(name)?, *to),
+            Entry::SetIntensity { light: name, to } => Command::SetIntensity(light(name)?, *to),
+            Entry::Insert(new) => Command::Insert(new.clone()),
+            Entry::Remove { body: name } => Command::Remove(body(name)?),
+            Entry::Undo {} | Entry::Redo {} | Entry::Solve { .. } => {
+                return Err("it is no command".into());
+            }
+        })
+    }
+}

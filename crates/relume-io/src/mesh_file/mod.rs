@@ -1,0 +1,181 @@
+//! Files that hold meshes and nothing that moves: Wavefront OBJ with its materials, STL, PLY.
+//!
+//! Coordinates are taken as metres, whatever axis is up. Each object or group is a body of its own. Reads and
+//! translates; what makes a scene valid is [`Scene::from_draft`]'s. Must not know light transport.
+
+use std::path::Path;
+
+use glam::{DQuat, DVec3};
+
+use crate::ImportOptions;
+use crate::folder::{Folder, read_scene};
+use relume_core::scene::draft::{Draft, DraftNode, DraftSurface};
+use relume_core::scene::merge::merge;
+use relume_core::scene::{Material, MaterialId, Note, Scene, SceneError, Severity};
+
+mod obj;
+mod ply;
+mod polygon;
+mod stl;
+
+/// Reflectance of what has no material: a middle grey.
+const REFLECTANCE: f64 = 0.5;
+
+/// Corners of all polygons of a file at most: above any scene that can be solved.
+const CORNERS_MAX: usize = 1 << 24;
+
+/// The formats that are read.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Format {
+    Obj,
+    Stl,
+    Ply,
+}
+
+impl Format {
+    /// The format of a file, by its name.
+    pub(super) fn of(path: &Path) -> Option<Format> {
+        let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+        match ending.as_str() {
+            "obj" => Some(Format::Obj),
+            "stl" => Some(Format::Stl),
+            "ply" => Some(Format::Ply),
+            _ => None,
+        }
+    }
+
+    /// As messages call it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Format::Obj => "OBJ",
+            Format::Stl => "STL",
+            Format::Ply => "PLY",
+        }
+    }
+}
+
+/// What a file holds.
+#[derive(Default)]
+struct Contents {
+    objects: Vec<Object>,
+    materials: Vec<Material>,
+    notes: Vec<Note>,
+}
+
+/// An object or group: polygons of one or several materials.
+struct Object {
+    name: String,
+    parts: Vec<Part>,
+}
+
+/// Polygons of one material.
+struct Part {
+    /// `None` for the one that things without a material get.
+    material: Option<usize>,
+    points: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+/// Reads a scene at rest.
+///
+/// # Errors
+/// A file that is missing, damaged, too large or without polygons, with its name and the remedy.
+pub(super) fn import(
+    path: &Path,
+    format: Format,
+    options: &ImportOptions,
+) -> Result<Scene, SceneError> {
+    let folder = Folder {
+        file: path.display().to_string(),
+        directory: path.parent().unwrap_or(Path::new("")).to_owned(),
+        allow_outside: options.allow_outside,
+        max_memory_bytes: options.max_memory_bytes,
+    };
+    let (bytes, stem) = read_scene(path, options.max_memory_bytes)?;
+    let contents = match format {
+        Format::Obj => obj::read(&bytes, &stem, &folder),
+        Format::Stl => stl::read(bytes, &stem, &folder),
+        Format::Ply => ply::read(&bytes, &stem, &folder),
+    }?;
+    let draft = draft(contents, stem, format)?;
+    Scene::from_draft(Draft { edits: options.edits.clone(), ..draft })
+}
+
+/// An error about the content of a file.
+fn damaged(folder: &Folder, format: Format, what: impl std::fmt::Display) -> SceneError {
+    SceneError::Mesh {
+        file: folder.file.clone(),
+        format: format.name(),
+        what: what.to_string(),
+        remedy: "repair the file or export it again".into(),
+    }
+}
+
+/// A node for each object.
+fn draft(contents: Contents, name: String, format: Format) -> Result<Draft, SceneError> {
+    let Contents { objects, mut materials, mut notes } = contents;
+    let none = materials.len();
+    let bare = objects.iter().flat_map(|o| &o.parts).filter(|p| p.material.is_none()).count();
+    if bare > 0 {
+        materials.push(grey());
+        let message = format!(
+            "surfaces without a material: {bare}; they get reflectance {REFLECTANCE} on both sides"
+        );
+        notes.push(info("no-material", "no material", bare, message));
+    }
+    let message =
+        format!("{} has no units and no up: coordinates are taken as metres", format.name());
+    notes.push(info("units", &name, 1, message));
+    let mut nodes = Vec::new();
+    for object in objects {
+        let mut node = DraftNode::still(&object.name, None, DVec3::ZERO, DQuat::IDENTITY);
+        for part in object.parts {
+            check_places(&part.points, &object.name)?;
+            let merged = merge(&part.points, &part.triangles);
+            if merged.degenerate > 0 {
+                let (none, all) = (merged.degenerate, part.triangles.len());
+                let message = format!("{none} of {all} triangles have no area and were left out");
+                notes.push(info("degenerate", &object.name, none, message));
+            }
+            let material = MaterialId(part.material.unwrap_or(none) as u32);
+            node.surfaces.push(DraftSurface {
+                name: None,
+                material,
+                polygons: merged.polygons,
+                tints: Vec::new(),
+                prints: Vec::new(),
+            });
+        }
+        nodes.push(node);
+    }
+    Ok(Draft { name, nodes, materials, notes, ..Draft::default() })
+}
+
+fn grey() -> Material {
+    Material {
+        name: "no material".into(),
+        reflectance: [REFLECTANCE; 3],
+        exitance: [0.0; 3],
+        glow: None,
+        double_sided: true,
+    }
+}
+
+fn check_places(points: &[DVec3], object: &str) -> Result<(), SceneError> {
+    match points.iter().find(|p| !p.is_finite()) {
+        None => Ok(()),
+        Some(p) => Err(SceneError::Geometry {
+            subject: format!("object `{object}`"),
+            what: format!("a vertex is at ({}, {}, {}), which is no place", p.x, p.y, p.z),
+            remedy: "repair the mesh and export it again".into(),
+        }),
+    }
+}
+
+fn info(code: &'static str, subject: &str, count: usize, message: String) -> Note {
+    Note { severity: Severity::Info, code, subject: subject.to_owned(), count, message }
+}
+
+fn warning(code: &'static str, subject: &str, count: usize, message: String) -> Note {
+    Note { severity: Severity::Warning, ..info(code, subject, count, message) }
+}

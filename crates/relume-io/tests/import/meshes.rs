@@ -1,0 +1,300 @@
+//! Meshes of OBJ, STL and PLY files: the same cube in each, and what is wrong with some.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::gltf::{cube_indices, cube_positions};
+use super::{read, with_code};
+use relume_core::scene::{Scene, SceneError};
+use relume_io::{ImportOptions, import};
+
+/// A scene of a file of this content.
+fn scene_of(name: &str, content: &[u8]) -> Result<Scene, SceneError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, content).unwrap();
+    read(&path)
+}
+
+/// The unit cube, its fronts outside.
+fn is_the_cube(scene: &Scene) {
+    assert_eq!((scene.bodies.len(), scene.patches.len()), (1, 12), "double-sided");
+    let (min, max) = scene.bounds(0.0).unwrap();
+    assert_eq!((min, max), (DVec3::ZERO, DVec3::ONE));
+    let outward = |p: &relume_core::scene::Patch| {
+        p.frame.normal.dot(p.frame.origin - (min + max) / 2.0) > 0.0
+    };
+    assert_eq!(scene.patches.iter().filter(|p| outward(p)).count(), 6);
+    assert_eq!(scene.materials[0].reflectance, [0.5; 3]);
+    assert_eq!(with_code(&scene.notes, "units").len(), 1);
+}
+
+/// Corners and triangles of the cube.
+fn cube() -> (Vec<[f32; 3]>, Vec<[u16; 3]>) {
+    let corners = cube_positions().chunks(3).map(|p| [p[0], p[1], p[2]]).collect();
+    (corners, cube_indices().chunks(3).map(|t| [t[0], t[1], t[2]]).collect())
+}
+
+fn stl_text() -> String {
+    let (corners, triangles) = cube();
+    let vertex = |c: &u16| {
+        let [x, y, z] = corners[usize::from(*c)];
+        format!("vertex {x} {y} {z}\n")
+    };
+    let facet = |t: &[u16; 3]| {
+        format!(
+            "facet normal 0 0 0\nouter loop\n{}endloop\nendfacet\n",
+            t.iter().map(vertex).collect::<String>()
+        )
+    };
+    format!("solid cube\n{}endsolid cube\n", triangles.iter().map(facet).collect::<String>())
+}
+
+fn stl_binary(header: &[u8]) -> Vec<u8> {
+    let (corners, triangles) = cube();
+    let mut bytes = header.to_vec();
+    bytes.resize(80, 0);
+    bytes.extend((triangles.len() as u32).to_le_bytes());
+    for t in &triangles {
+        bytes.extend([0; 12]);
+        bytes.extend(t.iter().flat_map(|&c| corners[usize::from(c)]).flat_map(f32::to_le_bytes));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+#[test]
+fn stl_in_text_and_in_both_guises_of_binary() {
+    is_the_cube(&scene_of("cube.stl", stl_text().as_bytes()).unwrap());
+    is_the_cube(&scene_of("cube.STL", &stl_binary(b"made by hand")).unwrap());
+    is_the_cube(
+        &scene_of("cube.stl", &stl_binary(b"solid cube\nmade by a program that does not care"))
+            .unwrap(),
+    );
+}
+
+fn ply(format: &str) -> Vec<u8> {
+    let (corners, _) = cube();
+    let mut text = format!(
+        "ply\nformat {format} 1.0\ncomment by hand\nelement vertex 24\nproperty float x\nproperty float y\nproperty float z\n\
+         property uchar red\nelement face 6\nproperty list uchar int vertex_indices\nelement edge 1\nproperty int a\nend_header\n"
+    )
+    .into_bytes();
+    let is_text = format == "ascii";
+    let is_big = format == "binary_big_endian";
+    let word =
+        |v: [u8; 4]| if is_big { v.into_iter().rev().collect::<Vec<u8>>() } else { v.to_vec() };
+    for c in &corners {
+        match is_text {
+            true => text.extend(format!("{} {} {} 7\n", c[0], c[1], c[2]).into_bytes()),
+            false => {
+                text.extend(c.iter().flat_map(|v| word(v.to_le_bytes())));
+                text.push(7);
+            }
+        }
+    }
+    for side in 0..6 {
+        let loop_of = [0, 1, 2, 3].map(|k| 4 * side + k);
+        match is_text {
+            true => text.extend(
+                format!("4 {} {} {} {}\n", loop_of[0], loop_of[1], loop_of[2], loop_of[3])
+                    .into_bytes(),
+            ),
+            false => {
+                text.push(4);
+                text.extend(loop_of.iter().flat_map(|v: &i32| word(v.to_le_bytes())));
+            }
+        }
+    }
+    text.extend(if is_text { b"5\n".to_vec() } else { vec![0; 4] });
+    text
+}
+
+#[test]
+fn ply_in_text_and_both_orders_of_binary() {
+    for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+        let scene = scene_of("cube.ply", &ply(format)).unwrap();
+        is_the_cube(&scene);
+        assert!(with_code(&scene.notes, "ply")[0].message.contains("edge"));
+    }
+}
+
+const OBJ: &str = "mtllib room.mtl\no floor\nv 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 0.5 0\nv 0 2 0\nusemtl red\nf 1 2 3 4 5\n\
+                   o lamp\nv 0 0 3\nv 1 0 3\nv 1 1 3\nv 0 1 3\nusemtl light\nf -1 -2 -3 -4\nusemtl nothing\nf 6 7 8\n\
+                   g group\nf 6/1/1 7/1/1 8/1/1\nl 1 2\n";
+const MTL: &str =
+    "newmtl red\nKd 0.8 0.1 1.0\nmap_Kd wood.png\nd 0.5\nnewmtl light\nKe 4 2 0\nKd 0.2 0.2 0.2\n";
+
+/// What only black materials are known of is drawn grey; one that is black among others is black.
+#[test]
+fn obj_files_that_are_black_all_over_are_grey() {
+    let reflectances = |materials: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("room.mtl"), materials).unwrap();
+        let path = folder.path().join("room.obj");
+        std::fs::write(&path, OBJ).unwrap();
+        let scene = import(&path, &Default::default()).unwrap();
+        let of = |name: &str| {
+            scene.materials.iter().find(|m| m.name == name).map(|m| m.reflectance[0]).unwrap()
+        };
+        (of("red"), of("light"), with_code(&scene.notes, "black").len())
+    };
+    let black = "newmtl red\nKd 0 0 0\nnewmtl light\nKd 0 0 0\n";
+    assert_eq!(reflectances(black), (0.5, 0.5, 1));
+    let one = "newmtl red\nKd 0 0 0\nnewmtl light\nKd 0.2 0.2 0.2\n";
+    assert_eq!(reflectances(one), (0.0, 0.2, 0));
+    let textured = "newmtl red\nKd 0 0 0\nmap_Kd wood.png\nnewmtl light\nKd 0.2 0.2 0.2\n";
+    assert_eq!(reflectances(textured), (0.5, 0.2, 0));
+}
+
+#[test]
+fn strips_of_triangles_in_ply_are_surfaces() {
+    let strips = |list: &str| {
+        let count = list.split_whitespace().count();
+        let text = format!(
+            "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n\
+             element tristrips 1\nproperty list int int vertex_indices\nend_header\n\
+             0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 1\n1 2 1\n{count} {list}\n"
+        );
+        scene_of("strip.ply", text.as_bytes()).unwrap()
+    };
+    let fronts = |scene: &Scene| {
+        let firsts = scene
+            .patches
+            .iter()
+            .enumerate()
+            .filter(|(k, p)| p.twin.is_none_or(|t| t.0 as usize > *k));
+        firsts.map(|(_, p)| (p.area_m2(), p.frame.normal.z > 0.0)).collect::<Vec<_>>()
+    };
+    // A square, and a slope behind it, all counter-clockwise from above.
+    let whole = fronts(&strips("0 1 2 3 4 5"));
+    assert!(whole.len() == 2 && whole.iter().all(|f| f.1), "{whole:?}");
+    assert!((whole[0].0 - 1.0).abs() < 1e-12 && (whole[1].0 - 2f64.sqrt()).abs() < 1e-12);
+    // In two strips with a gap between.
+    assert_eq!(fronts(&strips("0 1 2 3 -1 2 3 4 5")), whole);
+    assert_eq!(fronts(&strips("0 1 2 -1 4 2 3")).len(), 2);
+}
+
+#[test]
+fn ply_with_other_ends_of_lines_and_more_space() {
+    for format in ["ascii", "binary_little_endian"] {
+        let plain = ply(format);
+        let body = plain.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+        for end in ["\r", "\r\n"] {
+            let again = |bytes: &[u8]| {
+                String::from_utf8(bytes.to_vec()).unwrap().replace('\n', end).into_bytes()
+            };
+            let text = again(&plain[..body]);
+            let rest =
+                if format == "ascii" { again(&plain[body..]) } else { plain[body..].to_vec() };
+            is_the_cube(&scene_of("cube.ply", &[text, rest].concat()).unwrap());
+        }
+        let text = String::from_utf8(plain[..body].to_vec()).unwrap();
+        let text = text
+            .replace("element face", "\t element  \tface")
+            .replace("property float", "property   float");
+        is_the_cube(&scene_of("cube.ply", &[text.as_bytes(), &plain[body..]].concat()).unwrap());
+    }
+}
+
+#[test]
+fn obj_with_objects_groups_and_materials() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("room.obj");
+    std::fs::write(&path, OBJ).unwrap();
+    std::fs::write(folder.path().join("room.mtl"), MTL).unwrap();
+    let scene = read(&path).unwrap();
+    let bodies: Vec<&str> = scene.bodies.iter().map(|b| b.name.as_str()).collect();
+    assert_eq!(bodies, ["floor", "lamp", "group"]);
+    let material = |name: &str| scene.materials.iter().find(|m| m.name == name).unwrap();
+    assert_eq!(material("red").reflectance, [0.8, 0.1, 0.98]);
+    assert!(material("red").double_sided && !material("light").double_sided);
+    let pi = std::f64::consts::PI;
+    assert_eq!(material("light").exitance, [4.0 * pi, 2.0 * pi, 0.0]);
+    // The floor is not convex: its area is that of its outline, on both sides, and not of its hull.
+    let of = |body: &str| {
+        let body = scene.bodies.iter().position(|b| b.name == body).unwrap();
+        scene
+            .patches_of(relume_core::scene::BodyId(body as u32))
+            .map(|(_, p)| p.area_m2())
+            .sum::<f64>()
+    };
+    assert!((of("floor") - 2.0 * 2.5).abs() < 1e-9, "{}", of("floor"));
+    for code in ["reflectance", "texture", "transparency", "units"] {
+        assert_eq!(with_code(&scene.notes, code).len(), 1, "{code}");
+    }
+    std::fs::remove_file(folder.path().join("room.mtl")).unwrap();
+    let scene = read(&path).unwrap();
+    assert_eq!(scene.materials.len(), 1);
+    assert_eq!(with_code(&scene.notes, "material-file")[0].subject, "room.mtl");
+}
+
+#[test]
+fn files_of_materials_elsewhere_are_opened_only_if_asked_for() {
+    let parent = tempfile::tempdir().unwrap();
+    let folder = parent.path().join("scene");
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::write(parent.path().join("room.mtl"), MTL).unwrap();
+    let path = folder.join("room.obj");
+    std::fs::write(&path, OBJ.replace("room.mtl", "../room.mtl")).unwrap();
+    let error = read(&path).unwrap_err();
+    assert!(matches!(error, SceneError::Outside { .. }), "{error}");
+    let options = ImportOptions { allow_outside: true, ..ImportOptions::default() };
+    assert_eq!(import(&path, &options).unwrap().materials[0].reflectance[0], 0.8);
+}
+
+#[test]
+fn what_is_wrong_with_them_is_said() {
+    let said = |name: &str, content: &[u8]| scene_of(name, content).unwrap_err().to_string();
+    let cut = |bytes: &[u8]| bytes[..bytes.len() - 30].to_vec();
+    let many = String::from_utf8(ply("ascii")).unwrap();
+    for (name, content, words) in [
+        ("a.obj", b"v 1 2 x\n".to_vec(), "is not a valid OBJ file"),
+        ("a.obj", b"v 0 0 0\nf 1 2 3\n".to_vec(), "is not a valid OBJ file"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n".to_vec(), "no place"),
+        ("a.obj", b"v 0 0 0\n".to_vec(), "no polygon"),
+        ("a.obj", Vec::new(), "no polygon"),
+        ("a.stl", Vec::new(), "is not a valid STL file"),
+        ("a.stl", cut(&stl_binary(b"")), "is not a valid STL file"),
+        ("a.stl", cut(stl_text().as_bytes()), "is not a valid STL file"),
+        ("a.ply", Vec::new(), "is not a valid PLY file"),
+        ("a.ply", cut(&ply("binary_little_endian")), "is not a valid PLY file"),
+        (
+            "a.ply",
+            many.replace("vertex 24", "vertex 99999999999").into_bytes(),
+            "more than it has bytes",
+        ),
+        ("a.ply", many.replace("4 0 1 2 3", "4 0 1 2 24").into_bytes(), "face 0 has a corner"),
+        ("a.ply", many.replace("4 0 1 2 3", "4 0 1 2 -1").into_bytes(), "face 0 has a corner"),
+    ] {
+        let message = said(name, &content);
+        assert!(message.contains(words), "{name}: {message}");
+    }
+    let animation = ImportOptions { animation: Some("walk".into()), ..ImportOptions::default() };
+    let message = import(Path::new("a.ply"), &animation).unwrap_err().to_string();
+    assert!(message.contains("files of PLY have no animation"), "{message}");
+    let limited = ImportOptions { max_memory_bytes: Some(100), ..ImportOptions::default() };
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.stl"), stl_text()).unwrap();
+    let error = import(folder.path().join("a.stl"), &limited).unwrap_err();
+    assert!(matches!(error, SceneError::TooLarge { .. }), "{error}");
+}
+
+#[test]
+fn damage_anywhere_never_panics() {
+    for (name, whole) in [
+        ("a.obj", OBJ.as_bytes().to_vec()),
+        ("a.stl", stl_binary(b"")),
+        ("a.stl", stl_text().into_bytes()),
+        ("a.ply", ply("ascii")),
+        ("a.ply", ply("binary_big_endian")),
+    ] {
+        for place in 0..whole.len() {
+            let mut damaged = whole.clone();
+            damaged[place] ^= [1, 0x10, 0x80, 0xff][place % 4];
+            // Whatever it says.
+            let _ = scene_of(name, &damaged);
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! A program against the face alone: a lamp is moved by hand and back.
+
+use relume::{Command, Options, Pose, SceneBuilder, Session};
+
+/// Corners and triangles of a cube of side 2 `half`, counter-clockwise seen from outside, or from inside.
+fn cube(half: f64, inward: bool) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let corner = |k: u32| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { half } else { -half });
+    let sides =
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let turned = |[a, b, c]: [u32; 3]| if inward { [a, c, b] } else { [a, b, c] };
+    let of_side = |[a, b, c, d]: [u32; 4]| [turned([a, b, c]), turned([a, c, d])];
+    ((0..8).map(corner).collect(), sides.into_iter().flat_map(of_side).collect())
+}
+
+#[test]
+fn a_body_is_moved_and_put_back() -> Result<(), Box<dyn std::error::Error>> {
+    let (positions, triangles) = cube(1.0, true);
+    let (lamp_positions, lamp_triangles) = cube(0.2, false);
+    let mut b = SceneBuilder::new("two");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.0; 3], [1.0; 3]);
+    let room = b.body("room");
+    let ball = b.body("ball");
+    b.mesh(room, "walls", grey, &positions, &triangles);
+    b.mesh(ball, "lamp", glow, &lamp_positions, &lamp_triangles);
+    let scene = b.build()?;
+    let mut session = Session::new(scene, Options::default())?;
+    let first = session.solve()?.hash();
+    let undo = session.apply(Command::set_pose(ball, Pose::translation([0.1, 0.0, 0.0])))?;
+    let frame = session.solve()?;
+    assert_ne!(frame.hash(), first);
+    assert!(frame.report().links > 0);
+    // What a closed room of reflectance 1/2 receives on average is twice what the lamp sends, by area; the floor's middle more.
+    assert!(frame.irradiance_at([0.0, -1.0, 0.0], [0.0, 1.0, 0.0])[0] > 0.08);
+    session.apply(undo)?;
+    assert_eq!(session.solve()?.hash(), first);
+    let mesh = session.solve()?.snapshot();
+    assert_eq!(mesh.radiosity.len(), mesh.patch.len());
+    Ok(())
+}

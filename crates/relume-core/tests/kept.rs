@@ -3,9 +3,11 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use relume_core::flat::{FlatOptions, FlatSession, parse};
-use relume_core::session::{SessionError, Update, compare};
-use relume_core::{BodyId, Command, Frame, Hash, NewBody, Options, Pose, SceneBuilder, Session};
+use relume_core::flat::{FlatOptions, FlatSession};
+use relume_core::geometry::Pose;
+use relume_core::scene::{BodyId, MaterialId, NewBody, Scene, SceneBuilder};
+use relume_core::session::{Command, Frame, Hash, Options, Session, SessionError, Update, compare};
+use relume_io::flat::parse;
 
 use crate::commands::{check, clutter, cold, cube, draw, insertion, kinds, room, start};
 use crate::common::{Random, at_tolerance, audit, lit_room, shipped, v};
@@ -27,7 +29,7 @@ fn keeps(session: &Session, was: (Hash, u64, [f64; 3]), why: &str) {
 }
 
 /// Random steps with random limits on memory, so that steps come to nothing at any point; how many of those there were.
-fn run_out_of_memory(scene: &relume_core::Scene, seed: u64, update: Update, edits: f64) -> usize {
+fn run_out_of_memory(scene: &Scene, seed: u64, update: Update, edits: f64) -> usize {
     let mut r = Random(seed);
     let options = Options { update, ..kinds()[(seed % 2) as usize].clone() };
     let mut session = Session::new(scene.clone(), options).unwrap();
@@ -117,7 +119,7 @@ fn one_that_is_called_off_goes_back() {
         insertion(&mut Random(3)),
         Command::Remove(BodyId(2)),
         Command::Remove(BodyId(4)),
-        Command::SetExitance(relume_core::MaterialId(0), Some([1.0; 3])),
+        Command::SetExitance(MaterialId(0), Some([1.0; 3])),
     ];
     let mut inverses = Vec::new();
     for (k, command) in commands.into_iter().enumerate() {
@@ -172,12 +174,7 @@ fn commands_leave_the_last_solution() {
         assert_eq!(seen(session.frame().unwrap()), was);
         assert_eq!(session.frame().unwrap().snapshot(), mesh);
     }
-    let bad = NewBody::new("bad").with_mesh(
-        "bad",
-        relume_core::MaterialId(99),
-        &[[0.0; 3]; 3],
-        &[[0, 1, 2]],
-    );
+    let bad = NewBody::new("bad").with_mesh("bad", MaterialId(99), &[[0.0; 3]; 3], &[[0, 1, 2]]);
     assert!(session.apply(Command::Insert(bad)).is_err());
     assert!(session.apply(Command::hide(BodyId(77))).is_err());
     assert_eq!(seen(session.frame().unwrap()), was);

@@ -6,12 +6,14 @@ use relume::session::{Accuracy, Frame, Sensor};
 #[derive(Debug)]
 pub(crate) struct Estimates {
     points: Option<usize>,
+    /// What was looked at, for the line.
+    where_: &'static str,
     worst: Option<(u32, Accuracy)>,
 }
 
 impl Estimates {
     pub(crate) fn new(points: Option<u32>) -> Estimates {
-        Estimates { points: points.map(|n| n as usize), worst: None }
+        Estimates { points: points.map(|n| n as usize), where_: "points of the mesh", worst: None }
     }
 
     /// Estimates the error of the frame just solved: at an even share of the sensors, or else at points spread over what is lit.
@@ -22,6 +24,9 @@ impl Estimates {
         sensors: Option<&[Sensor]>,
     ) -> Option<Accuracy> {
         let points = self.points?;
+        if sensors.is_some() {
+            self.where_ = "sensors";
+        }
         let found = match sensors {
             None => solved.accuracy(points),
             Some(sensors) => solved.accuracy_at(&some(sensors, points)),
@@ -37,20 +42,17 @@ impl Estimates {
         let Some((frame, found)) = self.worst.filter(|(_, found)| found.points > 0) else {
             return String::new();
         };
-        let Accuracy { points, rms, resolved, largest, largest_at: [x, y, z], mesh_rms, .. } =
-            found;
+        let Accuracy { points, rms, resolved, largest, largest_at: [x, y, z], .. } = found;
         let percent = |error: f64| match error < resolved {
             true => format!("less than {:.2} %", 100.0 * resolved),
             false => format!("about {:.2} %", 100.0 * error),
         };
         let mut line = format!(
-            "\nframe {frame}: irradiance is off by {} (RMS at {points} points, most near {x:.3},{y:.3},{z:.3}: {:+.1} %)",
+            "\nframe {frame}: irradiance is off by {} (RMS at {points} {}, most near {x:.3},{y:.3},{z:.3}: {:+.1} %)",
             percent(rms),
+            self.where_,
             100.0 * largest
         );
-        if let Some(mesh) = mesh_rms {
-            line += &format!("; the mesh by {}", percent(mesh));
-        }
         if rms > tolerance && rms > resolved {
             line += &format!(
                 "\nnote: that is more than the tolerance of {tolerance}: try --tolerance {}",

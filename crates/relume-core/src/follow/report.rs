@@ -134,26 +134,23 @@ impl Energy {
     }
 }
 
-/// Errors of a solution, relative to the irradiance (sum of the channels) at each of some points: 1. Estimated, not bounded.
+/// Errors of a solution, relative to the irradiance (sum of the channels) at each of some points: 1. Of what the mesh says there
+/// (`Snapshot::irradiance_at`), or of what sensors read (`Frame::irradiance_at`), as it was asked for. Estimated, not
+/// bounded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Accuracy {
     /// Number of points.
     pub points: u32,
-    /// Root mean square over the points of the error of what a sensor there reads
-    /// (`Frame::irradiance_at`).
+    /// Root mean square of the errors over the points.
     pub rms: f64,
     /// Root mean square error that these points and walks can tell from none: of what is below, `rms` says nothing.
     pub resolved: f64,
-    /// Mean of these errors, with its sign: positive where the solution is too bright.
+    /// Mean of the errors, with its sign: positive where the solution is too bright.
     pub mean: f64,
-    /// Largest of these errors, with its sign: positive where the solution is too bright.
+    /// Largest of the errors, with its sign: positive where the solution is too bright.
     pub largest: f64,
     /// Where that is, metres.
     pub largest_at: [f64; 3],
-    /// Root mean square of the error of what the mesh says there (`Snapshot::irradiance_at`): of pictures and lit
-    /// meshes. `None` at sensors.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mesh_rms: Option<f64>,
 }
 
 /// Bytes that the engine's structures hold.

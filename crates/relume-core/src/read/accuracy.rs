@@ -1,24 +1,29 @@
 //! How good a solution is, measured by itself: the residual of the rendering equation with exact visibility, at points.
 //!
-//! Where light arrives at a point of a surface, what the leaves send there can be gathered with visibility found at that
-//! point. What a leaf sends differs from what is gathered there by its residual; what the solution is off by is that
-//! residual, plus the error of what it gathers, times the reflectance: a Neumann series, of which terms are sampled by walks
-//! from point to point (residual Monte Carlo: Halton 1994). Residuals are small, so few walks tell much. Walks follow
-//! fixed sequences: the same solution is always told the same.
+//! Where light arrives at a point of a surface, what leaves send there can be gathered with visibility found at that point:
+//! of lamps exactly, of all else along rays. What a leaf sends differs from what is gathered there by its residual; what
+//! the solution is off by is that residual, plus the error of what it gathers, times the reflectance: a Neumann series, of
+//! which terms are sampled by walks from point to point (residual Monte Carlo: Halton 1994). Residuals are small, so few
+//! walks tell much. Directions follow fixed sequences: the same solution is always told the same.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use crate::element::{ElementId, Forest, Shape, WorldElement};
+use crate::element::Shape;
 use crate::follow::Accuracy;
 use crate::scene::PatchId;
 use crate::space::Solved;
 
-use super::gather::{Look, Purpose, Sensor, Source, at_share, spread};
+use super::gather::{Look, Purpose, Sensor, spread};
+use super::rays::{Hit, Rays};
 use super::snapshot::{self, Leaf};
 
 /// Walks from each point.
 const WALKS: usize = 8;
+
+/// Rays that a point looks around with, for each walk: a square number. Half as many cost half as much, and resolve errors
+/// larger by the root of two.
+const RAYS: usize = 64;
 
 /// Points that a walk comes to at most: what is left after six reflections weighs little beside the residuals before.
 const STEPS: usize = 6;
@@ -29,65 +34,68 @@ const LITTLE: f64 = 0.02;
 /// Irradiance below which a surface counts as dark, relative to the mean: errors there are relative to it.
 const DARK: f64 = 1e-3;
 
-/// What one point says: relative errors (sum of channels).
+/// Patches whose emission is gathered exactly, at most: the brightest. Other light is found by rays.
+const LAMPS: usize = 16;
+
+/// Exitance from which a patch counts as a lamp, relative to the mean radiosity.
+const BRIGHT: f64 = 4.0;
+
+/// What one point says: errors (sum of channels), relative to what arrives, by each walk.
 struct Found {
     at: DVec3,
-    /// Of a sensor, by each walk.
-    sensor: [f64; WALKS],
-    /// Of the mesh, by each walk.
-    mesh: Option<[f64; WALKS]>,
+    error: [f64; WALKS],
 }
 
-/// A point and the irradiance that the mesh says is there, W/m2, sum of channels.
+/// A point, and the irradiance that is said to be there, W/m2, sum of channels.
 struct Place {
     sensor: Sensor,
-    mesh: Option<f64>,
+    said: f64,
 }
 
-/// Errors of a solution, estimated at so many points. Cost: of each point some fifty sensors.
+/// Errors of what the mesh says, estimated at so many points.
 pub(super) fn accuracy(solved: &Solved, points: usize) -> Accuracy {
-    let meter = Meter { solved };
-    let (places, mean) = meter.places(points);
-    accuracy_of(&meter.all(places, DARK * mean))
+    let mesh = Mesh::new(solved);
+    let meter = Meter::new(solved, &mesh);
+    accuracy_of(&meter.all(&mesh.places(solved, points), DARK * mesh.mean))
 }
 
-/// Errors of a solution at sensors, relative to what arrives at each; where none does, there is none. Cost: of each some
-/// fifty sensors.
+/// Errors of what sensors read, relative to what arrives at each; where none does, there is none.
 pub(super) fn accuracy_at(solved: &Solved, sensors: &[Sensor]) -> Accuracy {
-    let meter = Meter { solved };
-    let places = sensors.iter().map(|&sensor| Place { sensor, mesh: None }).collect();
-    accuracy_of(&meter.all(places, 0.0))
+    let meter = Meter::new(solved, &Mesh::new(solved));
+    let read = |&sensor: &Sensor| {
+        let said = all(Look::new(solved, &sensor, Purpose::Sensor).irradiance());
+        Place { sensor, said }
+    };
+    let places: Vec<Place> = sensors.par_iter().map(read).collect();
+    accuracy_of(&meter.all(&places, 0.0))
 }
 
 fn accuracy_of(found: &[Found]) -> Accuracy {
-    let squares = |of: &dyn Fn(&Found) -> Option<[f64; WALKS]>| -> Vec<f64> {
-        found.iter().filter_map(of).map(|e| mean_square(&e)).collect()
-    };
     let mean_of = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
-    let sensors = squares(&|f| Some(f.sensor));
-    let scatter: Vec<f64> = found.iter().map(|f| f.variance_of_square()).collect();
+    let squares: Vec<f64> = found.iter().map(|f| mean_square(&f.error)).collect();
+    let scatter: Vec<f64> = found.iter().map(Found::variance_of_square).collect();
     let resolved = (2.0 * scatter.iter().sum::<f64>().sqrt() / found.len().max(1) as f64).sqrt();
-    let mesh = squares(&|f| f.mesh);
-    let rms = |squares: &[f64]| mean_of(squares).max(0.0).sqrt();
-    let mean = |f: &Found| f.sensor.iter().sum::<f64>() / WALKS as f64;
-    let worst = found.iter().max_by(|a, b| mean(a).abs().total_cmp(&mean(b).abs()));
+    let worst = found.iter().max_by(|a, b| a.mean().abs().total_cmp(&b.mean().abs()));
     Accuracy {
         points: found.len() as u32,
-        rms: rms(&sensors),
+        rms: mean_of(&squares).max(0.0).sqrt(),
         resolved,
-        mean: mean_of(&found.iter().map(mean).collect::<Vec<f64>>()),
-        largest: worst.map_or(0.0, mean),
+        mean: mean_of(&found.iter().map(Found::mean).collect::<Vec<f64>>()),
+        largest: worst.map_or(0.0, Found::mean),
         largest_at: worst.map_or([0.0; 3], |f| f.at.to_array()),
-        mesh_rms: (!mesh.is_empty()).then(|| rms(&mesh)),
     }
 }
 
 impl Found {
-    /// Variance that `mean_square` has of a sensor without error, from the scatter of its walks.
+    fn mean(&self) -> f64 {
+        self.error.iter().sum::<f64>() / WALKS as f64
+    }
+
+    /// Variance that `mean_square` has of a point without error, from the scatter of its walks.
     fn variance_of_square(&self) -> f64 {
-        let mean = self.sensor.iter().sum::<f64>() / WALKS as f64;
+        let mean = self.mean();
         let variance =
-            self.sensor.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (WALKS - 1) as f64;
+            self.error.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (WALKS - 1) as f64;
         2.0 * variance * variance / (WALKS * (WALKS - 1)) as f64
     }
 }
@@ -100,31 +108,41 @@ fn mean_square(samples: &[f64; WALKS]) -> f64 {
     (sum * sum - squares) / (WALKS * (WALKS - 1)) as f64
 }
 
-/// Measures a solution.
-struct Meter<'a> {
-    solved: &'a Solved,
+fn all(e: [f64; 3]) -> f64 {
+    e.iter().sum()
 }
 
-impl Meter<'_> {
-    fn all(&self, places: Vec<Place>, dark: f64) -> Vec<Found> {
-        let one = |(k, place): (usize, Place)| self.errors(k, &place, dark);
-        places.into_par_iter().enumerate().filter_map(one).collect()
-    }
+/// The leaves of a solution, with their areas, m2.
+struct Mesh {
+    leaves: Vec<(PatchId, Leaf, f64)>,
+    /// Mean irradiance, W/m2, sum of channels.
+    mean: f64,
+    /// Mean radiosity, W/m2, sum of channels.
+    radiosity: f64,
+}
 
-    /// Places spread evenly over what is lit, and the mean irradiance of the mesh, W/m2 (sum of channels).
-    fn places(&self, points: usize) -> (Vec<Place>, f64) {
-        let mesh = snapshot::take(self.solved, &self.solved.links, &self.solved.radiosity);
-        let arrives = |leaf: &Leaf| leaf.irradiance.iter().map(|&h| f64::from(h)).sum::<f64>();
-        let patches = (0..self.solved.space.scene.patches.len() as u32).map(PatchId);
+impl Mesh {
+    fn new(solved: &Solved) -> Mesh {
+        let mesh = snapshot::take(solved, &solved.links, &solved.radiosity);
+        let patches = (0..solved.space.scene.patches.len() as u32).map(PatchId);
         let leaves: Vec<(PatchId, Leaf, f64)> = patches
             .flat_map(|patch| mesh.leaves_of(patch).iter().map(move |leaf| (patch, *leaf)))
             .map(|(patch, leaf)| (patch, leaf, Shape { corners: leaf.corners, len: 4 }.area()))
             .collect();
         let area_m2 = leaves.iter().map(|leaf| leaf.2).sum::<f64>().max(f64::MIN_POSITIVE);
-        let mean = leaves.iter().map(|(_, leaf, area)| area * arrives(leaf)).sum::<f64>() / area_m2;
-        let is_lit = |(_, leaf, _): &&(PatchId, Leaf, f64)| arrives(leaf) > DARK * mean;
-        let lit_m2: f64 = leaves.iter().filter(is_lit).map(|leaf| leaf.2).sum();
-        let mut lit = leaves.iter().filter(is_lit);
+        let mean = |of: &dyn Fn(&Leaf) -> f64| {
+            leaves.iter().map(|(_, leaf, area)| area * of(leaf)).sum::<f64>() / area_m2
+        };
+        let (irradiance, radiosity) =
+            (mean(&arrives), mean(&|leaf| all(leaf.radiosity.map(f64::from))));
+        Mesh { leaves, mean: irradiance, radiosity }
+    }
+
+    /// Places spread evenly over what is lit.
+    fn places(&self, solved: &Solved, points: usize) -> Vec<Place> {
+        let is_lit = |(_, leaf, _): &&(PatchId, Leaf, f64)| arrives(leaf) > DARK * self.mean;
+        let lit_m2: f64 = self.leaves.iter().filter(is_lit).map(|leaf| leaf.2).sum();
+        let mut lit = self.leaves.iter().filter(is_lit);
         let (mut now, mut before_m2) = (lit.next(), 0.0);
         let mut places = Vec::with_capacity(points);
         for k in 0..points {
@@ -136,106 +154,152 @@ impl Meter<'_> {
                 now = lit.next();
             }
             let Some((patch, leaf, _)) = now else { break };
-            let [a, b, c, d] = leaf.corners;
-            let p = point_of([a, b, c, d].map(|p| p.extend(0.0)), [spread(k, 1), spread(k, 2)]);
-            let p = DVec2::new(p.x, p.y);
-            let at = self.solved.space.view.patch(*patch).world.point(p);
-            let mesh = Some(leaf.irradiance_at(p).iter().map(|&h| f64::from(h)).sum());
-            places.push(Place { sensor: self.sensor(*patch, at), mesh });
+            let p = point_of(leaf.corners, [spread(k, 1), spread(k, 2)]);
+            let at = solved.space.view.patch(*patch).world.point(p);
+            let said = all(leaf.irradiance_at(p).map(f64::from));
+            places.push(Place { sensor: sensor_on(solved, *patch, at), said });
         }
-        (places, mean)
+        places
+    }
+}
+
+fn arrives(leaf: &Leaf) -> f64 {
+    all(leaf.irradiance.map(f64::from))
+}
+
+fn sensor_on(solved: &Solved, patch: PatchId, at: DVec3) -> Sensor {
+    Sensor { at, normal: solved.space.view.occluder(patch).plane.normal }
+}
+
+/// Measures a solution.
+struct Meter<'a> {
+    solved: &'a Solved,
+    rays: Rays<'a>,
+    /// What is gathered exactly, ascending.
+    lamps: Vec<PatchId>,
+    /// How far from their surfaces rays begin, metres.
+    lift_m: f64,
+}
+
+impl<'a> Meter<'a> {
+    fn new(solved: &'a Solved, mesh: &Mesh) -> Meter<'a> {
+        let space = &solved.space;
+        let exitance = |&patch: &PatchId| {
+            all(space.world.exitance(&space.scene, &space.scene.patches[patch.0 as usize]))
+        };
+        let patches = (0..space.scene.patches.len() as u32).map(PatchId);
+        let is_present = |patch: &PatchId| space.view.is_present(space.view.patch(*patch).body);
+        let mut lamps: Vec<PatchId> = patches
+            .filter(|patch| exitance(patch) > BRIGHT * mesh.radiosity)
+            .filter(is_present)
+            .collect();
+        lamps.sort_by(|a, b| exitance(b).total_cmp(&exitance(a)));
+        lamps.truncate(LAMPS);
+        lamps.sort_unstable();
+        let lift_m = 1e-9 * space.view.far_m();
+        Meter { solved, rays: Rays::new(&space.view, &space.forest), lamps, lift_m }
     }
 
-    fn sensor(&self, patch: PatchId, at: DVec3) -> Sensor {
-        Sensor { at, normal: self.solved.space.view.occluder(patch).plane.normal }
+    fn all(&self, places: &[Place], dark: f64) -> Vec<Found> {
+        let one = |(k, place): (usize, &Place)| self.errors(k, place, dark);
+        places.par_iter().enumerate().filter_map(one).collect()
     }
 
     /// Relative errors at one place; `None` where it is dark: covered, most likely.
     fn errors(&self, k: usize, place: &Place, dark: f64) -> Option<Found> {
-        let look = |purpose| Look::new(self.solved, &place.sensor, purpose);
-        let (by_lines, sources) = look(Purpose::Listing).by_source();
-        let all = |e: [f64; 3]| e.iter().sum::<f64>();
-        if all(by_lines) <= dark {
-            return None;
+        let lamps = Look::new(self.solved, &place.sensor, Purpose::Beyond).direct(&self.lamps);
+        let (mut right, mut arrives) = ([0.0; WALKS], 0.0);
+        for (walk, right) in right.iter_mut().enumerate() {
+            let walk = k * WALKS + walk;
+            let (by_leaves, hits) = self.look_around(&place.sensor, lamps, (walk, 0));
+            *right = all(by_leaves) + all(self.error_of_hits(hits, walk));
+            arrives += all(by_leaves) / WALKS as f64;
         }
-        let read = all(look(Purpose::Sensor).irradiance());
-        let (mut sensor, mut mesh) = ([0.0; WALKS], place.mesh.map(|_| [0.0; WALKS]));
-        // Relative to what leaves say: a divisor that walks scatter would bend their mean.
-        let scale = all(by_lines);
-        for walk in 0..WALKS {
-            let right = all(by_lines) + all(self.error_of_sources(&sources, k * WALKS + walk));
-            sensor[walk] = (read - right) / scale;
-            if let (Some(mesh), Some(said)) = (&mut mesh, place.mesh) {
-                mesh[walk] = (said - right) / scale;
-            }
-        }
-        Some(Found { at: place.sensor.at, sensor, mesh })
+        // Relative to what leaves send: a divisor of its own for each walk would bend their mean.
+        (arrives > dark).then(|| Found {
+            at: place.sensor.at,
+            error: right.map(|right| (place.said - right) / arrives),
+        })
     }
 
-    /// How much more arrives from some sources than their leaves say, W/m2, by one walk.
-    fn error_of_sources(&self, sources: &[Source], walk: usize) -> [f64; 3] {
+    /// What arrives at a point if leaves are taken at their word, W/m2, by rays in all directions and what comes from lamps;
+    /// and the leaves that were met, in an order that the number of the walk and the step decides.
+    fn look_around(
+        &self,
+        sensor: &Sensor,
+        lamps: [f64; 3],
+        (walk, step): (usize, usize),
+    ) -> ([f64; 3], Vec<Option<Hit>>) {
+        let (one, two) = sensor.normal.any_orthonormal_pair();
+        let from = sensor.at + sensor.normal * self.lift_m;
+        let side = RAYS.isqrt();
+        let shift = [spread(walk, 3 * step + 3), spread(walk, 3 * step + 4)];
+        let hits: Vec<Option<Hit>> = (0..RAYS)
+            .map(|k| {
+                // As many rays as the cosine weighs.
+                let [u, v] = [(k / side, shift[0]), (k % side, shift[1])]
+                    .map(|(cell, shift)| (cell as f64 + shift) / side as f64);
+                let (sin, cos) = libm::sincos(std::f64::consts::TAU * v);
+                let across = u.sqrt();
+                let up = (1.0 - u).max(0.0).sqrt();
+                self.rays
+                    .first(from, one * (across * cos) + two * (across * sin) + sensor.normal * up)
+            })
+            .collect();
+        let mut sum = lamps;
+        for hit in hits.iter().flatten() {
+            let sent = self.said_by(hit);
+            let is_lamp = self.lamps.binary_search(&hit.patch).is_ok();
+            let counted = if is_lamp { self.emitted_by(hit) } else { [0.0; 3] };
+            (0..3).for_each(|c| sum[c] += (sent[c] - counted[c]) / RAYS as f64);
+        }
+        (sum, hits)
+    }
+
+    /// How much more arrives from some leaves than they say, W/m2, by one walk.
+    fn error_of_hits(&self, mut hits: Vec<Option<Hit>>, walk: usize) -> [f64; 3] {
         let (mut error, mut weight) = ([0.0; 3], [1.0; 3]);
-        let mut sources = std::borrow::Cow::Borrowed(sources);
         for step in 0..STEPS {
-            let number = |dimension: usize| spread(walk, 3 + 4 * step + dimension);
-            let seen: f64 = sources.iter().map(|s| s.factor).sum();
-            let Some(chosen) = at_share(sources.iter().map(|s| s.factor), number(0)) else { break };
-            let drawn = [number(1), number(2), number(3)];
-            let Some((leaf, at)) = self.place_in(&sources[chosen], drawn) else { break };
-            let patch = self.solved.space.forest.patch(leaf).expect("an element has a patch");
-            let sensor = self.sensor(patch, at);
-            let look = Look::new(self.solved, &sensor, Purpose::Listing);
-            let (arrives, next) = look.by_source();
-            let e =
-                WorldElement::new(&self.solved.space.view, &self.solved.space.forest, leaf, false);
-            let said = look.radiosity_at(&e, leaf, at);
-            let (scene, world) = (&self.solved.space.scene, &self.solved.space.world);
-            let patch = &scene.patches[patch.0 as usize];
-            let (m, rho) = (world.exitance(scene, patch), world.reflectance(scene, patch));
+            let chosen = (spread(walk, 3 * step + 5) * RAYS as f64) as usize;
+            let Some(hit) = hits[chosen.min(RAYS - 1)] else { break };
+            if self.solved.space.forest.is_distant(hit.leaf) {
+                break;
+            }
+            let sensor = sensor_on(self.solved, hit.patch, hit.at);
+            let lamps = Look::new(self.solved, &sensor, Purpose::Beyond).direct(&self.lamps);
+            let (arrives, next) = self.look_around(&sensor, lamps, (walk, step + 1));
+            let (said, m) = (self.said_by(&hit), self.emitted_by(&hit));
+            let space = &self.solved.space;
+            let rho =
+                space.world.reflectance(&space.scene, &space.scene.patches[hit.patch.0 as usize]);
             for c in 0..3 {
-                weight[c] *= seen;
-                error[c] += weight[c] * (m[c] + rho[c] * arrives[c] - f64::from(said[c]));
+                error[c] += weight[c] * (m[c] + rho[c] * arrives[c] - said[c]);
                 weight[c] *= rho[c];
             }
             if weight.iter().all(|&w| w < LITTLE) {
                 break;
             }
-            sources = std::borrow::Cow::Owned(next);
+            hits = next;
         }
         error
     }
 
-    /// A place on a leaf of a source, drawn by three numbers; `None` on what only shines.
-    fn place_in(
-        &self,
-        source: &Source,
-        [mut which, one, two]: [f64; 3],
-    ) -> Option<(ElementId, DVec3)> {
-        let forest: &Forest = &self.solved.space.forest;
-        let mut leaf = source.element;
-        if forest.is_distant(leaf) {
-            return None;
-        }
-        if let Some(at) = source.at {
-            return Some((leaf, at));
-        }
-        while !forest.children(leaf).is_empty() {
-            let children: Vec<ElementId> = forest.children(leaf).map(ElementId).collect();
-            let areas: Vec<f64> = children.iter().map(|&id| forest.exposed_m2(id)).collect();
-            let chosen = at_share(areas.iter().copied(), which)?;
-            let before: f64 = areas[..chosen].iter().sum::<f64>() / areas.iter().sum::<f64>();
-            let share = areas[chosen] / areas.iter().sum::<f64>();
-            which = ((which - before) / share).clamp(0.0, 1.0 - f64::EPSILON);
-            leaf = children[chosen];
-        }
-        let e = WorldElement::new(&self.solved.space.view, forest, leaf, false);
-        Some((leaf, point_of(e.corners, [one, two])))
+    /// Radiosity that a leaf has by its word where it was met, W/m2.
+    fn said_by(&self, hit: &Hit) -> [f64; 3] {
+        let place = self.rays.place(hit.leaf);
+        super::gather::radiosity_at(self.solved, &place, hit.leaf, hit.at).map(f64::from)
+    }
+
+    /// Exitance where a leaf was met, W/m2.
+    fn emitted_by(&self, hit: &Hit) -> [f64; 3] {
+        let space = &self.solved.space;
+        space.world.exitance(&space.scene, &space.scene.patches[hit.patch.0 as usize])
     }
 }
 
 /// A point of a quadrilateral, or a triangle that repeats its last corner, evenly distributed if both numbers are.
-fn point_of([a, b, c, d]: [DVec3; 4], [one, two]: [f64; 2]) -> DVec3 {
-    let halves = [(b - a).cross(c - a).length(), (c - a).cross(d - a).length()];
+fn point_of([a, b, c, d]: [DVec2; 4], [one, two]: [f64; 2]) -> DVec2 {
+    let halves = [(b - a).perp_dot(c - a), (c - a).perp_dot(d - a)].map(f64::abs);
     let share = halves[0] / (halves[0] + halves[1]).max(f64::MIN_POSITIVE);
     let (one, [q, r]) = match one < share {
         true => (one / share, [b, c]),

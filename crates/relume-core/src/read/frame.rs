@@ -74,7 +74,7 @@ impl<'a> Frame<'a> {
         gather::irradiances_at(self.solved, sensors)
     }
 
-    /// Errors of the solution, estimated at so many points with exact visibility; each costs some fifty sensors.
+    /// Errors of what the mesh says, estimated at so many points along rays; each point costs some 2,000 rays.
     pub fn accuracy(&self, points: usize) -> Accuracy {
         accuracy::accuracy(self.solved, points)
     }

@@ -74,8 +74,6 @@ pub(super) enum Purpose {
     Sensor,
     /// A point that a sensor sees: leaves are taken at their word.
     Beyond,
-    /// A point of which each source is listed: leaves are taken at their word.
-    Listing,
 }
 
 /// A sensor looking at a solved scene.
@@ -99,18 +97,8 @@ struct Gathered {
     parts: Vec<Part>,
     /// Such leaves as wholes; of other points.
     near: Vec<Near>,
-    /// What is far enough, where sources are listed.
-    far: Vec<Source>,
-}
-
-/// An element that light comes from.
-#[derive(Clone, Copy)]
-pub(super) struct Source {
-    pub(super) element: ElementId,
-    /// Form factor from the point to what is seen of it.
-    pub(super) factor: f64,
-    /// The middle of what is seen, where that is not all of it.
-    pub(super) at: Option<DVec3>,
+    /// Form factor to what is far enough.
+    factor: f64,
 }
 
 /// A part of a leaf, as large as it is far.
@@ -126,8 +114,6 @@ struct Part {
 struct Near {
     leaf: ElementId,
     factor: f64,
-    /// The middle of what is seen of it.
-    at: DVec3,
     /// What its line says that it sends, W/m2.
     sent: [f64; 3],
 }
@@ -144,16 +130,6 @@ impl<'a> Look<'a> {
             slack_m,
             purpose,
         }
-    }
-
-    /// What arrives at the point if leaves are taken at their word, W/m2, and from where: a look for [`Purpose::Listing`].
-    pub(super) fn by_source(&self) -> ([f64; 3], Vec<Source>) {
-        let Gathered { mut sum, near, mut far, .. } = self.gather();
-        for n in &near {
-            (0..3).for_each(|c| sum[c] += n.sent[c]);
-            far.push(Source { element: n.leaf, factor: n.factor, at: Some(n.at) });
-        }
-        (sum, far)
     }
 
     /// What arrives at the sensor, W/m2.
@@ -173,7 +149,7 @@ impl<'a> Look<'a> {
             .into_iter()
             .map(|(k, part)| {
                 let e = WorldElement::new(&self.solved.space.view, self.forest, part.leaf, false);
-                let line = self.radiosity_at(&e, part.leaf, part.at).map(f64::from);
+                let line = radiosity_at(self.solved, &e, part.leaf, part.at).map(f64::from);
                 (part.factor * all(line), line, (k, part))
             })
             .collect();
@@ -193,12 +169,8 @@ impl<'a> Look<'a> {
         for patch in 0..self.solved.space.scene.patches.len() as u32 {
             self.add_patch(PatchId(patch), &mut out);
         }
-        for id in self.forest.children(Forest::ROOT).map(ElementId) {
-            if self.forest.kind(id) == Kind::Light {
-                let e = self.light_arriving(id);
-                (0..3).for_each(|c| out.sum[c] += e[c]);
-            }
-        }
+        let lights = self.from_lights();
+        (0..3).for_each(|c| out.sum[c] += lights[c]);
         out
     }
 
@@ -297,27 +269,25 @@ impl<'a> Look<'a> {
         if self.purpose == Purpose::Sensor && is_near {
             return self.add_parts(id, &seen, (&in_the_way, SPLITS), &mut out.parts);
         }
-        let (factor, b, at) = if in_the_way.is_empty() && !is_near {
+        let (factor, b) = if in_the_way.is_empty() && !is_near {
             let factor = form_factor_from_point(self.point, self.normal, &seen);
-            (factor, self.solved.radiosity.radiosity(id.0), None)
+            (factor, self.solved.radiosity.radiosity(id.0))
         } else {
             // The part in view may be much brighter or darker than the rest.
             let (factor, moment) = self.factor_past(&seen, &in_the_way, SPLITS);
             let at = moment / factor.max(f64::MIN_POSITIVE);
-            (factor, self.radiosity_at(&e, id, at), Some(at))
+            (factor, radiosity_at(self.solved, &e, id, at))
         };
         if factor <= 0.0 {
             return;
         }
         let sent = b.map(|b| factor * f64::from(b));
-        if let (true, Some(at)) = (is_near, at) {
-            out.near.push(Near { leaf: id, factor, at, sent });
+        if is_near {
+            out.near.push(Near { leaf: id, factor, sent });
             return;
         }
         (0..3).for_each(|c| out.sum[c] += sent[c]);
-        if self.purpose == Purpose::Listing {
-            out.far.push(Source { element: id, factor, at });
-        }
+        out.factor += factor;
     }
 
     /// The part of an element before the point.
@@ -349,15 +319,31 @@ impl<'a> Look<'a> {
         Some(out)
     }
 
-    /// Radiosity of an element at a point of it, from its line, never negative.
-    pub(super) fn radiosity_at(&self, e: &WorldElement, id: ElementId, at: DVec3) -> [f32; 3] {
-        let place = place_of(self.forest, id);
-        let b = self.solved.radiosity.linear(id.0, &place, SQUARE_MOMENT);
-        // Its mean is that of what is exposed of it.
-        let [x, y] = place.centroid.map(f64::from);
-        let middle = glam::DVec2::new(x, y) - self.forest.extent(id).centroid;
-        let at = (e.offset(at) - middle) / e.radius;
-        b.at(at.x as f32, at.y as f32).map(|b| b.max(0.0))
+    /// What arrives from punctual lights and from what some patches emit, W/m2.
+    pub(super) fn direct(&self, lamps: &[PatchId]) -> [f64; 3] {
+        let space = &self.solved.space;
+        let mut sum = self.from_lights();
+        for &lamp in lamps {
+            let mut seen = Gathered::default();
+            self.add_patch(lamp, &mut seen);
+            let near = seen.near.iter().map(|near| near.factor);
+            let factor = seen.factor + near.sum::<f64>();
+            let m = space.world.exitance(&space.scene, &space.scene.patches[lamp.0 as usize]);
+            (0..3).for_each(|c| sum[c] += factor * m[c]);
+        }
+        sum
+    }
+
+    /// What arrives from punctual lights, W/m2.
+    fn from_lights(&self) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for id in self.forest.children(Forest::ROOT).map(ElementId) {
+            if self.forest.kind(id) == Kind::Light {
+                let e = self.light_arriving(id);
+                (0..3).for_each(|c| sum[c] += e[c]);
+            }
+        }
+        sum
     }
 
     /// Adds the parts, as large as they are far, of a part of a leaf that is seen.
@@ -468,6 +454,23 @@ impl<'a> Look<'a> {
         };
         (0..n).map(part).fold((0.0, DVec3::ZERO), |sum, part| (sum.0 + part.0, sum.1 + part.1))
     }
+}
+
+/// Radiosity of an element at a point of it, from its line, never negative, W/m2.
+pub(super) fn radiosity_at(
+    solved: &Solved,
+    e: &WorldElement,
+    id: ElementId,
+    at: DVec3,
+) -> [f32; 3] {
+    let forest = &solved.space.forest;
+    let place = place_of(forest, id);
+    let b = solved.radiosity.linear(id.0, &place, SQUARE_MOMENT);
+    // Its mean is that of what is exposed of it.
+    let [x, y] = place.centroid.map(f64::from);
+    let middle = glam::DVec2::new(x, y) - forest.extent(id).centroid;
+    let at = (e.offset(at) - middle) / e.radius;
+    b.at(at.x as f32, at.y as f32).map(|b| b.max(0.0))
 }
 
 /// The first of some numbers up to which all sum to a share of the whole.

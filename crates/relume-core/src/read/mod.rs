@@ -12,6 +12,7 @@ mod gather;
 mod lossy;
 mod names;
 mod pieces;
+mod rays;
 mod reconstruct;
 mod snapshot;
 mod solution;

@@ -88,15 +88,32 @@ impl<'a> Rays<'a> {
         let frame = &self.view.patch(patch).world;
         let d = at - frame.origin;
         let p = DVec2::new(d.dot(frame.u), d.dot(frame.v));
-        let mut id = self.forest.patch_root(patch);
+        let deepest = |ids: &[ElementId]| {
+            let depth = |&id: &ElementId| (depth_in(&self.forest.shape(id), p), id);
+            let found = ids.iter().map(depth).max_by(|a, b| a.0.total_cmp(&b.0));
+            found.map(|(_, id)| id)
+        };
+        let mut leaf = deepest(&self.facets(patch)).expect("a patch has a facet");
         loop {
-            let depth = |child: u32| (depth_in(&self.forest.shape(ElementId(child)), p), child);
-            let children = self.forest.children(id).map(depth);
-            match children.max_by(|a, b| a.0.total_cmp(&b.0)) {
-                Some((_, child)) => id = ElementId(child),
-                None => return id,
+            let children: Vec<ElementId> = self.forest.children(leaf).map(ElementId).collect();
+            match deepest(&children) {
+                Some(child) => leaf = child,
+                None => return leaf,
             }
         }
+    }
+
+    /// The elements that a patch is made of: itself, or its parts where it is cut.
+    fn facets(&self, patch: PatchId) -> Vec<ElementId> {
+        let mut out = Vec::new();
+        let mut stack = vec![self.forest.patch_root(patch)];
+        while let Some(id) = stack.pop() {
+            match self.forest.kind(id) {
+                Kind::Element => out.push(id),
+                _ => stack.extend(self.forest.children(id).map(ElementId)),
+            }
+        }
+        out
     }
 
     /// A leaf where it is.

@@ -346,8 +346,8 @@ pub(crate) struct ProbeArgs {
     /// many sensors, and wrong on either side of a shadow's edge. Sensors must lie on surfaces.
     #[arg(long)]
     pub(crate) interpolate: bool,
-    /// Estimate the error of the rows of each frame at so many of the sensors, by walks with exact visibility: each takes
-    /// about as long as fifty sensors. Said at the end.
+    /// Estimate the error of the rows of each frame at so many of the sensors, by walks along rays. Said at
+    /// the end.
     #[arg(long, value_name = "SENSORS", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "interpolate")]
     pub(crate) accuracy: Option<u32>,
     #[command(flatten)]
@@ -591,8 +591,8 @@ pub(crate) struct SolveFlags {
     /// frame, kind, receiver, source, exchange area and visibility before and after.
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     pub(crate) events: Option<PathBuf>,
-    /// Estimate the error of irradiance in each frame at so many points, by walks with exact visibility: a point takes about as
-    /// long as fifty sensors. The report and the last line say it.
+    /// Estimate the error of what the mesh says in each frame at so many points, by walks along rays. The report and the last line
+    /// say it.
     #[arg(long, value_name = "POINTS", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) accuracy: Option<u32>,
 }

@@ -156,7 +156,7 @@ fn each_room_uses_only_rooms_above_it() {
 
 #[test]
 fn the_phases_of_a_frame_know_no_space() {
-    let follow = crates_dir().join("relume/src/follow");
+    let follow = crates_dir().join("relume-core/src/follow");
     let files = sources(&follow);
     assert!(files.len() > 5, "the phases were not found");
     for file in files {

@@ -88,6 +88,10 @@ const EDGE: f64 = 0.2;
 /// them along the same edge. With 1, tables of form factors behind partitions and white closets miss their limits.
 const EDGE_REFLECTED: f64 = 3.0;
 
+/// Share of the links across which an edge sweeps that err alike. With 1, tables and halls have a quarter more links for the same
+/// errors.
+const ALIKE_SHARE: f64 = 0.5;
+
 /// Form factor, at most, of all that is counted as hidden along one edge. With 1, scenes have a tenth more links for the
 /// same errors.
 const ALIKE_FACTOR: f64 = 0.3;
@@ -193,10 +197,10 @@ impl LinkSize {
     /// their errors have one sign.
     ///
     /// The edge that a point of the receiver sees sweeps over as much of the source's surface as the receiver is large,
-    /// times the leverage. Light does not count: what it is changes how errors add up no more than how large they are.
+    /// times the leverage. Light does not count: the margins of verdicts know how errors grow with it, not how a count would.
     fn alike(&self, receiver: &End, source: &End) -> f64 {
         let swept = receiver.area * self.leverage * self.leverage;
-        let by_size = swept.min(source.surface_area) / source.own_area;
+        let by_size = ALIKE_SHARE * swept.min(source.surface_area) / source.own_area;
         let factor = self.exchange / receiver.area;
         match by_size > 1.0 && factor > 0.0 {
             true => by_size.min(ALIKE_FACTOR / factor).max(1.0),

@@ -19,7 +19,7 @@ impl Watch {
 
     /// Calls off the step under way, or the next one if none is: within some milliseconds it goes back to the last solution,
     /// which takes as long as a frame at most if there is one, and ends with
-    /// [`SessionError::Cancelled`](crate::SessionError::Cancelled).
+    /// [`SessionError::Cancelled`](crate::session::SessionError::Cancelled).
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }

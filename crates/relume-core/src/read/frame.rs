@@ -84,7 +84,7 @@ impl<'a> Frame<'a> {
         accuracy::accuracy_at(self.solved, sensors)
     }
 
-    /// The link events of this frame, if [`Options::events`](crate::Options::events) asks for them: none after a cold build.
+    /// The link events of this frame, if [`Options::events`](crate::session::Options::events) asks for them: none after a cold build.
     /// In the order in which they were found, which is the same for any number of threads.
     pub fn events(&self) -> Vec<Event> {
         events::named(self.solved)
@@ -93,7 +93,7 @@ impl<'a> Frame<'a> {
     /// Form factors between groups of patches.
     ///
     /// Error of an entry: that of its links, which the tolerance bounds relative to the row where
-    /// nothing emits (see [`Scene::without_light`](crate::Scene::without_light)). Cost: one pass over all links.
+    /// nothing emits (see [`Scene::without_light`](crate::scene::Scene::without_light)). Cost: one pass over all links.
     ///
     /// # Panics
     /// If the grouping is of another scene.

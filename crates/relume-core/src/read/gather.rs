@@ -169,7 +169,7 @@ impl<'a> Look<'a> {
         for patch in 0..self.solved.space.scene.patches.len() as u32 {
             self.add_patch(PatchId(patch), &mut out);
         }
-        let lights = self.from_lights();
+        let lights = self.lights_arriving();
         (0..3).for_each(|c| out.sum[c] += lights[c]);
         out
     }
@@ -322,7 +322,7 @@ impl<'a> Look<'a> {
     /// What arrives from punctual lights and from what some patches emit, W/m2.
     pub(super) fn direct(&self, lamps: &[PatchId]) -> [f64; 3] {
         let space = &self.solved.space;
-        let mut sum = self.from_lights();
+        let mut sum = self.lights_arriving();
         for &lamp in lamps {
             let mut seen = Gathered::default();
             self.add_patch(lamp, &mut seen);
@@ -335,7 +335,7 @@ impl<'a> Look<'a> {
     }
 
     /// What arrives from punctual lights, W/m2.
-    fn from_lights(&self) -> [f64; 3] {
+    fn lights_arriving(&self) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for id in self.forest.children(Forest::ROOT).map(ElementId) {
             if self.forest.kind(id) == Kind::Light {

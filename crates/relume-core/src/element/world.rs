@@ -402,3 +402,29 @@ impl WorldElement {
         (d[0].min(d[1]).min(d[2].min(d[3])), d[0].max(d[1]).max(d[2].max(d[3])))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_is_as_far_from_a_polygon_as_from_its_face_edge_or_corner() {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+        let edge = |k: usize| {
+            let along = corners[(k + 1) % 4] - corners[k];
+            Plane::through(corners[k], DVec3::Z.cross(along))
+        };
+        let edges = [edge(0), edge(1), edge(2), edge(3)];
+        let plane = Plane::through(DVec3::ZERO, DVec3::Z);
+        let square = OccluderPolygon { plane, edges: &edges, corners: &corners };
+        let places = [
+            (DVec3::new(0.3, 0.6, -2.0), 2.0),
+            (DVec3::new(0.3, -3.0, 4.0), 5.0),
+            (DVec3::new(3.0, 4.0, 6.0), 7.0),
+            (DVec3::new(0.5, 0.5, 0.0), 0.0),
+        ];
+        for (p, distance) in places {
+            assert!((square.distance(p) - distance).abs() < 1e-12, "{p}: {}", square.distance(p));
+        }
+    }
+}

@@ -54,14 +54,14 @@ struct Place {
 
 /// Errors of what the mesh says, estimated at so many points.
 pub(super) fn accuracy(solved: &Solved, points: usize) -> Accuracy {
-    let mesh = Mesh::new(solved);
-    let meter = Meter::new(solved, &mesh);
-    accuracy_of(&meter.all(&mesh.places(solved, points), DARK * mesh.mean))
+    let leaves = Leaves::new(solved);
+    let meter = Meter::new(solved, &leaves);
+    accuracy_of(&meter.all(&leaves.places(solved, points), DARK * leaves.mean))
 }
 
 /// Errors of what sensors read, relative to what arrives at each; where none does, there is none.
 pub(super) fn accuracy_at(solved: &Solved, sensors: &[Sensor]) -> Accuracy {
-    let meter = Meter::new(solved, &Mesh::new(solved));
+    let meter = Meter::new(solved, &Leaves::new(solved));
     let read = |&sensor: &Sensor| {
         let said = all(Look::new(solved, &sensor, Purpose::Sensor).irradiance());
         Place { sensor, said }
@@ -113,7 +113,7 @@ fn all(e: [f64; 3]) -> f64 {
 }
 
 /// The leaves of a solution, with their areas, m2.
-struct Mesh {
+struct Leaves {
     leaves: Vec<(PatchId, Leaf, f64)>,
     /// Mean irradiance, W/m2, sum of channels.
     mean: f64,
@@ -121,8 +121,8 @@ struct Mesh {
     radiosity: f64,
 }
 
-impl Mesh {
-    fn new(solved: &Solved) -> Mesh {
+impl Leaves {
+    fn new(solved: &Solved) -> Leaves {
         let mesh = snapshot::take(solved, &solved.links, &solved.radiosity);
         let patches = (0..solved.space.scene.patches.len() as u32).map(PatchId);
         let leaves: Vec<(PatchId, Leaf, f64)> = patches
@@ -135,7 +135,7 @@ impl Mesh {
         };
         let (irradiance, radiosity) =
             (mean(&arrives), mean(&|leaf| all(leaf.radiosity.map(f64::from))));
-        Mesh { leaves, mean: irradiance, radiosity }
+        Leaves { leaves, mean: irradiance, radiosity }
     }
 
     /// Places spread evenly over what is lit.
@@ -182,7 +182,7 @@ struct Meter<'a> {
 }
 
 impl<'a> Meter<'a> {
-    fn new(solved: &'a Solved, mesh: &Mesh) -> Meter<'a> {
+    fn new(solved: &'a Solved, leaves: &Leaves) -> Meter<'a> {
         let space = &solved.space;
         let exitance = |&patch: &PatchId| {
             all(space.world.exitance(&space.scene, &space.scene.patches[patch.0 as usize]))
@@ -190,7 +190,7 @@ impl<'a> Meter<'a> {
         let patches = (0..space.scene.patches.len() as u32).map(PatchId);
         let is_present = |patch: &PatchId| space.view.is_present(space.view.patch(*patch).body);
         let mut lamps: Vec<PatchId> = patches
-            .filter(|patch| exitance(patch) > BRIGHT * mesh.radiosity)
+            .filter(|patch| exitance(patch) > BRIGHT * leaves.radiosity)
             .filter(is_present)
             .collect();
         lamps.sort_by(|a, b| exitance(b).total_cmp(&exitance(a)));

@@ -14,7 +14,8 @@ use crate::follow::Accuracy;
 use crate::scene::PatchId;
 use crate::space::Solved;
 
-use super::gather::{Look, Purpose, Sensor, spread};
+use super::choice::spread;
+use super::gather::{Look, Purpose, Sensor};
 use super::rays::{Hit, Rays};
 use super::snapshot::{self, Leaf};
 

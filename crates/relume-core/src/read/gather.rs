@@ -17,6 +17,9 @@ use crate::transport::{
 
 use crate::space::{Solved, place_of};
 
+use super::choice::at_share;
+use super::gap::Gap;
+
 /// A place and a direction at which irradiance is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensor {
@@ -54,16 +57,6 @@ const FAR: f64 = 1.0 / 32.0;
 /// Form factor to a part of a leaf below which it is taken to send what the leaf's line says.
 const LITTLE: f64 = 0.01;
 
-/// Share of what a point sees above which leaves that are large against their distance are not taken at their word: it
-/// is in a gap, and what leaves them is followed on.
-const IN_A_GAP: f64 = 0.5;
-
-/// Share of the light below which nobody follows on what leaves a leaf, and how often at most.
-const FOLLOWED: (f64, usize) = (1e-3, 24);
-
-/// Share of what arrives in a gap that may come from parts that are taken at their leaf's word.
-const BY_LINES: f64 = 0.02;
-
 /// Halvings of a leaf that falls into too many pieces; then its middle decides.
 const SPLITS: u32 = 6;
 
@@ -86,36 +79,41 @@ pub(super) struct Look<'a> {
     tangent: Plane,
     slack_m: f64,
     purpose: Purpose,
+    /// Distance up to which no leaf is taken at its word, however small it is, metres: that of the other side of a gap, some
+    /// times; 0 outside gaps.
+    reach_m: f64,
 }
 
 /// What a point gathers.
 #[derive(Default)]
-struct Gathered {
-    /// From what is far enough for its size, W/m2.
-    sum: [f64; 3],
-    /// Parts of leaves that are large against their distance; of the sensor itself.
-    parts: Vec<Part>,
+pub(super) struct Gathered {
+    /// Irradiance from what is far enough for its size, W/m2.
+    pub(super) sum: [f64; 3],
+    /// Parts of leaves that are large against their distance or within reach; of the sensor itself.
+    pub(super) parts: Vec<Part>,
     /// Such leaves as wholes; of other points.
-    near: Vec<Near>,
+    pub(super) near: Vec<Near>,
     /// Form factor to what is far enough.
     factor: f64,
+    /// Distance of all that is seen, metres, with its form factor; of the sensor itself.
+    pub(super) seen: Vec<(f64, f64)>,
 }
 
 /// A part of a leaf, as large as it is far.
 #[derive(Clone, Copy)]
-struct Part {
-    leaf: ElementId,
-    /// The middle of what is seen of it.
-    at: DVec3,
-    factor: f64,
+pub(super) struct Part {
+    pub(super) leaf: ElementId,
+    /// The middle of the visible portion, metres.
+    pub(super) at: DVec3,
+    pub(super) factor: f64,
 }
 
-/// A leaf that is large against its distance.
-struct Near {
-    leaf: ElementId,
-    factor: f64,
-    /// What its line says that it sends, W/m2.
-    sent: [f64; 3],
+/// A leaf that is large against its distance, or within reach.
+pub(super) struct Near {
+    pub(super) leaf: ElementId,
+    pub(super) factor: f64,
+    /// Irradiance that it causes by its line, W/m2.
+    pub(super) sent: [f64; 3],
 }
 
 impl<'a> Look<'a> {
@@ -129,42 +127,34 @@ impl<'a> Look<'a> {
             tangent: Plane::through(sensor.at, sensor.normal),
             slack_m,
             purpose,
+            reach_m: 0.0,
         }
     }
 
-    /// What arrives at the sensor, W/m2.
+    /// The same look, that takes no leaf at its word up to a distance.
+    pub(super) fn reaching(self, reach_m: f64) -> Look<'a> {
+        Look { reach_m, ..self }
+    }
+
+    /// Irradiance at the sensor, W/m2.
     pub(super) fn irradiance(&self) -> [f64; 3] {
-        let Gathered { mut sum, parts, .. } = self.gather();
-        let add = |sum: &mut [f64; 3], part: &Part, b: [f64; 3]| {
-            (0..3).for_each(|c| sum[c] += part.factor * b[c]);
-        };
-        let is_in_a_gap = parts.iter().map(|p| p.factor).sum::<f64>() > IN_A_GAP;
-        let (large, little): (Vec<_>, Vec<_>) =
-            parts.iter().enumerate().partition(|(_, part)| part.factor > LITTLE);
-        for (k, part) in large {
-            add(&mut sum, part, self.sent_by(part, k));
+        let found = self.gather();
+        if let Some(gap) = Gap::around(self.solved, &found) {
+            return gap.irradiance(self.solved, &Sensor { at: self.point, normal: self.normal });
         }
-        let all = |e: [f64; 3]| e.iter().sum::<f64>();
-        let mut little: Vec<(f64, [f64; 3], (usize, &Part))> = little
-            .into_iter()
-            .map(|(k, part)| {
-                let e = WorldElement::new(&self.solved.space.view, self.forest, part.leaf, false);
-                let line = radiosity_at(self.solved, &e, part.leaf, part.at).map(f64::from);
-                (part.factor * all(line), line, (k, part))
-            })
-            .collect();
-        // In the dark of a gap what lines say of little parts is more than all that arrives.
-        little.sort_by(|one, other| other.0.total_cmp(&one.0));
-        let mut left: f64 = little.iter().map(|part| part.0).sum();
-        for (brings, line, (k, part)) in little {
-            let is_much = is_in_a_gap && left > BY_LINES * (all(sum) + left);
-            add(&mut sum, part, if is_much { self.sent_by(part, k) } else { line });
-            left -= brings;
+        let Gathered { mut sum, parts, .. } = found;
+        for (k, part) in parts.iter().enumerate() {
+            let b = match part.factor > LITTLE {
+                true => Gap::NONE.radiosity_of(self.solved, part, k),
+                false => part.line(self.solved),
+            };
+            (0..3).for_each(|c| sum[c] += part.factor * b[c]);
         }
         sum
     }
 
-    fn gather(&self) -> Gathered {
+    /// What the point sees.
+    pub(super) fn gather(&self) -> Gathered {
         let mut out = Gathered::default();
         for patch in 0..self.solved.space.scene.patches.len() as u32 {
             self.add_patch(PatchId(patch), &mut out);
@@ -265,9 +255,14 @@ impl<'a> Look<'a> {
             children.for_each(|child| self.add_element(ElementId(child), &in_the_way, out));
             return;
         }
-        let is_near = e.radius > e.bounds.distance(&Aabb::of([self.point]));
+        let way_m = e.bounds.distance(&Aabb::of([self.point]));
+        let is_near = e.radius > way_m || way_m < self.reach_m;
         if self.purpose == Purpose::Sensor && is_near {
-            return self.add_parts(id, &seen, (&in_the_way, SPLITS), &mut out.parts);
+            let from = out.parts.len();
+            self.add_parts(id, &seen, (&in_the_way, SPLITS), &mut out.parts);
+            let way = |part: &Part| (part.at.distance(self.point), part.factor);
+            out.seen.extend(out.parts[from..].iter().map(way));
+            return;
         }
         let (factor, b) = if in_the_way.is_empty() && !is_near {
             let factor = form_factor_from_point(self.point, self.normal, &seen);
@@ -288,6 +283,9 @@ impl<'a> Look<'a> {
         }
         (0..3).for_each(|c| out.sum[c] += sent[c]);
         out.factor += factor;
+        if self.purpose == Purpose::Sensor {
+            out.seen.push((distance, factor));
+        }
     }
 
     /// The part of an element before the point.
@@ -372,51 +370,9 @@ impl<'a> Look<'a> {
         }
     }
 
-    /// What leaves a part of a leaf that is large against its distance, W/m2: the leaf knows its radiosity as a line only, and
-    /// beside it may be the shadow of what the sensor is close to. What arrives there is gathered there.
-    ///
-    /// In a gap most of what is seen there is as close again, and so on: one part of it is followed, chosen by its form
-    /// factor and the number `k` of the first part, so that many of them together show all ways that light takes.
-    fn sent_by(&self, part: &Part, k: usize) -> [f64; 3] {
-        let scene = &self.solved.space.scene;
-        let (mut b, mut share, mut part) = ([0.0; 3], [1.0; 3], *part);
-        for step in 0.. {
-            let patch = self.forest.patch(part.leaf).expect("an element has a patch");
-            let sensor =
-                Sensor { at: part.at, normal: self.solved.space.view.occluder(patch).plane.normal };
-            let patch = &scene.patches[patch.0 as usize];
-            let now = &self.solved.space.world;
-            let (m, rho) = (now.exitance(scene, patch), now.reflectance(scene, patch));
-            let look = Look::new(self.solved, &sensor, Purpose::Beyond);
-            let Gathered { sum, near, .. } = look.gather();
-            for c in 0..3 {
-                b[c] += share[c] * m[c];
-                share[c] *= rho[c];
-                b[c] += share[c] * sum[c];
-            }
-            let seen: f64 = near.iter().map(|n| n.factor).sum();
-            let left = seen * share.iter().fold(0.0, |most: f64, s| most.max(*s));
-            if seen > IN_A_GAP && left <= FOLLOWED.0 {
-                return b;
-            }
-            let next = (seen > IN_A_GAP && step < FOLLOWED.1)
-                .then(|| look.choose(&near, [spread(k, 2 * step), spread(k, 2 * step + 1)]));
-            match next.flatten() {
-                Some(next) => (share, part) = (share.map(|s| s * seen), next),
-                None => {
-                    for n in &near {
-                        (0..3).for_each(|c| b[c] += share[c] * n.sent[c]);
-                    }
-                    return b;
-                }
-            }
-        }
-        b
-    }
-
     /// One part of some leaves close by, each as likely as its form factor is large if both numbers, from 0 to 1, are equally
     /// distributed; `None` if nothing is seen of them.
-    fn choose(&self, near: &[Near], [which, where_]: [f64; 2]) -> Option<Part> {
+    pub(super) fn choose(&self, near: &[Near], [which, where_]: [f64; 2]) -> Option<Part> {
         let leaf = near[at_share(near.iter().map(|n| n.factor), which)?].leaf;
         let patch = self.forest.patch(leaf).expect("an element has a patch");
         let occluders = self.between(patch, self.solved.space.view.patch(patch).rounding_m);
@@ -456,6 +412,14 @@ impl<'a> Look<'a> {
     }
 }
 
+impl Part {
+    /// Radiosity of the part by the line of its leaf, W/m2.
+    pub(super) fn line(&self, solved: &Solved) -> [f64; 3] {
+        let e = WorldElement::new(&solved.space.view, &solved.space.forest, self.leaf, false);
+        radiosity_at(solved, &e, self.leaf, self.at).map(f64::from)
+    }
+}
+
 /// Radiosity of an element at a point of it, from its line, never negative, W/m2.
 pub(super) fn radiosity_at(
     solved: &Solved,
@@ -471,27 +435,6 @@ pub(super) fn radiosity_at(
     let middle = glam::DVec2::new(x, y) - forest.extent(id).centroid;
     let at = (e.offset(at) - middle) / e.radius;
     b.at(at.x as f32, at.y as f32).map(|b| b.max(0.0))
-}
-
-/// The first of some numbers up to which all sum to a share of the whole.
-pub(super) fn at_share(values: impl Iterator<Item = f64> + Clone, share: f64) -> Option<usize> {
-    let mut left = share * values.clone().sum::<f64>();
-    let last = values.clone().count().checked_sub(1)?;
-    let found = values.into_iter().position(|value| {
-        left -= value;
-        left < 0.0
-    });
-    Some(found.unwrap_or(last))
-}
-
-/// Number `k` of a sequence that fills (0, 1) evenly, another for each dimension: multiples of the roots of primes, less whole
-/// numbers (Richtmyer 1951).
-pub(super) fn spread(k: usize, dimension: usize) -> f64 {
-    const PRIMES: [f64; 26] = [
-        2., 3., 5., 7., 11., 13., 17., 19., 23., 29., 31., 37., 41., 43., 47., 53., 59., 61., 67.,
-        71., 73., 79., 83., 89., 97., 101.,
-    ];
-    (0.5 + k as f64 * PRIMES[dimension % PRIMES.len()].sqrt()).fract()
 }
 
 /// The part of a polygon towards its corner `k`: a quadrilateral with a corner in the middle.

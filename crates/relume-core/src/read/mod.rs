@@ -4,10 +4,12 @@
 
 mod accuracy;
 mod bends;
+mod choice;
 mod compare;
 mod events;
 mod factors;
 mod frame;
+mod gap;
 mod gather;
 mod lossy;
 mod names;

@@ -16,7 +16,7 @@ use super::surfaces::{CoarseReceivers, CoarseSurfaces, LitForest};
 const COARSE_SHARE: f64 = 0.0323;
 
 /// An element of this share of the scene's area weighs 1 in the error norm.
-const REFERENCE_SHARE: f64 = 1.0 / 512.0;
+pub(super) const REFERENCE_SHARE: f64 = 1.0 / 512.0;
 
 /// Sweeps of the coarse solution: five bounces bring every closed room within 10 % or so.
 const SWEEPS: u32 = 8;

@@ -8,7 +8,7 @@ use crate::scene::{Held, Scene, World};
 use crate::solver::GroupLinks;
 use crate::transport::Simd;
 
-use super::coarse::Coarse;
+use super::coarse::{Coarse, REFERENCE_SHARE};
 use super::surfaces::LitForest;
 
 /// What a scene is solved with.
@@ -45,5 +45,10 @@ impl SpaceState {
     /// The elements with their light, absent ones among them.
     pub(crate) fn surfaces(&self) -> LitForest<'_> {
         LitForest::new(&self.scene, &self.forest, &self.world).with_groups(&self.groups)
+    }
+
+    /// Area of an element that weighs 1 in the error norm of the scene, m2.
+    pub(crate) fn reference_area_m2(&self) -> f64 {
+        self.forest.made_m2() * REFERENCE_SHARE
     }
 }

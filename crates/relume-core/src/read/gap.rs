@@ -1,0 +1,113 @@
+//! Light in gaps: leaves there are as large as the tolerance of the whole scene allows, and what arrives changes within
+//! the width of the gap. Sensors follow light through it.
+//!
+//! A walk goes from part to part of what is close by. What a part sends is gathered there, from far leaves with exact
+//! visibility and from those close by as their lines say; the next step corrects one of these by the difference between what
+//! is gathered and what its line says, and so on. The mean over walks is the light that all walks together follow;
+//! the better the leaves, the less it scatters (lines as control variates).
+
+use crate::space::Solved;
+
+use super::choice::{at_share, spread};
+use super::gather::{Gathered, Look, Part, Purpose, Sensor};
+
+/// Width of a gap at most, as a share of the length at which an element weighs 1 in the error norm.
+const NARROW: f64 = 0.25;
+
+/// Share of what a point sees above which leaves that are large against their distance make a gap of any width.
+const SURROUNDED: f64 = 0.5;
+
+/// Distance up to which leaves are not taken at their word, in widths of the gap.
+const REACH: f64 = 8.0;
+
+/// Walks from a sensor.
+const WALKS: usize = 64;
+
+/// Share of the light below which a walk ends, and its steps at most.
+const FOLLOWED: (f64, usize) = (1e-2, 24);
+
+/// The gap that a sensor is in.
+pub(super) struct Gap {
+    /// Distance up to which no leaf is taken at its word, metres.
+    reach_m: f64,
+}
+
+impl Gap {
+    /// Of a sensor in no gap.
+    pub(super) const NONE: Gap = Gap { reach_m: 0.0 };
+
+    /// The gap around a point, if half of all that it sees is close by.
+    pub(super) fn around(solved: &Solved, found: &Gathered) -> Option<Gap> {
+        let width_m = half_seen_m(&found.seen);
+        let near: f64 = found.parts.iter().map(|part| part.factor).sum();
+        let narrow_m = NARROW * solved.space.reference_area_m2().sqrt();
+        match width_m < narrow_m {
+            true => Some(Gap { reach_m: REACH * width_m }),
+            false => (near > SURROUNDED).then_some(Gap::NONE),
+        }
+    }
+
+    /// Irradiance at a sensor in the gap, W/m2.
+    pub(super) fn irradiance(&self, solved: &Solved, sensor: &Sensor) -> [f64; 3] {
+        let look = Look::new(solved, sensor, Purpose::Sensor).reaching(self.reach_m);
+        let Gathered { mut sum, parts, .. } = look.gather();
+        let lines: Vec<[f64; 3]> = parts.iter().map(|part| part.line(solved)).collect();
+        for (part, line) in parts.iter().zip(&lines) {
+            (0..3).for_each(|c| sum[c] += part.factor * line[c]);
+        }
+        let factors = || parts.iter().map(|part| part.factor);
+        let weight = factors().sum::<f64>() / WALKS as f64;
+        for walk in 0..WALKS {
+            let share = (walk as f64 + 0.5) / WALKS as f64;
+            let Some(k) = at_share(factors(), share) else { break };
+            let b = self.radiosity_of(solved, &parts[k], walk);
+            (0..3).for_each(|c| sum[c] += weight * (b[c] - lines[k][c]));
+        }
+        sum.map(|e| e.max(0.0))
+    }
+
+    /// Radiosity of a part of a leaf, W/m2: by what arrives there, found along walk number `k`.
+    pub(super) fn radiosity_of(&self, solved: &Solved, part: &Part, k: usize) -> [f64; 3] {
+        let scene = &solved.space.scene;
+        let now = &solved.space.world;
+        let (mut b, mut share, mut part) = ([0.0; 3], [1.0; 3], *part);
+        for step in 0.. {
+            let patch = solved.space.forest.patch(part.leaf).expect("an element has a patch");
+            let normal = solved.space.view.occluder(patch).plane.normal;
+            let patch = &scene.patches[patch.0 as usize];
+            let (m, rho) = (now.exitance(scene, patch), now.reflectance(scene, patch));
+            let sensor = Sensor { at: part.at, normal };
+            let look = Look::new(solved, &sensor, Purpose::Beyond).reaching(self.reach_m);
+            let Gathered { sum, near, .. } = look.gather();
+            let known = if step == 0 { [0.0; 3] } else { part.line(solved) };
+            let seen: f64 = near.iter().map(|n| n.factor).sum();
+            for c in 0..3 {
+                let arrives = sum[c] + near.iter().map(|n| n.sent[c]).sum::<f64>();
+                b[c] += share[c] * (m[c] + rho[c] * arrives - known[c]);
+                share[c] *= rho[c] * seen;
+            }
+            let goes_on = self.reach_m > 0.0 || seen > SURROUNDED;
+            let left = share.iter().fold(0.0, |most: f64, s| most.max(*s));
+            if !goes_on || left <= FOLLOWED.0 || step == FOLLOWED.1 {
+                return b;
+            }
+            match look.choose(&near, [spread(k, 2 * step), spread(k, 2 * step + 1)]) {
+                Some(next) => part = next,
+                None => return b,
+            }
+        }
+        b
+    }
+}
+
+/// Distance within which half of the hemisphere is seen, metres; infinite where more than that is open.
+fn half_seen_m(seen: &[(f64, f64)]) -> f64 {
+    let mut seen = seen.to_vec();
+    seen.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let mut left = 0.5;
+    let found = seen.iter().find(|(_, factor)| {
+        left -= factor;
+        left < 0.0
+    });
+    found.map_or(f64::INFINITY, |&(distance_m, _)| distance_m)
+}

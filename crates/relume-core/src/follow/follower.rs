@@ -1,7 +1,7 @@
 //! A solved state, whatever it is of.
 
-use crate::event::Ticks;
 use crate::pair::{LinkEvent, PairHash, PairTree};
+use crate::predict::Ticks;
 use crate::solver::{Links, Radiosity};
 
 use super::report::FrameReport;
@@ -22,11 +22,11 @@ pub struct Follower<S> {
     /// By which certificates expire.
     pub(super) ticks: Ticks,
     /// Mean radiosity when no link was extrapolated last, W/m2.
-    pub(super) sound_mean_w_m2: f64,
+    pub(super) last_exact_mean_w_m2: f64,
     /// Whether something moved that no motion foresaw.
     pub(super) is_broken: bool,
     /// Whether the radiosities say nothing.
-    pub(super) is_dim: bool,
+    pub(super) is_unsolved: bool,
 }
 
 /// Why there is no solution.

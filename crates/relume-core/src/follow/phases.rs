@@ -3,17 +3,17 @@
 //! Without a state to start from, the same phases build it: a cold build is the update of nothing.
 
 use crate::element::ElementId;
-use crate::event::Ticks;
 use crate::pair::{
     Changes, Edit, OutOfMemory, PairHash, PairId, PairTree, Pairs, Record, Scope, update,
 };
+use crate::predict::Ticks;
 use crate::solver::{Dirty, Links, Radiosity};
 
-use super::ahead::{Ahead, Clocked, most_mean, while_extrapolated};
 use super::budget;
 use super::clock::Clock;
 use super::follower::{Follower, Said, Why};
 use super::links::{Receivers, apply_edits, links_of};
+use super::prediction::{Clocked, Prediction, mean_radiosity_limit, while_extrapolated};
 use super::report::{FrameReport, Memory, PairCounts};
 use super::space::{Balance, Level, Motion, Space};
 use super::update::Update;
@@ -48,7 +48,7 @@ struct Step<'f, 'g, S: Space> {
     goal: &'f S::Goal<'g>,
     order: &'f Order<'f>,
     was: &'f S::Was,
-    ahead: Ahead,
+    prediction: Prediction,
     /// Whether there was nothing to start from.
     is_cold: bool,
 }
@@ -90,19 +90,19 @@ impl<S: Space> Follower<S> {
     ) -> Result<Self, Box<Failed<S>>> {
         let (mut clock, mut report) = (Clock::start(), order.label.clone());
         let is_cold = last.is_none();
-        let mut state = last.unwrap_or_else(|| Follower::blank(goal, order.label.time_s));
+        let mut state = last.unwrap_or_else(|| Follower::unsolved(goal, order.label.time_s));
         let failed = |state, why| Err(Box::new(Failed { state, is_cold, why }));
 
         let was = state.space.go(goal);
-        let mut since = (!is_cold).then(|| state.space.since(goal, &was));
+        let mut change = (!is_cold).then(|| state.space.change(goal, &was));
         report.seconds.moving = clock.lap();
 
-        let ahead = state.predict(goal, &was, order, is_cold);
-        let step = Step { goal, order, was: &was, ahead, is_cold };
+        let prediction = state.predict(goal, &was, order, is_cold);
+        let step = Step { goal, order, was: &was, prediction, is_cold };
         report.seconds.predict = clock.lap();
 
-        let coarse = state.coarse(&step, &mut since);
-        let changes = coarse.and_then(|coarse| state.fine(&step, since.as_ref(), coarse));
+        let coarse = state.coarse(&step, &mut change);
+        let changes = coarse.and_then(|coarse| state.fine(&step, change.as_ref(), coarse));
         let Ok(changes) = changes else {
             let is_called_off = order.watch.is_some_and(Watch::is_cancelled);
             return failed(state, if is_called_off { Why::Cancelled } else { Why::OutOfMemory });
@@ -126,10 +126,10 @@ impl<S: Space> Follower<S> {
     }
 
     /// Nothing but the elements to begin with and an unjudged root.
-    fn blank(goal: &S::Goal<'_>, time_s: f64) -> Self {
+    fn unsolved(goal: &S::Goal<'_>, time_s: f64) -> Self {
         Follower {
             time_s,
-            space: S::blank(goal),
+            space: S::unsolved(goal),
             tree: PairTree::new(S::ROOT),
             hash: PairHash::default(),
             links: Links::default(),
@@ -137,9 +137,9 @@ impl<S: Space> Follower<S> {
             events: Vec::new(),
             report: FrameReport::default(),
             ticks: Ticks::default(),
-            sound_mean_w_m2: 0.0,
+            last_exact_mean_w_m2: 0.0,
             is_broken: false,
-            is_dim: true,
+            is_unsolved: true,
         }
     }
 
@@ -152,7 +152,7 @@ impl<S: Space> Follower<S> {
 
     /// Whether this is what a goal asks for.
     fn is_at(&self, goal: &S::Goal<'_>) -> bool {
-        self.is_settled() && !self.is_dim && self.space.is_at(goal)
+        self.is_settled() && !self.is_unsolved && self.space.is_at(goal)
     }
 
     /// The same state as that of another frame, in which nothing differs.
@@ -173,28 +173,28 @@ impl<S: Space> Follower<S> {
         was: &S::Was,
         order: &Order<'_>,
         is_cold: bool,
-    ) -> Ahead {
+    ) -> Prediction {
         self.is_broken = false;
         let to_s = order.label.time_s;
         let from_s = std::mem::replace(&mut self.time_s, to_s);
         if is_cold {
-            return Ahead::default();
+            return Prediction::default();
         }
         let (ticks, tree) = (&mut self.ticks, &mut self.tree);
-        self.space.ahead(goal, was, order.update, Clocked { ticks, tree, from_s, to_s })
+        self.space.prediction(goal, was, order.update, Clocked { ticks, tree, from_s, to_s })
     }
 
     /// Brings the pairs down to the coarse elements up to date, and the coarse solution that verdicts weigh by.
     fn coarse(
         &mut self,
         step: &Step<'_, '_, S>,
-        since: &mut Option<S::Since<'_>>,
+        change: &mut Option<S::Change<'_>>,
     ) -> Result<Changes, OutOfMemory> {
         if !S::has_coarse(step.goal) {
             return Ok(Changes::default());
         }
-        let changes = self.bring(step, Level::Coarse, since.as_ref(), &[])?;
-        self.space.weigh(step.goal, step.was, &changes, since.as_mut());
+        let changes = self.bring(step, Level::Coarse, change.as_ref(), &[])?;
+        self.space.weigh(step.goal, step.was, &changes, change.as_mut());
         Ok(changes)
     }
 
@@ -202,11 +202,11 @@ impl<S: Space> Follower<S> {
     fn fine(
         &mut self,
         step: &Step<'_, '_, S>,
-        since: Option<&S::Since<'_>>,
+        change: Option<&S::Change<'_>>,
         coarse: Changes,
     ) -> Result<Changes, OutOfMemory> {
         let mut all = coarse;
-        let fine = self.bring(step, Level::Fine, since, &all.refined)?;
+        let fine = self.bring(step, Level::Fine, change, &all.refined)?;
         all.work.add_after_coarse(fine.work);
         all.edits.extend(fine.edits);
         all.apart.extend(fine.apart);
@@ -219,7 +219,7 @@ impl<S: Space> Follower<S> {
         &mut self,
         step: &Step<'_, '_, S>,
         level: Level,
-        since: Option<&S::Since<'_>>,
+        change: Option<&S::Change<'_>>,
         fresh: &[PairId],
     ) -> Result<Changes, OutOfMemory> {
         let Step { goal, order, is_cold, .. } = step;
@@ -231,7 +231,7 @@ impl<S: Space> Follower<S> {
             });
             is_wanted && within(tree, elements, scratch)
         };
-        let motion = Motion { since, ahead: &step.ahead };
+        let motion = Motion { change, prediction: &step.prediction };
         let mut judge = self.space.judge(goal, level, &motion);
         let scope = Scope {
             candidates: &S::candidates(goal),
@@ -279,16 +279,16 @@ impl<S: Space> Follower<S> {
             Some(receivers)
         };
         let mut parents = self.space.take_changed();
-        let lit = self.space.lit(step.goal, false);
-        if self.is_dim {
-            self.radiosity = self.space.first_guess(step.goal, &lit);
+        let surfaces = self.space.surfaces(step.goal, false);
+        if self.is_unsolved {
+            self.radiosity = self.space.first_guess(step.goal, &surfaces);
             return Dirty::All;
         }
         let forest = self.space.forest();
         self.radiosity.extend(forest.room());
         let receives = |id: &u32| forest.receives(ElementId(*id));
         parents.retain(receives);
-        parents.iter().for_each(|&parent| self.radiosity.inherit(&lit, parent));
+        parents.iter().for_each(|&parent| self.radiosity.inherit(&surfaces, parent));
         match receivers {
             None => Dirty::All,
             Some(mut receivers) => {
@@ -302,31 +302,31 @@ impl<S: Space> Follower<S> {
     fn solve(&mut self, step: &Step<'_, '_, S>, edited: Edited) {
         let Edited { dirty, sources_differ } = edited;
         let goal = step.goal;
-        let lit = self.space.lit(goal, matches!(dirty, Dirty::All));
+        let surfaces = self.space.surfaces(goal, matches!(dirty, Dirty::All));
         if sources_differ {
-            self.space.set_sources(goal, &lit, &mut self.radiosity);
+            self.space.set_sources(goal, &surfaces, &mut self.radiosity);
         }
-        let residual = S::residual(goal, self.is_dim);
-        let most_w_m2 = S::most_mean_w_m2(goal);
-        if let Some(dark) = self.space.if_dark(goal, &lit) {
+        let residual = S::residual(goal, self.is_unsolved);
+        let bound_w_m2 = S::mean_radiosity_bound_w_m2(goal);
+        if let Some(dark) = self.space.if_dark(goal, &surfaces) {
             // What is left of earlier light would fade for ever.
             self.radiosity = dark;
         } else if self.is_settled() {
-            let bound = (residual, most_mean(most_w_m2));
-            self.radiosity.solve_bounded(&lit, &self.links, dirty, bound);
+            let bound = (residual, mean_radiosity_limit(bound_w_m2));
+            self.radiosity.solve_bounded(&surfaces, &self.links, dirty, bound);
         } else {
-            let mean = self.sound_mean_w_m2 * self.space.brightened(goal);
+            let mean = self.last_exact_mean_w_m2 * self.space.brightened(goal);
             // From nothing on, no growth is too much.
             let mean = if mean > 0.0 { mean } else { f64::INFINITY };
-            let stop = while_extrapolated(residual, mean, most_w_m2);
-            self.radiosity.solve(&lit, &self.links, dirty, stop);
+            let stop = while_extrapolated(residual, mean, bound_w_m2);
+            self.radiosity.solve(&surfaces, &self.links, dirty, stop);
         }
-        self.is_dim = false;
+        self.is_unsolved = false;
         let is_settled = self.is_settled();
         if is_settled {
-            self.sound_mean_w_m2 = self.radiosity.mean_w_m2(&lit);
+            self.last_exact_mean_w_m2 = self.radiosity.mean_w_m2(&surfaces);
         }
-        drop(lit);
+        drop(surfaces);
         self.space.finish(is_settled);
     }
 
@@ -429,7 +429,7 @@ impl<S: Space> Failed<S> {
         state.ticks = Ticks::default();
         state.space.stop();
         // A solution that did not settle is no guess.
-        state.is_dim = !matches!(why, Why::OutOfMemory | Why::Cancelled);
+        state.is_unsolved = !matches!(why, Why::OutOfMemory | Why::Cancelled);
         Some(state)
     }
 }

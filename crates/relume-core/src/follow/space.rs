@@ -4,9 +4,9 @@ use crate::element::{ElementId, Renumbering};
 use crate::pair::{Changes, Judge, PairId, PairTree};
 use crate::solver::{Dirty, Radiosity, Surfaces};
 
-use super::ahead::{Ahead, Clocked};
 use super::follower::{Follower, Why};
 use super::links::Receivers;
+use super::prediction::{Clocked, Prediction};
 use super::report::{Energy, FrameReport, RowSumError};
 use super::update::Update;
 
@@ -20,11 +20,11 @@ pub(crate) enum Level {
 }
 
 /// What pairs may feel of a motion: what lies behind, and what is known of what lies ahead.
-pub(crate) struct Motion<'m, Since> {
+pub(crate) struct Motion<'m, Change> {
     /// What happened since the last frame; `None` in a cold build.
-    pub(crate) since: Option<&'m Since>,
+    pub(crate) change: Option<&'m Change>,
     /// What is predicted with.
-    pub(crate) ahead: &'m Ahead,
+    pub(crate) prediction: &'m Prediction,
 }
 
 /// Where the flux of a solution goes.
@@ -46,7 +46,7 @@ pub(crate) trait Space: Sized + Send {
     /// What was before the frame.
     type Was: Sync;
     /// The difference between what was and what is, as pairs feel it.
-    type Since<'m>: Sync
+    type Change<'m>: Sync
     where
         Self: 'm;
     /// What decides on pairs.
@@ -56,7 +56,7 @@ pub(crate) trait Space: Sized + Send {
     /// The elements.
     type Forest: Receivers;
     /// The elements with their light.
-    type Lit<'l>: Surfaces
+    type LitSurfaces<'l>: Surfaces
     where
         Self: 'l;
 
@@ -66,7 +66,7 @@ pub(crate) trait Space: Sized + Send {
     // Before a frame.
 
     /// Elements as a cold build begins with them.
-    fn blank(goal: &Self::Goal<'_>) -> Self;
+    fn unsolved(goal: &Self::Goal<'_>) -> Self;
     /// Whether this is what the goal asks for.
     fn is_at(&self, goal: &Self::Goal<'_>) -> bool;
     /// Takes over the goal's promises where nothing else differs. Whether bodies move as they promised before.
@@ -81,15 +81,15 @@ pub(crate) trait Space: Sized + Send {
     /// Goes where the goal says; what was before.
     fn go(&mut self, goal: &Self::Goal<'_>) -> Self::Was;
     /// What differs.
-    fn since<'m>(&self, goal: &Self::Goal<'_>, was: &'m Self::Was) -> Self::Since<'m>;
+    fn change<'m>(&self, goal: &Self::Goal<'_>, was: &'m Self::Was) -> Self::Change<'m>;
     /// What is predicted with from here on.
-    fn ahead(
+    fn prediction(
         &self,
         goal: &Self::Goal<'_>,
         was: &Self::Was,
         update: Update,
         clocked: Clocked<'_>,
-    ) -> Ahead;
+    ) -> Prediction;
 
     // Coarse and fine.
 
@@ -100,19 +100,19 @@ pub(crate) trait Space: Sized + Send {
         &'j mut self,
         goal: &'j Self::Goal<'_>,
         level: Level,
-        motion: &Motion<'j, Self::Since<'_>>,
+        motion: &Motion<'j, Self::Change<'_>>,
     ) -> Self::Judge<'j>;
     /// Whether verdicts weigh by a coarse solution.
     fn has_coarse(_goal: &Self::Goal<'_>) -> bool {
         false
     }
-    /// Follows the coarse pairs with the coarse solution; what of it changed is added to `since`.
+    /// Follows the coarse pairs with the coarse solution; what of it changed is added to `change`.
     fn weigh(
         &mut self,
         _goal: &Self::Goal<'_>,
         _was: &Self::Was,
         _changes: &Changes,
-        _since: Option<&mut Self::Since<'_>>,
+        _change: Option<&mut Self::Change<'_>>,
     ) {
     }
 
@@ -129,7 +129,7 @@ pub(crate) trait Space: Sized + Send {
     /// Elements whose children came or went since this was asked last.
     fn take_changed(&mut self) -> Vec<u32>;
     /// A solution to begin with.
-    fn first_guess(&self, goal: &Self::Goal<'_>, lit: &Self::Lit<'_>) -> Radiosity;
+    fn first_guess(&self, goal: &Self::Goal<'_>, surfaces: &Self::LitSurfaces<'_>) -> Radiosity;
     /// Works out links that end on groups; `apart` are those that were looked at again, `None` in a cold build.
     fn place_groups(
         &mut self,
@@ -147,15 +147,22 @@ pub(crate) trait Space: Sized + Send {
     // Solve.
 
     /// The elements with their light; with places worked out beforehand if most of them are to be gathered.
-    fn lit(&self, goal: &Self::Goal<'_>, everywhere: bool) -> Self::Lit<'_>;
+    fn surfaces(&self, goal: &Self::Goal<'_>, everywhere: bool) -> Self::LitSurfaces<'_>;
     /// Gives sources that are no surfaces what they send.
-    fn set_sources(&self, _goal: &Self::Goal<'_>, _lit: &Self::Lit<'_>, _light: &mut Radiosity) {}
+    fn set_sources(
+        &self,
+        _goal: &Self::Goal<'_>,
+        _surfaces: &Self::LitSurfaces<'_>,
+        _light: &mut Radiosity,
+    ) {
+    }
     /// The solution, where nothing emits.
-    fn if_dark(&self, goal: &Self::Goal<'_>, lit: &Self::Lit<'_>) -> Option<Radiosity>;
+    fn if_dark(&self, goal: &Self::Goal<'_>, surfaces: &Self::LitSurfaces<'_>)
+    -> Option<Radiosity>;
     /// Residual to solve to, relative to the mean radiosity.
     fn residual(goal: &Self::Goal<'_>, is_cold: bool) -> f64;
     /// The mean radiosity that the space cannot pass at any time, W/m2, whatever hides what.
-    fn most_mean_w_m2(goal: &Self::Goal<'_>) -> f64;
+    fn mean_radiosity_bound_w_m2(goal: &Self::Goal<'_>) -> f64;
     /// How many times as much is emitted as when [`Space::finish`] was told last of a solution without extrapolated links.
     fn brightened(&self, _goal: &Self::Goal<'_>) -> f64 {
         1.0

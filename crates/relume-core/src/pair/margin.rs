@@ -5,8 +5,8 @@
 //! judged; changes of brightness are added to them exactly, so that what brightens and darkens again leaves
 //! them as they were.
 
-use super::light::Light;
-use super::side::Side;
+use super::brightness::Brightness;
+use crate::transport::Side;
 
 /// Steps in an octave.
 const STEPS: f64 = 240.0;
@@ -224,7 +224,7 @@ const ENDLESS: i32 = 1 << 24;
 
 impl Shift {
     /// From one light to another; `None` if they are the same.
-    pub(super) fn between(before: &Light, after: &Light) -> Option<Shift> {
+    pub(super) fn between(before: &Brightness, after: &Brightness) -> Option<Shift> {
         if before == after {
             return None;
         }
@@ -287,8 +287,8 @@ impl Growth {
 mod tests {
     use super::*;
 
-    fn light(radiosity: f64, irradiance: f64) -> Light {
-        Light { radiosity, reflected: radiosity, irradiance }
+    fn light(radiosity: f64, irradiance: f64) -> Brightness {
+        Brightness { radiosity, reflected: radiosity, irradiance }
     }
 
     fn growth(on: [(i32, i32); 2]) -> Growth {

@@ -3,9 +3,9 @@
 use crate::geometry::no_smaller;
 use crate::transport::{BlockerSizes, Exchange, SEGMENTS, Variation, Visibility};
 
-use super::light::Light;
+use super::brightness::Brightness;
 use super::margin::Margin;
-use super::side::Side;
+use crate::transport::Side;
 
 /// What decides on a pair of elements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +30,7 @@ pub(super) struct End {
     pub(super) area: f64,
     /// Area at which an element of this surface weighs 1 in the error norm, m2.
     pub(super) reference_area: f64,
-    pub(super) light: Light,
+    pub(super) light: Brightness,
     /// Its area where it sends: also of what is distant, which receives nothing; m2.
     pub(super) own_area: f64,
     /// Area of the surface that it is a part of and that may send alike: of its patch, or of the sky; m2.
@@ -236,7 +236,7 @@ fn one_way(
     let finer = (receiver.reference_area / scale).sqrt();
     let weight = by_area / receiver.light.irradiance;
     let per_radiosity = link.exchange / receiver.area * weight;
-    let Light { radiosity, reflected, .. } = source.light;
+    let Brightness { radiosity, reflected, .. } = source.light;
     let varies = SOURCE_VARIATION * (source.area / link.reference_area).min(4.0);
     // What a small source does unevenly its neighbours do too, in the same sense: splitting the
     // source does not mend it, so it counts as if the source were as large as the receiver.

@@ -6,10 +6,10 @@ use std::ops::Range;
 use glam::DVec2;
 
 use crate::element::{ElementId, Renumbering};
-use crate::event::{History, Lookahead, Tick};
+use crate::predict::{History, Lookahead, Tick};
 
 use super::margin::Margin;
-use super::side::Side;
+use crate::transport::Side;
 
 /// Index of a pair in a [`PairTree`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -254,20 +254,20 @@ pub struct PairTree {
     vacant: Vec<Vec<u32>>,
     counts: StateCounts,
     /// Until when each pair's certificate stands.
-    due: Beside<Tick>,
+    expiry: SideTable<Tick>,
     /// What extrapolation knows of each pair.
-    history: Beside<History>,
+    history: SideTable<History>,
     /// Pairs that are extrapolated.
     live: usize,
 }
 
 /// Something beside the nodes, by their ids: nothing at all where it is the default of all of them.
 #[derive(Clone, Debug, Default)]
-struct Beside<T> {
+struct SideTable<T> {
     values: Vec<T>,
 }
 
-impl<T: Copy + Default + PartialEq> Beside<T> {
+impl<T: Copy + Default + PartialEq> SideTable<T> {
     #[inline]
     fn get(&self, id: PairId) -> T {
         self.values.get(id.0 as usize).copied().unwrap_or_default()
@@ -334,16 +334,16 @@ impl PairTree {
     pub fn memory_bytes(&self) -> u64 {
         let lists: usize =
             self.vacant.iter().map(|l| l.capacity() * 4 + size_of::<Vec<u32>>()).sum();
-        let beside = self.due.memory_bytes() + self.history.memory_bytes();
-        (self.nodes.capacity() * size_of::<Node>() + lists) as u64 + beside
+        let side_tables = self.expiry.memory_bytes() + self.history.memory_bytes();
+        (self.nodes.capacity() * size_of::<Node>() + lists) as u64 + side_tables
     }
 
     /// Bytes in use: without the room that vectors keep to grow into, which is no memory before it is
     /// written to.
     pub fn used_bytes(&self) -> u64 {
         let lists: usize = self.vacant.iter().map(|l| l.len() * 4 + size_of::<Vec<u32>>()).sum();
-        let beside = self.due.used_bytes() + self.history.used_bytes();
-        (self.nodes.len() * size_of::<Node>() + lists) as u64 + beside
+        let side_tables = self.expiry.used_bytes() + self.history.used_bytes();
+        (self.nodes.len() * size_of::<Node>() + lists) as u64 + side_tables
     }
 
     /// Room that no pair has.
@@ -376,7 +376,7 @@ impl PairTree {
         let mut known = BTreeMap::new();
         for id in old.clone().map(PairId) {
             let node = self.nodes[id.0 as usize];
-            let same = known.insert(self.ends(id), (node, self.due(id), self.history(id)));
+            let same = known.insert(self.ends(id), (node, self.expiry(id), self.history(id)));
             // Ends that are gone cannot be told apart.
             same.iter().for_each(|(node, ..)| self.count_out(node));
             self.set_history(id, History::default());
@@ -386,9 +386,9 @@ impl PairTree {
         let first = self.refine(PairTree::ROOT, State::RefinedSelf, wanted.iter().copied()).start;
         for (id, ends) in (first..).map(PairId).zip(&wanted) {
             match known.remove(ends) {
-                Some((node, due, history)) => {
+                Some((node, expiry, history)) => {
                     self.nodes[id.0 as usize] = node;
-                    self.set_due(id, due);
+                    self.set_expiry(id, expiry);
                     self.set_history(id, history);
                 }
                 None => self.set_state(id, State::Culled(CullReason::Absent)),
@@ -421,7 +421,7 @@ impl PairTree {
             at += 1;
         }
         debug_assert_eq!(self.nodes.len(), self.len());
-        self.due.reorder(&order);
+        self.expiry.reorder(&order);
         self.history.reorder(&order);
         self.vacant = Vec::new();
     }
@@ -429,7 +429,7 @@ impl PairTree {
     /// Gives back room beyond a small reserve.
     pub fn trim(&mut self) {
         self.nodes.shrink_to(self.nodes.len() + self.nodes.len() / SLACK);
-        self.due.trim();
+        self.expiry.trim();
         self.history.trim();
         self.vacant.iter_mut().for_each(|list| list.shrink_to(2 * list.len()));
     }
@@ -511,12 +511,12 @@ impl PairTree {
 
     /// Until when a pair's certificate stands; 0 without one.
     #[inline]
-    pub(super) fn due(&self, id: PairId) -> Tick {
-        self.due.get(id)
+    pub(super) fn expiry(&self, id: PairId) -> Tick {
+        self.expiry.get(id)
     }
 
-    pub(super) fn set_due(&mut self, id: PairId, due: Tick) {
-        self.due.set(id, due, self.nodes.len());
+    pub(super) fn set_expiry(&mut self, id: PairId, expiry: Tick) {
+        self.expiry.set(id, expiry, self.nodes.len());
     }
 
     /// What extrapolation knows of a pair; empty where it is not asked for.
@@ -549,12 +549,12 @@ impl PairTree {
 
     /// Takes back all certificates.
     pub fn forget_certificates(&mut self) {
-        self.due = Beside::default();
+        self.expiry = SideTable::default();
     }
 
     /// Extrapolates no pair any more.
     pub fn forget_histories(&mut self) {
-        self.history = Beside::default();
+        self.history = SideTable::default();
         self.live = 0;
     }
 
@@ -585,7 +585,7 @@ impl PairTree {
                 *node = Node::new(a, b, State::New);
             }
             for id in (first..first + count as u32).map(PairId) {
-                self.set_due(id, 0);
+                self.set_expiry(id, 0);
                 self.set_history(id, History::default());
             }
         }

@@ -11,13 +11,13 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::element::{ElementId, ElementKey};
-use crate::event::{History, Lookahead, Sample, Tick};
+use crate::predict::{History, Lookahead, Sample, Tick};
 
+use super::certificate_tests::Finding;
 use super::hash::{PairHash, pair_key};
 use super::margin::Margin;
-use super::outlook::Finding;
-use super::side::Side;
 use super::tree::{Carried, CullReason, PairId, PairTree, State};
+use crate::transport::Side;
 
 /// What is decided on a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +31,7 @@ pub enum Verdict {
     /// It exchanges nothing.
     Cull(CullReason),
     /// Undecided: it is left as it is, and reported.
-    Hold,
+    CoarseLink,
 }
 
 /// A verdict with what it rests on.
@@ -116,10 +116,10 @@ pub trait Judge: Hierarchy + Sync {
     ) -> bool;
 
     /// Whether the light on one of the ends changed, at a pair whose verdict depends on it.
-    fn dimmed(&self, a: ElementId, b: ElementId) -> bool;
+    fn brightness_changed(&self, a: ElementId, b: ElementId) -> bool;
 
     /// Whether a certificate stands at this instant.
-    fn certified(&self, due: Tick) -> bool;
+    fn certified(&self, until: Tick) -> bool;
 
     /// How far ahead pairs are extrapolated, if they are.
     fn lookahead(&self) -> Option<&Lookahead>;
@@ -131,10 +131,10 @@ pub trait Judge: Hierarchy + Sync {
     }
 
     /// The last tick until which the known motion cannot change what was found of a pair; 0 if none.
-    fn foresee(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick;
+    fn expiry(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick;
 
     /// Whether this pair is one of those that are held when it is not culled.
-    fn holds(&self, a: ElementId, b: ElementId) -> bool;
+    fn is_coarse_pair(&self, a: ElementId, b: ElementId) -> bool;
 
     /// Whether a link between these two is worked out further from their places once it is one, so that it must be known
     /// where they were looked at again.
@@ -255,7 +255,7 @@ pub struct Record {
 
 /// A pair that was held, with what it would carry.
 #[derive(Clone, Copy, Debug)]
-pub struct Held {
+pub struct CoarseLink {
     /// First end.
     pub a: ElementId,
     /// Second end.
@@ -277,9 +277,9 @@ pub struct Changes {
     /// Pairs that were refined anew, ascending; empty where edits are not recorded.
     pub refined: Vec<PairId>,
     /// Pairs held.
-    pub held: Vec<Held>,
+    pub coarse_links: Vec<CoarseLink>,
     /// Pairs that were held once and may be so no more; both ends may have vanished since.
-    pub dropped: Vec<(ElementId, ElementId)>,
+    pub dropped_coarse_links: Vec<(ElementId, ElementId)>,
     /// Links that are worked out further ([`Judge::is_apart`]) of which more than the light was looked at, whatever they
     /// carry now; empty where edits are not recorded.
     pub apart: Vec<(ElementId, ElementId)>,
@@ -339,8 +339,8 @@ pub fn update<J: Judge>(
                 for chunk in &judged {
                     editor.apply_chunk(chunk, &wave);
                 }
-                let held = editor.changes.held.len() * size_of::<Held>();
-                let scratch = wave.used_bytes() + editor.next.used_bytes() + held as u64;
+                let coarse = editor.changes.coarse_links.len() * size_of::<CoarseLink>();
+                let scratch = wave.used_bytes() + editor.next.used_bytes() + coarse as u64;
                 if !may_go_on(editor.tree, editor.judge.element_count(), scratch) {
                     return Err(OutOfMemory);
                 }
@@ -421,7 +421,7 @@ impl List {
     /// No candidates, by the certificate of a pair above.
     const CLEAR: List = List { start: u32::MAX, len: 0 };
 
-    fn since(start: usize, candidates: &[u32]) -> List {
+    fn from_start(start: usize, candidates: &[u32]) -> List {
         List { start: start as u32, len: (candidates.len() - start) as u32 }
     }
 
@@ -454,19 +454,19 @@ impl Below {
             narrowed.truncate(start);
             return Below::Same;
         }
-        Below::Own(List::since(start, narrowed))
+        Below::Own(List::from_start(start, narrowed))
     }
 }
 
 struct Chunk<'a> {
     items: &'a [Item],
     ends: Vec<(ElementId, ElementId)>,
-    looks: Vec<Look>,
+    outcomes: Vec<Outcome>,
     candidates: Vec<u32>,
 }
 
 /// What a look at a pair found.
-enum Look {
+enum Outcome {
     /// Nothing can have changed here or below, by certificate.
     Certified,
     /// Nothing has changed here or below, nor can it until then.
@@ -492,23 +492,23 @@ fn judge_block<'a, J: Judge>(
 ) -> Vec<Chunk<'a>> {
     let judge_chunk = |items: &'a [Item]| {
         let mut narrowed = Vec::new();
-        let looks = items
+        let outcomes = items
             .iter()
-            .map(|item| look_at(tree, judge, item, (candidates, &mut narrowed), fresh))
+            .map(|item| evaluate(tree, judge, item, (candidates, &mut narrowed), fresh))
             .collect();
         let ends = items.iter().map(|item| tree.ends(item.pair)).collect();
-        Chunk { items, ends, looks, candidates: narrowed }
+        Chunk { items, ends, outcomes, candidates: narrowed }
     };
     items.par_chunks(CHUNK).map(judge_chunk).collect()
 }
 
-fn look_at<J: Judge>(
+fn evaluate<J: Judge>(
     tree: &PairTree,
     judge: &J,
     item: &Item,
     (candidates, narrowed): (&[u32], &mut Vec<u32>),
     fresh: &[PairId],
-) -> Look {
+) -> Outcome {
     let (a, b) = tree.ends(item.pair);
     let state = tree.state(item.pair);
     let new = state == State::New || fresh.binary_search(&item.pair).is_ok();
@@ -516,13 +516,13 @@ fn look_at<J: Judge>(
     let mut due = false;
     if let Some(ahead) = judge.lookahead().filter(|_| !new && history.is_live()) {
         due = history.is_due(ahead);
-        if !due && let Some(look) = extrapolate(tree, judge, item.pair, &history, ahead) {
-            return look;
+        if !due && let Some(outcome) = extrapolate(tree, judge, item.pair, &history, ahead) {
+            return outcome;
         }
     }
-    let certified = !new && judge.certified(tree.due(item.pair));
+    let certified = !new && judge.certified(tree.expiry(item.pair));
     if certified && matches!(state, State::Culled(_)) {
-        return Look::Certified;
+        return Outcome::Certified;
     }
     let stale = match new {
         true => Stale::New,
@@ -530,20 +530,20 @@ fn look_at<J: Judge>(
         false => judge.stale(a, b, certified || item.list == List::CLEAR),
     };
     // Of a pair whose ends are at rest with nothing new between them.
-    let unaffected = || (!certified).then(|| judge.foresee(a, b, Finding::Unaffected));
+    let unaffected = || (!certified).then(|| judge.expiry(a, b, Finding::Unaffected));
     if stale == Stale::Brightness
         && let Some(left) = judge.withstands(a, b, tree.margin(item.pair))
     {
-        return Look::Withstands(left, unaffected());
+        return Outcome::Withstands(left, unaffected());
     }
     let start = narrowed.len();
     match stale {
-        Stale::Nothing => return unaffected().map_or(Look::Certified, Look::Unaffected),
-        Stale::Below => return Look::Descend(unaffected()),
+        Stale::Nothing => return unaffected().map_or(Outcome::Certified, Outcome::Unaffected),
+        Stale::Below => return Outcome::Descend(unaffected()),
         Stale::Occlusion
             if state.is_refined() && judge.narrow(a, b, item.list.of(candidates), narrowed) =>
         {
-            return Look::Narrowed(Below::of(item.list, start, narrowed));
+            return Outcome::Narrowed(Below::of(item.list, start, narrowed));
         }
         _ => {}
     }
@@ -558,7 +558,7 @@ fn judge_again<J: Judge>(
     stale: Stale,
     (candidates, narrowed): (&[u32], &mut Vec<u32>),
     unaffected: &dyn Fn() -> Option<Tick>,
-) -> Look {
+) -> Outcome {
     let ((a, b), state) = (tree.ends(item.pair), tree.state(item.pair));
     let start = narrowed.len();
     let candidates = if stale == Stale::Followed { &[] } else { item.list.of(candidates) };
@@ -583,15 +583,15 @@ fn judge_again<J: Judge>(
     if !refined {
         narrowed.truncate(start);
     }
-    let due = match stale == Stale::Brightness {
-        true if !matches!(found.verdict, Verdict::Cull(_) | Verdict::Hold) => unaffected(),
+    let expiry = match stale == Stale::Brightness {
+        true if !matches!(found.verdict, Verdict::Cull(_) | Verdict::CoarseLink) => unaffected(),
         _ => certificate(judge, (a, b), (found.verdict, stale), may_be_clear),
     };
     let list = match stale {
         Stale::Followed => Below::Own(List::CLEAR),
         _ => Below::of(item.list, start, narrowed),
     };
-    Look::Judged(found, stale, list, due)
+    Outcome::Judged(found, stale, list, expiry)
 }
 
 /// Until when what was found of a pair cannot change; `None` where the pair keeps the certificate that it has.
@@ -602,11 +602,11 @@ fn certificate<J: Judge>(
     may_be_clear: bool,
 ) -> Option<Tick> {
     match found {
-        (Verdict::Cull(_), _) => Some(judge.foresee(a, b, Finding::Culled)),
+        (Verdict::Cull(_), _) => Some(judge.expiry(a, b, Finding::Culled)),
         (_, Stale::Followed) => None,
         // It is met again, perhaps still in the state that it had.
-        (Verdict::Hold, _) => Some(0),
-        (_, Stale::Moved) if may_be_clear => Some(judge.foresee(a, b, Finding::Clear)),
+        (Verdict::CoarseLink, _) => Some(0),
+        (_, Stale::Moved) if may_be_clear => Some(judge.expiry(a, b, Finding::Clear)),
         _ => Some(0),
     }
 }
@@ -619,9 +619,9 @@ fn extrapolate<J: Judge>(
     pair: PairId,
     history: &History,
     ahead: &Lookahead,
-) -> Option<Look> {
+) -> Option<Outcome> {
     let (a, b) = tree.ends(pair);
-    let margin = match judge.dimmed(a, b) {
+    let margin = match judge.brightness_changed(a, b) {
         true => Some(judge.withstands(a, b, tree.margin(pair))?),
         false => None,
     };
@@ -629,11 +629,11 @@ fn extrapolate<J: Judge>(
         Some(link) => {
             let (exchange_area_m2, visibility) = history.extrapolated(ahead);
             let carried = Carried { exchange_area_m2, visibility, ..link.carried };
-            Some(Look::Extrapolated(carried, margin))
+            Some(Outcome::Extrapolated(carried, margin))
         }
         None => Some(match margin {
-            Some(margin) => Look::Withstands(margin, None),
-            None => Look::Descend(None),
+            Some(margin) => Outcome::Withstands(margin, None),
+            None => Outcome::Descend(None),
         }),
     }
 }
@@ -650,30 +650,30 @@ struct Editor<'a, J> {
 
 impl<J: Judge> Editor<'_, J> {
     fn apply_chunk(&mut self, chunk: &Chunk<'_>, wave: &Wave) {
-        for ((item, look), &ends) in chunk.items.iter().zip(&chunk.looks).zip(&chunk.ends) {
+        for ((item, outcome), &ends) in chunk.items.iter().zip(&chunk.outcomes).zip(&chunk.ends) {
             if item.is_gone(self.tree, ends) {
                 continue;
             }
             self.changes.work.visited += 1;
-            match look {
-                Look::Certified => self.changes.work.certified += 1,
-                Look::Unaffected(due) => self.tree.set_due(item.pair, *due),
-                Look::Descend(due) => {
-                    self.certify(item.pair, *due);
+            match outcome {
+                Outcome::Certified => self.changes.work.certified += 1,
+                Outcome::Unaffected(expiry) => self.tree.set_expiry(item.pair, *expiry),
+                Outcome::Descend(expiry) => {
+                    self.certify(item.pair, *expiry);
                     let children = self.tree.children(item.pair);
-                    self.look_at(children, Below::Same, item, (chunk, wave));
+                    self.enqueue(children, Below::Same, item, (chunk, wave));
                 }
-                Look::Narrowed(list) => {
+                Outcome::Narrowed(list) => {
                     let children = self.tree.children(item.pair);
-                    self.look_at(children, *list, item, (chunk, wave));
+                    self.enqueue(children, *list, item, (chunk, wave));
                 }
-                Look::Withstands(margin, due) => {
-                    self.certify(item.pair, *due);
+                Outcome::Withstands(margin, expiry) => {
+                    self.certify(item.pair, *expiry);
                     self.tree.set_margin(item.pair, *margin);
                     let children = self.tree.children(item.pair);
-                    self.look_at(children, Below::Same, item, (chunk, wave));
+                    self.enqueue(children, Below::Same, item, (chunk, wave));
                 }
-                Look::Extrapolated(carried, margin) => {
+                Outcome::Extrapolated(carried, margin) => {
                     self.changes.work.extrapolated += 1;
                     self.changes.work.dynamic_links += 1;
                     self.carry(item.pair, carried);
@@ -682,15 +682,15 @@ impl<J: Judge> Editor<'_, J> {
                         self.tree.set_margin(item.pair, *margin);
                     }
                 }
-                Look::Judged(found, stale, list, due) => {
+                Outcome::Judged(found, stale, list, expiry) => {
                     self.count(found, *stale);
                     self.remember(item.pair, found, *stale);
                     let children = self.apply(item.pair, found, *stale);
                     if found.verdict == Verdict::Link && *stale != Stale::Brightness {
                         self.note_apart(item.pair);
                     }
-                    self.certify(item.pair, *due);
-                    self.look_at(children, *list, item, (chunk, wave));
+                    self.certify(item.pair, *expiry);
+                    self.enqueue(children, *list, item, (chunk, wave));
                 }
             }
         }
@@ -703,9 +703,9 @@ impl<J: Judge> Editor<'_, J> {
         }
     }
 
-    fn certify(&mut self, pair: PairId, due: Option<Tick>) {
-        if let Some(due) = due {
-            self.tree.set_due(pair, due);
+    fn certify(&mut self, pair: PairId, expiry: Option<Tick>) {
+        if let Some(expiry) = expiry {
+            self.tree.set_expiry(pair, expiry);
         }
     }
 
@@ -762,7 +762,7 @@ impl<J: Judge> Editor<'_, J> {
         self.tree.set_history(pair, history);
     }
 
-    fn look_at(
+    fn enqueue(
         &mut self,
         pairs: Range<u32>,
         list: Below,
@@ -784,8 +784,8 @@ impl<J: Judge> Editor<'_, J> {
         let before = self.tree.state(pair);
         let (a, b) = self.tree.ends(pair);
         let wanted = match found.verdict {
-            Verdict::Hold => {
-                self.changes.held.push(Held { a, b, carried: found.carried });
+            Verdict::CoarseLink => {
+                self.changes.coarse_links.push(CoarseLink { a, b, carried: found.carried });
                 return 0..0;
             }
             Verdict::Link => State::Active,
@@ -910,7 +910,7 @@ impl<J: Judge> Editor<'_, J> {
             }
             State::Culled(_) | State::New | State::Vacant => {
                 self.tree.set_state(pair, wanted);
-                self.drop_held(pair);
+                self.drop_coarse_link(pair);
                 0..0
             }
         }
@@ -927,7 +927,7 @@ impl<J: Judge> Editor<'_, J> {
         for child in self.tree.children(pair).map(PairId) {
             let state = self.tree.state(child);
             self.leave(child, state);
-            self.drop_held(child);
+            self.drop_coarse_link(child);
         }
         if let State::Refined(side) = self.tree.state(pair) {
             let (a, b) = self.tree.ends(pair);
@@ -936,10 +936,10 @@ impl<J: Judge> Editor<'_, J> {
         self.tree.remove_children(pair);
     }
 
-    fn drop_held(&mut self, pair: PairId) {
+    fn drop_coarse_link(&mut self, pair: PairId) {
         let (a, b) = self.tree.ends(pair);
-        if self.judge.holds(a, b) {
-            self.changes.dropped.push((a, b));
+        if self.judge.is_coarse_pair(a, b) {
+            self.changes.dropped_coarse_links.push((a, b));
         }
     }
 

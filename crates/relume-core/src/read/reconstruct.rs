@@ -12,7 +12,7 @@ use crate::follow::directions;
 use crate::pair::{self, Carried, Gradients};
 use crate::solver::{Dirty, Link, Links, LinksBuilder, Radiosity, Stop};
 use crate::space::Solved;
-use crate::transport::{Looker, Meeting, meeting};
+use crate::transport::{Meeting, Side, meeting};
 
 use super::compare::mean_radiosity;
 use super::pieces::Sharing;
@@ -155,11 +155,11 @@ impl Reconstruction<'_> {
         if visibility == u16::MAX {
             return None;
         }
-        let (looker, over_receiver, over_source) = match leaf == link.a {
-            true => (Looker::A, gradients.over_a, gradients.over_b),
-            false => (Looker::B, gradients.over_b, gradients.over_a),
+        let (observer, over_receiver, over_source) = match leaf == link.a {
+            true => (Side::A, gradients.over_a, gradients.over_b),
+            false => (Side::B, gradients.over_b, gradients.over_a),
         };
-        let v = self.sharing.visibility_from(link, looker)?;
+        let v = self.sharing.visibility_from(link, observer)?;
         let area_m2 = self.solved.space.forest.receiving_m2(leaf);
         let coupling = (v * f64::from(exchange_area_m2) / area_m2) as f32;
         Some(Link { source: source.0, coupling, over_receiver, over_source })

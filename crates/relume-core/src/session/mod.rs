@@ -111,7 +111,7 @@ pub struct Session {
     /// What others may see of a step under way.
     watch: Arc<Watch>,
     /// Time that `moved` compares with, where it is not that of the last step.
-    came_from: Option<f64>,
+    count_motion_from: Option<f64>,
     /// What is held by hand.
     held: Held,
     /// Bodies that are not where the scene has them at rest, as the seed knows them.
@@ -144,7 +144,7 @@ impl Session {
             edited: None,
             starts_anew: false,
             watch: Arc::default(),
-            came_from: None,
+            count_motion_from: None,
             held: Held::default(),
             displaced,
             time_s: 0.0,
@@ -188,10 +188,10 @@ impl Session {
         let back = self.solved.as_ref().map(|solved| self.way_back(solved));
         let Start { last, remains } = self.follow_hands();
         let world = self.world();
-        let came_from =
-            self.came_from.take().map(|from_s| self.bed.scene.at_but(from_s, &self.held));
+        let count_motion_from =
+            self.count_motion_from.take().map(|from_s| self.bed.scene.at_but(from_s, &self.held));
         let last_world = last.as_ref().map(|last| last.space.world.clone());
-        let from = came_from.as_ref().or(last_world.as_ref());
+        let from = count_motion_from.as_ref().or(last_world.as_ref());
         let goal = self.goal(&world, &self.held, from);
         let moved = from.map_or(Vec::new(), |from| self.moved(from, &world));
         let order = self.order(FrameReport { frame, time_s, moved, ..FrameReport::default() });
@@ -219,8 +219,8 @@ impl Session {
     /// [`FrameReport::moved`] and [`FrameReport::dynamic_links`] count from there. Nothing else
     /// depends on it.
     #[doc(hidden)]
-    pub fn came_from(&mut self, time_s: Option<f64>) {
-        self.came_from = time_s;
+    pub fn count_motion_from(&mut self, time_s: Option<f64>) {
+        self.count_motion_from = time_s;
     }
 
     /// Solves the world as the commands so far have made it; the first time that is a cold build.

@@ -1,10 +1,10 @@
 //! What a solve has left to do, batch by batch: which receivers to gather, and the ways to them.
 
+use super::dirty_path::{Batch, DirtyPath, clear_bit, set_bit};
 use super::field::Linear;
 use super::links::Links;
 use super::settle::Settled;
 use super::surfaces::{Surfaces, for_each_below};
-use super::way::{Batch, Way, clear_bit, set_bit};
 
 /// Which receivers to gather anew to begin with.
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ pub(super) struct Work {
     pub(super) all: bool,
     /// Elements that the last sweep changed by more than the limit, and by how much.
     pub(super) changed: Vec<(u32, f32)>,
-    pub(super) way: Way,
+    pub(super) path: DirtyPath,
     pub(super) scratch: Scratch,
 }
 
@@ -73,7 +73,7 @@ impl Work {
             marks,
             all: false,
             changed: Vec::new(),
-            way: Way::new(surfaces.len()),
+            path: DirtyPath::new(surfaces.len()),
             scratch: Scratch::default(),
         };
         match dirty {

@@ -9,8 +9,9 @@ use super::clip::keep_in_front;
 use super::contact::{in_plane, lies_in, overlap_m2};
 use super::exchange::{Meeting, meeting};
 use super::kernel::Simd;
-use super::lookout::{Between, Clipping, Looker, Lookout, PlacedSolid, is_hidden};
+use super::prepared_view::{Between, Clipping, PlacedSolid, PreparedView, is_hidden};
 use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
+use super::side::Side;
 use glam::{DVec2, DVec3};
 
 /// Nodes of the forest's fixed part that may stand between the two ends of a pair: clusters and
@@ -613,10 +614,15 @@ pub fn clipping<'a>(simd: Simd, shaft: &Shaft<'a>, blockers: &[PatchId]) -> Clip
 
 /// One end of a pair made ready to look at the other past blockers; in the frame of the body that both
 /// ride on, if they do.
-pub fn lookout(simd: Simd, shaft: &Shaft<'_>, blockers: &[PatchId], looker: Looker) -> Lookout {
+pub fn prepare_view(
+    simd: Simd,
+    shaft: &Shaft<'_>,
+    blockers: &[PatchId],
+    observer: Side,
+) -> PreparedView {
     let (a, b) = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
-    let (looker, other) = if looker == Looker::B { (b, a) } else { (a, b) };
-    Lookout::new(simd, looker, other, &shaft.between(blockers))
+    let (observer, other) = if observer == Side::B { (b, a) } else { (a, b) };
+    PreparedView::new(simd, observer, other, &shaft.between(blockers))
 }
 
 /// Visibility of a punctual light (the second end of the shaft) from an element; `segments` come
@@ -763,7 +769,7 @@ mod tests {
     /// Floor and ceiling, both double-sided if wanted, and what `fill` adds: V of their inner sides.
     fn floor_to_ceiling(double_sided: bool, fill: impl Fn(&mut SceneBuilder)) -> f64 {
         let mut b = SceneBuilder::new("floor and ceiling");
-        let node = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+        let node = b.node("scratch", None, DVec3::ZERO, DQuat::IDENTITY);
         let grey = match double_sided {
             true => b.double_sided_material("grey", [0.5; 3], [0.0; 3]),
             false => b.material("grey", [0.5; 3], [0.0; 3]),

@@ -61,12 +61,12 @@ impl<'a> Between<'a> {
     /// outside, and faces that it is wholly behind hide nothing that others do not. `without` the faces of some solids.
     fn facing<'b>(
         &'b self,
-        looker: &'b WorldElement,
+        observer: &'b WorldElement,
         slack: f64,
         without: &'b [u32],
     ) -> impl Iterator<Item = &'b [DVec3]> + 'b {
         let span = move |(corners, (normal, _)): (&[DVec3], &(DVec3, Option<u32>))| {
-            looker.span(&Plane::through(corners[0], *normal))
+            observer.span(&Plane::through(corners[0], *normal))
         };
         let all = || self.iter().zip(&self.faces);
         let is_outside = move |solid: u32| {
@@ -91,20 +91,20 @@ impl<'a> Between<'a> {
     /// other's frame.
     fn seen(
         &self,
-        looker: &WorldElement,
+        observer: &WorldElement,
         other: &WorldElement,
         frame: &TargetFrame,
         slack: f64,
     ) -> Occluders {
-        let from = frame.place(looker.centre);
+        let from = frame.place(observer.centre);
         let raised = |p: &Plane| Plane { normal: p.normal, offset: p.offset + slack };
-        let planes = [raised(&looker.plane), raised(&other.plane)];
+        let planes = [raised(&observer.plane), raised(&other.plane)];
         let mut out = Occluders::default();
         let mut whole = Vec::new();
         // The near plane in the frame.
-        let up = frame.direction(looker.plane.normal);
+        let up = frame.direction(observer.plane.normal);
         let is_low = |c: DVec3| up.dot(c - from) <= slack;
-        let corners = looker.corners.map(|c| frame.place(c));
+        let corners = observer.corners.map(|c| frame.place(c));
         for PlacedSolid { number, solid, pose } in &self.solids {
             // What reaches behind the other's plane hides less than its silhouette.
             if solid.corners.iter().all(|&c| other.plane.distance(pose.point(c)) >= -slack) {
@@ -116,7 +116,7 @@ impl<'a> Between<'a> {
             }
         }
         let (mut part, mut rest) = (Vec::new(), Vec::new());
-        for corners in self.facing(looker, slack, &whole) {
+        for corners in self.facing(observer, slack, &whole) {
             part.clear();
             part.extend_from_slice(corners);
             for plane in &planes {
@@ -131,17 +131,8 @@ impl<'a> Between<'a> {
     }
 }
 
-/// The end of a pair that the other is looked at from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Looker {
-    /// The first.
-    A,
-    /// The second.
-    B,
-}
-
 /// One end of a pair made ready to look at the other.
-pub struct Lookout {
+pub struct PreparedView {
     simd: Simd,
     frame: TargetFrame,
     /// The other's plane.
@@ -151,45 +142,46 @@ pub struct Lookout {
     between: Occluders,
     /// The looker's, in the frame.
     normal: DVec3,
-    room: Room,
+    scratch: Scratch,
 }
 
 /// What looking fills and empties: made once a thread, since most lookouts look only a few times.
 #[derive(Default)]
-struct Room {
+struct Scratch {
     cutter: Cutter,
-    looks: Looks,
+    views: PointViews,
 }
 
 thread_local! {
-    static ROOM: Cell<Room> = Cell::default();
+    static SCRATCH: Cell<Scratch> = Cell::default();
 }
 
-impl Drop for Lookout {
+impl Drop for PreparedView {
     fn drop(&mut self) {
-        ROOM.set(std::mem::take(&mut self.room));
+        SCRATCH.set(std::mem::take(&mut self.scratch));
     }
 }
 
-impl Lookout {
+impl PreparedView {
     pub(super) fn new(
         simd: Simd,
-        looker: &WorldElement,
+        observer: &WorldElement,
         other: &WorldElement,
         between: &Between<'_>,
-    ) -> Lookout {
-        let slack = looker.rounding_m + other.rounding_m;
+    ) -> PreparedView {
+        let slack = observer.rounding_m + other.rounding_m;
         let frame = TargetFrame::of(other);
-        let facing = ConvexPolygon::new(&other.corners[..other.len]).clipped(&looker.plane, slack);
-        let room = ROOM.take();
-        Lookout {
+        let facing =
+            ConvexPolygon::new(&other.corners[..other.len]).clipped(&observer.plane, slack);
+        let scratch = SCRATCH.take();
+        PreparedView {
             simd,
             other: other.plane,
             target: frame.flat(facing.corners()),
-            between: between.seen(looker, other, &frame, slack),
-            normal: frame.direction(looker.plane.normal),
+            between: between.seen(observer, other, &frame, slack),
+            normal: frame.direction(observer.plane.normal),
             frame,
-            room: Room { looks: Looks { moments: None, ..room.looks }, ..room },
+            scratch: Scratch { views: PointViews { moments: None, ..scratch.views }, ..scratch },
         }
     }
 
@@ -204,17 +196,18 @@ impl Lookout {
     /// Visibility of the other from the middle of each of some parts of the looker, in [0, 1]; 0 where a
     /// middle does not face the other.
     pub fn from_middles<'a>(&mut self, parts: impl Iterator<Item = &'a WorldElement>) -> Vec<f64> {
-        self.room.looks.start();
+        self.scratch.views.start();
         parts.for_each(|part| self.look_from(part, part.point(0.5, 0.5)));
-        self.room.looks.evaluate(self.simd, self.normal);
+        self.scratch.views.evaluate(self.simd, self.normal);
         let share = |&(all, clear): &(f64, f64)| if all > 0.0 { clear / all } else { 0.0 };
-        self.room.looks.points.iter().map(|point| share(point).clamp(0.0, 1.0)).collect()
+        self.scratch.views.points.iter().map(|point| share(point).clamp(0.0, 1.0)).collect()
     }
 
     /// Whether the other end, in parts of each of which one occluder hides all, is hidden from all of the looker, its
     /// rim aside.
-    fn is_hidden(&mut self, looker: &WorldElement) -> bool {
-        let corners = ConvexPolygon::new(&looker.corners[..looker.len]).clipped(&self.other, 0.0);
+    fn is_hidden(&mut self, observer: &WorldElement) -> bool {
+        let corners =
+            ConvexPolygon::new(&observer.corners[..observer.len]).clipped(&self.other, 0.0);
         let corners = corners.corners();
         if corners.len() < 3 || self.target.len() < 3 {
             return false;
@@ -222,31 +215,31 @@ impl Lookout {
         let middle = corners.iter().sum::<DVec3>() / corners.len() as f64;
         let drawn_in = |&c: &DVec3| self.frame.place(c.lerp(middle, DRAWN_IN));
         let points: Vec<DVec3> = corners.iter().map(drawn_in).collect();
-        self.room.cutter.hides_from_all(&points, &self.target, &self.between, HALVINGS)
+        self.scratch.cutter.hides_from_all(&points, &self.target, &self.between, HALVINGS)
     }
 
     fn look(&mut self, part: &WorldElement, cells: u32) -> &Sums {
-        self.room.looks.start();
+        self.scratch.views.start();
         let at = |k: u32| (f64::from(k / 2) + G[k as usize & 1]) / f64::from(cells);
         for k in 0..4 * cells * cells {
             self.look_from(part, part.point(at(k % (2 * cells)), at(k / (2 * cells))));
         }
-        self.room.looks.evaluate(self.simd, self.normal);
-        &self.room.looks.sums
+        self.scratch.views.evaluate(self.simd, self.normal);
+        &self.scratch.views.sums
     }
 
     fn look_from(&mut self, part: &WorldElement, point: DVec3) {
         if self.other.distance(point) > 0.0 && self.target.len() >= 3 {
             let from = self.frame.place(point);
-            self.room.cutter.cut(from, &self.target, &self.between);
+            self.scratch.cutter.cut(from, &self.target, &self.between);
             let at =
-                if self.room.looks.moments.is_some() { part.offset(point) } else { DVec2::ZERO };
-            self.room.looks.push(from, at, &self.target, &self.room.cutter);
+                if self.scratch.views.moments.is_some() { part.offset(point) } else { DVec2::ZERO };
+            self.scratch.views.push(from, at, &self.target, &self.scratch.cutter);
         } else {
-            self.room.looks.push_nothing();
+            self.scratch.views.push_nothing();
         }
-        if self.room.looks.edges.len() >= EDGES_AT_ONCE {
-            self.room.looks.evaluate(self.simd, self.normal);
+        if self.scratch.views.edges.len() >= EDGES_AT_ONCE {
+            self.scratch.views.evaluate(self.simd, self.normal);
         }
     }
 }
@@ -254,10 +247,10 @@ impl Lookout {
 /// A pair that is partly hidden, made ready to be clipped as seen from one of its ends: the smaller, unless
 /// what blocks is very near it or more of the other is in front.
 pub struct Clipping<'a> {
-    looker: &'a WorldElement,
+    observer: &'a WorldElement,
     other: &'a WorldElement,
     a_looks: bool,
-    lookout: Lookout,
+    prepare_view: PreparedView,
 }
 
 impl<'a> Clipping<'a> {
@@ -268,20 +261,20 @@ impl<'a> Clipping<'a> {
         between: &Between<'_>,
     ) -> Clipping<'a> {
         let a_looks = looks_best(a, b, between);
-        let (looker, other) = if a_looks { (a, b) } else { (b, a) };
-        let mut lookout = Lookout::new(simd, looker, other, between);
-        lookout.room.looks.moments = Some(lookout.normal);
-        Clipping { looker, other, a_looks, lookout }
+        let (observer, other) = if a_looks { (a, b) } else { (b, a) };
+        let mut prepare_view = PreparedView::new(simd, observer, other, between);
+        prepare_view.scratch.views.moments = Some(prepare_view.normal);
+        Clipping { observer, other, a_looks, prepare_view }
     }
 
     /// Visibility, exact from 2 x 2 Gauss points in each of `cells` x `cells` parts of the looker. Each point
     /// counts as a segment.
     pub fn visibility(&mut self, cells: u32) -> Visibility {
-        let Clipping { looker, other, a_looks, ref mut lookout } = *self;
-        let sums = lookout.look(looker, cells);
+        let Clipping { observer, other, a_looks, ref mut prepare_view } = *self;
+        let sums = prepare_view.look(observer, cells);
         let value = sums.visibility();
         let over_looker =
-            gradient(looker, sums.at_looker, sums.at_looker_clear, sums.all, sums.clear);
+            gradient(observer, sums.at_looker, sums.at_looker_clear, sums.all, sums.clear);
         let over_other = gradient(other, sums.at_other, sums.at_other_clear, sums.all, sums.clear);
         let (of_looker, of_other) = sums.spreads(value);
         let (gradient_a, gradient_b) =
@@ -300,7 +293,7 @@ impl<'a> Clipping<'a> {
 
     /// Whether no point sees more of the other end than slivers that rounding leaves between shadows.
     fn sees_next_to_nothing(&self) -> bool {
-        self.lookout.room.looks.points.iter().all(|&(all, clear)| clear <= SLIVER * all)
+        self.prepare_view.scratch.views.points.iter().all(|&(all, clear)| clear <= SLIVER * all)
     }
 
     /// Visibility from four points, and how far it may be off: about its root mean square.
@@ -318,11 +311,11 @@ impl<'a> Clipping<'a> {
         let mut is_hidden = None;
         while cells < CELLS_MAX && self.sees_next_to_nothing() {
             // A sliver of each in front of the other: V is not nothing because no point lies in it.
-            let is_behind = self.lookout.room.looks.points.iter().all(|p| p.0 <= 0.0);
+            let is_behind = self.prepare_view.scratch.views.points.iter().all(|p| p.0 <= 0.0);
             let overlooked = OVERLOOKED / f64::from(cells * cells);
             if !is_behind
                 && (overlooked <= error_max
-                    || *is_hidden.get_or_insert_with(|| self.lookout.is_hidden(self.looker)))
+                    || *is_hidden.get_or_insert_with(|| self.prepare_view.is_hidden(self.observer)))
             {
                 break;
             }
@@ -331,7 +324,7 @@ impl<'a> Clipping<'a> {
             v = Visibility { segments: v.segments + again.segments, ..again };
         }
         let spread = if self.a_looks { v.spread_a } else { v.spread_b };
-        let points = &self.lookout.room.looks.points;
+        let points = &self.prepare_view.scratch.views.points;
         let sees_nothing = |&(_, clear): &(f64, f64)| clear <= 0.0;
         let sees_all = |&(all, clear): &(f64, f64)| clear > 0.0 && clear >= all * (1.0 - NOTHING);
         let doubt = if points.iter().all(sees_nothing) || points.iter().all(sees_all) {
@@ -422,7 +415,7 @@ pub struct FactorPast {
 }
 
 /// What a single point sees of a convex polygon past convex occluders.
-struct PointLook {
+struct PointView {
     frame: TargetFrame,
     /// The point, and the polygon, in it.
     from: DVec3,
@@ -430,12 +423,12 @@ struct PointLook {
     cutter: Cutter,
 }
 
-impl PointLook {
+impl PointView {
     fn new<'a>(
         point: DVec3,
         target: &[DVec3],
         occluders: impl Iterator<Item = &'a [DVec3]>,
-    ) -> PointLook {
+    ) -> PointView {
         let frame = TargetFrame::of_polygon(target);
         let from = frame.place(point);
         let mut between = Occluders::default();
@@ -446,7 +439,7 @@ impl PointLook {
         let mut cutter = Cutter::default();
         let flat = frame.flat(target);
         cutter.cut(from, &flat, &between);
-        PointLook { frame, from, flat, cutter }
+        PointView { frame, from, flat, cutter }
     }
 }
 
@@ -459,7 +452,7 @@ pub fn form_factor_past<'a>(
     target: &[DVec3],
     occluders: impl Iterator<Item = &'a [DVec3]>,
 ) -> FactorPast {
-    let PointLook { frame, from, flat, cutter } = PointLook::new(point, target, occluders);
+    let PointView { frame, from, flat, cutter } = PointView::new(point, target, occluders);
     let normal = frame.direction(normal);
     let mut solid = Vec::new();
     let (mut factor, mut moment) = (0.0, DVec2::ZERO);
@@ -486,7 +479,7 @@ pub(super) fn is_hidden<'a>(
     target: &[DVec3],
     occluders: impl Iterator<Item = &'a [DVec3]>,
 ) -> bool {
-    let PointLook { flat, cutter, .. } = PointLook::new(point, target, occluders);
+    let PointView { flat, cutter, .. } = PointView::new(point, target, occluders);
     let left: f64 = cutter.left.iter().map(twice_area).sum();
     let dark: f64 = cutter.dark.iter().map(twice_area).sum();
     left - dark <= HIDDEN * twice_area(&flat)
@@ -540,7 +533,7 @@ impl TargetFrame {
 
 /// What points of the looker see, with form factors evaluated many edges at a time.
 #[derive(Default)]
-struct Looks {
+struct PointViews {
     sums: Sums,
     /// Form factors from each point, of the target and of what is clear of it.
     points: Vec<(f64, f64)>,
@@ -571,7 +564,7 @@ enum What {
     Dark,
 }
 
-impl Looks {
+impl PointViews {
     fn start(&mut self) {
         self.sums = Sums::default();
         self.points.clear();

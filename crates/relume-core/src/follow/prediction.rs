@@ -1,7 +1,7 @@
 //! What a strategy predicts with.
 
-use crate::event::{Foresight, KnownMotion, Lookahead, Ticks};
 use crate::pair::PairTree;
+use crate::predict::{KnownMotion, Lookahead, MotionBounds, Ticks};
 use crate::solver::Stop;
 
 use super::update::Update;
@@ -12,15 +12,19 @@ const SUDDEN: f64 = 1.25;
 
 /// When to stop a solve over extrapolated links: given up where it gets brighter than it did without them, or than
 /// the scene can be. Mean radiosities, W/m2.
-pub(super) fn while_extrapolated(residual: f64, sound_mean_w_m2: f64, most_mean_w_m2: f64) -> Stop {
-    let mean_w_m2 = (SUDDEN * sound_mean_w_m2).min(ROUNDING * most_mean_w_m2);
+pub(super) fn while_extrapolated(
+    residual: f64,
+    last_exact_mean_w_m2: f64,
+    mean_radiosity_bound_w_m2: f64,
+) -> Stop {
+    let mean_w_m2 = (SUDDEN * last_exact_mean_w_m2).min(ROUNDING * mean_radiosity_bound_w_m2);
     Stop::Bounded { residual, mean_w_m2 }
 }
 
 /// What the mean radiosity of a solution cannot reach, from what all that is emitted can make of it, W/m2.
-pub(super) fn most_mean(most_mean_w_m2: f64) -> f64 {
+pub(super) fn mean_radiosity_limit(mean_radiosity_bound_w_m2: f64) -> f64 {
     // A scene that is dark at all times has nothing to be measured against.
-    if most_mean_w_m2 > 0.0 { BEYOND * most_mean_w_m2 } else { f64::INFINITY }
+    if mean_radiosity_bound_w_m2 > 0.0 { BEYOND * mean_radiosity_bound_w_m2 } else { f64::INFINITY }
 }
 
 /// How many times as bright as it can be a solution gets before it is given up.
@@ -40,9 +44,9 @@ pub(crate) struct Void {
 
 /// What a strategy predicts with; nothing for those that do not.
 #[derive(Default)]
-pub(crate) struct Ahead {
+pub(crate) struct Prediction {
     /// Of certificates.
-    pub(crate) foresight: Option<Foresight>,
+    pub(crate) motion_bounds: Option<MotionBounds>,
     /// Of extrapolation.
     pub(crate) lookahead: Option<Lookahead>,
 }
@@ -59,18 +63,18 @@ pub(crate) struct Clocked<'a> {
     pub(crate) to_s: f64,
 }
 
-impl Ahead {
+impl Prediction {
     /// From the second of two times on; what no longer holds is taken back.
     pub(crate) fn new(
         update: Update,
         scene: &impl KnownMotion,
         clocked: Clocked<'_>,
         no_longer: Void,
-    ) -> Ahead {
+    ) -> Prediction {
         let Clocked { ticks, tree, from_s, to_s } = clocked;
-        let mut ahead = Ahead::default();
+        let mut prediction = Prediction::default();
         if matches!(update, Update::Scratch | Update::Reinspect) {
-            return ahead;
+            return prediction;
         }
         let void = ticks.go(from_s, to_s) || no_longer.promise;
         if void || no_longer.rounding {
@@ -82,11 +86,13 @@ impl Ahead {
         match update {
             Update::Extrapolate { frames, error } if ticks.runs() => {
                 let frame_s = ticks.length_s();
-                ahead.lookahead = Some(Lookahead { now_s: to_s, frame_s, frames, error });
+                prediction.lookahead = Some(Lookahead { now_s: to_s, frame_s, frames, error });
             }
-            Update::Certificate => ahead.foresight = Some(Foresight::new(scene, ticks, to_s)),
+            Update::Certificate => {
+                prediction.motion_bounds = Some(MotionBounds::new(scene, ticks, to_s))
+            }
             _ => {}
         }
-        ahead
+        prediction
     }
 }

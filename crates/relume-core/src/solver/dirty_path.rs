@@ -33,7 +33,7 @@ pub(super) fn bit(bits: &[u64], id: u32) -> bool {
 }
 
 /// The ways from facets to the elements that a batch concerns.
-pub(super) struct Way {
+pub(super) struct DirtyPath {
     /// Elements on a way.
     pub(super) on: Vec<u64>,
     /// Ends of the ways.
@@ -46,10 +46,10 @@ pub(super) struct Way {
 /// In place of a number of news: everything below may differ.
 const ALL: u32 = u32::MAX;
 
-impl Way {
-    pub(super) fn new(len: usize) -> Way {
+impl DirtyPath {
+    pub(super) fn new(len: usize) -> DirtyPath {
         let bits = || vec![0; len / 64 + 1];
-        Way { on: bits(), ends: bits(), numbers: vec![0; len], news: Vec::new() }
+        DirtyPath { on: bits(), ends: bits(), numbers: vec![0; len], news: Vec::new() }
     }
 
     /// Whether anything changed at an element itself, and by how much what it gathered did, if that is all.
@@ -58,7 +58,7 @@ impl Way {
         bit(&self.ends, id).then(|| (number() != ALL).then(|| &self.news[number() as usize]))
     }
 
-    pub(super) fn mark(&mut self, surfaces: &impl Surfaces, batch: &mut Batch) -> &Way {
+    pub(super) fn mark(&mut self, surfaces: &impl Surfaces, batch: &mut Batch) -> &DirtyPath {
         self.news = std::mem::take(&mut batch.news);
         let receivers = batch.receivers.iter().copied().zip(0..);
         let parents = batch.parents.iter().map(|&id| (id, ALL));

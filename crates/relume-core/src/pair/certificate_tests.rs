@@ -1,8 +1,8 @@
 //! What can be said of a pair until coming ticks, whatever space it is in.
 
 use crate::element::ElementId;
-use crate::event::{Foresight, Tick};
 use crate::geometry::Aabb;
+use crate::predict::{MotionBounds, Tick};
 use crate::scene::Drift;
 
 /// What was found of a pair.
@@ -18,9 +18,9 @@ pub enum Finding {
 }
 
 /// What can be said of pairs of a space until each of the coming ticks.
-pub(crate) trait Outlook {
+pub(crate) trait CertificateTests {
     /// How far bodies can get until then.
-    fn ahead(&self) -> &Foresight;
+    fn motion_bounds(&self) -> &MotionBounds;
     /// Whether two ends rest against each other up to a horizon.
     fn rest(&self, horizon: usize, a: ElementId, b: ElementId) -> bool;
     /// Whether a body that moves against the ends, which rest against each other, may enter their shaft.
@@ -37,8 +37,8 @@ pub(crate) trait Outlook {
             Finding::Clear => self.stays_clear(h, a, b),
             Finding::Culled => self.rest(h, a, b) || self.stays_away(h, a, b),
         };
-        let last = self.ahead().horizons().take_while(stands).last();
-        last.map_or(0, |h| self.ahead().until(h))
+        let last = self.motion_bounds().horizons().take_while(stands).last();
+        last.map_or(0, |h| self.motion_bounds().until(h))
     }
 }
 

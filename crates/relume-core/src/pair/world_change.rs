@@ -20,23 +20,28 @@ enum Motion {
 ///
 /// Only the two instants count, not what lies between them: the state of a pair is a function of
 /// one of them.
-pub struct Since<'a> {
+pub struct WorldChange<'a> {
     old: &'a WorldView,
     motion: Vec<Motion>,
     movers: Vec<BodyId>,
     /// How the brightness of coarse elements changed, by number.
-    dimmed: Vec<Option<Shift>>,
+    shifts: Vec<Option<Shift>>,
     /// How punctual lights changed theirs.
     lights: Vec<Option<Shift>>,
     /// Kept nodes above the coarse level with such an element below.
-    dimmed_below: Vec<bool>,
+    brightness_changed_below: Vec<bool>,
     /// Whether margins count from the first instant.
     knows_margins: bool,
 }
 
-impl<'a> Since<'a> {
+impl<'a> WorldChange<'a> {
     /// What moved between two instants. Cost: proportional to the forest's fixed part.
-    pub fn new(scene: &Scene, forest: &Forest, old: &'a WorldView, new: &WorldView) -> Since<'a> {
+    pub fn new(
+        scene: &Scene,
+        forest: &Forest,
+        old: &'a WorldView,
+        new: &WorldView,
+    ) -> WorldChange<'a> {
         let bodies = (0..scene.bodies.len() as u32).map(BodyId);
         let moved = |body: &BodyId| {
             let k = body.0 as usize;
@@ -73,59 +78,59 @@ impl<'a> Since<'a> {
                 motion[id as usize] = if any { Motion::Some } else { Motion::Still };
             }
         }
-        Since {
+        WorldChange {
             old,
             motion,
             movers,
-            dimmed: Vec::new(),
+            shifts: Vec::new(),
             lights: Vec::new(),
-            dimmed_below: Vec::new(),
+            brightness_changed_below: Vec::new(),
             knows_margins: true,
         }
     }
 
     /// The same where the last update was left half-way: some margins count from its beginning, others from its end.
-    pub fn after_a_stop(self) -> Since<'a> {
-        Since { knows_margins: false, ..self }
+    pub fn after_a_stop(self) -> WorldChange<'a> {
+        WorldChange { knows_margins: false, ..self }
     }
 
     /// Adds how coarse elements (by number) changed their brightness.
-    pub fn dim(
+    pub fn set_brightness_shifts(
         &mut self,
         forest: &Forest,
         coarse: &[u32],
-        (dimmed, lights): (Vec<Option<Shift>>, Vec<Option<Shift>>),
+        (shifts, lights): (Vec<Option<Shift>>, Vec<Option<Shift>>),
     ) {
-        self.dimmed_below = vec![false; forest.kept_len() as usize];
-        let elements = coarse.iter().zip(&dimmed).filter(|(_, shift)| shift.is_some());
-        let is_dimmed =
+        self.brightness_changed_below = vec![false; forest.kept_len() as usize];
+        let elements = coarse.iter().zip(&shifts).filter(|(_, shift)| shift.is_some());
+        let is_shifted =
             |id: &u32| forest.light(ElementId(*id)).is_some_and(|light| lights[light].is_some());
-        let below = elements.map(|(&id, _)| id).chain((0..forest.fixed_len()).filter(is_dimmed));
+        let below = elements.map(|(&id, _)| id).chain((0..forest.fixed_len()).filter(is_shifted));
         for id in below {
             let mut above = forest.parent(ElementId(id));
             while let Some(id) = above {
-                if std::mem::replace(&mut self.dimmed_below[id.0 as usize], true) {
+                if std::mem::replace(&mut self.brightness_changed_below[id.0 as usize], true) {
                     break;
                 }
                 above = forest.parent(id);
             }
         }
-        (self.dimmed, self.lights) = (dimmed, lights);
+        (self.shifts, self.lights) = (shifts, lights);
     }
 
     /// What the changes of brightness mean to a pair.
     pub(super) fn brightness(&self, forest: &Forest, a: ElementId, b: ElementId) -> Stale {
-        if self.dimmed.is_empty() {
+        if self.shifts.is_empty() {
             return Stale::Nothing;
         }
-        let dim = |id: ElementId| match (forest.coarse(id), forest.light(id)) {
-            (Some(number), _) => self.dimmed[number].is_some(),
+        let shifted = |id: ElementId| match (forest.coarse(id), forest.light(id)) {
+            (Some(number), _) => self.shifts[number].is_some(),
             (None, Some(light)) => self.lights[light].is_some(),
-            (None, None) => self.dimmed_below[id.0 as usize],
+            (None, None) => self.brightness_changed_below[id.0 as usize],
         };
         // Above the coarse level no verdict depends on brightness.
         let low = |id| forest.coarse(id).is_some() || forest.kind(id) == Kind::Light;
-        match dim(a) || dim(b) {
+        match shifted(a) || shifted(b) {
             false => Stale::Nothing,
             true if low(a) && low(b) => Stale::Brightness,
             true => Stale::Below,
@@ -139,7 +144,7 @@ impl<'a> Since<'a> {
             let of_light = || forest.light(id).and_then(|light| self.lights[light]);
             forest
                 .coarse(id)
-                .map_or_else(of_light, |number| self.dimmed[number])
+                .map_or_else(of_light, |number| self.shifts[number])
                 .unwrap_or_default()
         };
         self.knows_margins.then(|| Growth::of_pair(&shift(a), &shift(b)))

@@ -55,7 +55,7 @@ impl KnownMotion for Scene {
 /// How far the bodies of a scene can get until some coming ticks, the *horizons*, counted from the
 /// nearest. No body and no light appears or vanishes before any of them.
 #[derive(Clone, Debug, Default)]
-pub struct Foresight {
+pub struct MotionBounds {
     now: Tick,
     horizons: Vec<Horizon>,
     /// Row of each body; the rows are those of bodies that are animated at all.
@@ -72,13 +72,13 @@ struct Horizon {
     widest_distant: Aabb,
 }
 
-impl Foresight {
+impl MotionBounds {
     /// What the motion of `scene` holds from `time_s` on, the present of `ticks`. Cost:
     /// proportional to the bodies and their keys within the horizons.
-    pub fn new(scene: &impl KnownMotion, ticks: &Ticks, time_s: f64) -> Foresight {
+    pub fn new(scene: &impl KnownMotion, ticks: &Ticks, time_s: f64) -> MotionBounds {
         let all = (0..scene.body_count() as u32).map(BodyId);
         let bodies: Vec<BodyId> = all.clone().filter(|&b| scene.moves(b)).collect();
-        let mut out = Foresight { now: ticks.now(), bodies, ..Foresight::default() };
+        let mut out = MotionBounds { now: ticks.now(), bodies, ..MotionBounds::default() };
         out.rows = vec![None; scene.body_count()];
         for (row, body) in out.bodies.iter().enumerate() {
             out.rows[body.0 as usize] = Some(row as u32);
@@ -105,8 +105,8 @@ impl Foresight {
 
     /// Whether what holds until `due` holds now.
     #[inline]
-    pub fn holds(&self, due: Tick) -> bool {
-        due >= self.now
+    pub fn holds(&self, until: Tick) -> bool {
+        until >= self.now
     }
 
     /// The horizons, from the nearest.

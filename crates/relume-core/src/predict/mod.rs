@@ -3,10 +3,10 @@
 //! This room knows no pairs and no light. Whoever has something that only a motion can change asks
 //! how far bodies can get before a tick, and waits until then.
 
-mod foresight;
 mod history;
+mod motion_bounds;
 mod ticks;
 
-pub use foresight::{Foresight, KnownMotion};
 pub use history::{History, Lookahead, Sample};
+pub use motion_bounds::{KnownMotion, MotionBounds};
 pub use ticks::{Tick, Ticks};

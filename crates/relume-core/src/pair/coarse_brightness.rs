@@ -1,0 +1,87 @@
+//! The brightness bounds that the error oracle weighs links by.
+
+use crate::element::{ElementId, Forest};
+
+use super::brightness::Brightness;
+use super::margin::Shift;
+
+/// Canonical brightness: a pure function of the scene at one instant, never of the running
+/// solution, so that verdicts have no memory.
+#[derive(Clone, Debug, Default)]
+pub struct CoarseBrightness {
+    coarse: Vec<Brightness>,
+    lights: Vec<f64>,
+    reference_area_m2: f64,
+}
+
+impl CoarseBrightness {
+    /// From the light of each coarse element, the mean intensity of each punctual light, and the
+    /// area below which elements weigh less than others, m2. Values are rounded to half powers of
+    /// two, so that they seldom change.
+    pub fn new(
+        coarse: Vec<Brightness>,
+        lights: Vec<f64>,
+        reference_area_m2: f64,
+    ) -> CoarseBrightness {
+        let step = |l: Brightness| Brightness {
+            radiosity: coarsen(l.radiosity),
+            reflected: coarsen(l.reflected),
+            irradiance: coarsen(l.irradiance),
+        };
+        CoarseBrightness {
+            coarse: coarse.into_iter().map(step).collect(),
+            lights: lights.into_iter().map(coarsen).collect(),
+            reference_area_m2,
+        }
+    }
+
+    /// The light of an element or punctual light.
+    #[inline]
+    pub fn of(&self, forest: &Forest, id: ElementId) -> Brightness {
+        if let Some(light) = forest.light(id) {
+            let radiosity = self.lights[light];
+            return Brightness { radiosity, reflected: 0.0, irradiance: f64::INFINITY };
+        }
+        forest.coarse(id).map_or(Brightness::UNIFORM, |c| self.coarse[c])
+    }
+
+    /// How the light of each coarse element, by number, and each punctual light changed since `before`, if
+    /// it did.
+    pub fn shifts(&self, before: &CoarseBrightness) -> (Vec<Option<Shift>>, Vec<Option<Shift>>) {
+        let elements = before.coarse.iter().zip(&self.coarse);
+        let lights = before.lights.iter().zip(&self.lights);
+        (
+            elements.map(|(before, after)| Shift::between(before, after)).collect(),
+            lights.map(|(&before, &after)| Shift::of_light(before, after)).collect(),
+        )
+    }
+
+    /// Follows coarse elements to other numbers: for each the one that it had; what is new has any brightness.
+    pub fn renumber(&mut self, old_of: &[Option<usize>]) {
+        let of = |old: &Option<usize>| old.map_or(Brightness::UNIFORM, |old| self.coarse[old]);
+        self.coarse = old_of.iter().map(of).collect();
+    }
+
+    /// Area at which an element weighs 1 in the error norm, m2.
+    pub fn reference_area_m2(&self) -> f64 {
+        self.reference_area_m2
+    }
+}
+
+/// Rounds down to 1, 1.5, 2, 3, 4, 6, 8 ...: all but the first bit of the mantissa is dropped.
+fn coarsen(x: f64) -> f64 {
+    f64::from_bits(x.to_bits() & !((1 << 51) - 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_keeps_half_powers_of_two() {
+        for (x, y) in [(1.0, 1.0), (1.4, 1.0), (1.5, 1.5), (1.99, 1.5), (5.9, 4.0), (0.0, 0.0)] {
+            assert_eq!(coarsen(x), y);
+        }
+        assert!(coarsen(f64::INFINITY).is_infinite());
+    }
+}

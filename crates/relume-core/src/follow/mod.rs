@@ -1,7 +1,7 @@
-//! Following a space from one instant to another: the phases of a frame.
+//! The frame loop: a solved state ([`Follower`]) and the phases that bring it to another instant.
 //!
-//! A [`Follower`] is a solved state, and its methods are the phases that bring it to another instant; what they ask of where
-//! things are they ask of its `Space`. Must not know polygons, segments, scenes or files.
+//! `phases` has the order of a frame (`Follower::frame`). Everything about places, emission and reflection is asked of the
+//! follower's `Space`, which space and plane implement. Must not know polygons, segments, scenes or files.
 
 mod budget;
 mod clock;

@@ -1,6 +1,6 @@
-//! The phases of a frame, which bring a solved state to another instant.
+//! The phases of a frame: move, predict, coarse, fine, edit, solve, tally (`Follower::frame`).
 //!
-//! Without a state to start from, the same phases build it: a cold build is the update of nothing.
+//! A cold build runs the same phases without a state to start from.
 
 use crate::element::ElementId;
 use crate::pair::{
@@ -19,9 +19,9 @@ use super::space::{Balance, Level, Motion, Space};
 use super::update::Update;
 use super::watch::Watch;
 
-/// How a frame is made.
+/// Settings of one frame.
 pub(crate) struct Order<'a> {
-    /// The report to be: frame, time, and what moved.
+    /// Head of the report: frame, time, and names of moved bodies.
     pub(crate) label: FrameReport,
     /// How the pairs follow the motion.
     pub(crate) update: Update,
@@ -31,13 +31,13 @@ pub(crate) struct Order<'a> {
     pub(crate) balance: bool,
     /// Limit on memory, bytes.
     pub(crate) max_memory_bytes: Option<u64>,
-    /// What others see of the frame under way, and call it off by.
+    /// Progress of the frame for other threads, by which they may also cancel it.
     pub(crate) watch: Option<&'a Watch>,
 }
 
-/// A frame that came to nothing.
+/// A frame that failed.
 pub(crate) struct Failed<S> {
-    /// As it was left.
+    /// State at the failure.
     state: Follower<S>,
     is_cold: bool,
     pub(crate) why: Why,
@@ -49,17 +49,17 @@ struct Step<'f, 'g, S: Space> {
     order: &'f Order<'f>,
     was: &'f S::Was,
     prediction: Prediction,
-    /// Whether there was nothing to start from.
+    /// Whether this is a cold build.
     is_cold: bool,
 }
 
-/// Share of the pairs' room that may be vacant.
+/// The pair tree is compacted when more than one pair in this many is vacant.
 const VACANT_PAIRS: usize = 16;
 
 // Spaces are the engine's own: nobody else has one to follow.
 #[allow(private_bounds)]
 impl<S: Space> Follower<S> {
-    /// The state that a goal asks for, from the last one where there is one.
+    /// The state at a goal, from the last state where there is one.
     pub(crate) fn follow(
         last: Option<Self>,
         goal: &S::Goal<'_>,
@@ -82,7 +82,7 @@ impl<S: Space> Follower<S> {
         }
     }
 
-    /// One frame, phase by phase.
+    /// One frame, phase by phase: the place where it is decided what is evaluated again.
     fn frame(
         last: Option<Self>,
         goal: &S::Goal<'_>,
@@ -110,7 +110,7 @@ impl<S: Space> Follower<S> {
         report.seconds.evaluate = clock.lap();
 
         let edited = state.edit(&step, changes, &mut report);
-        report.seconds.judge = clock.lap();
+        report.seconds.edit = clock.lap();
 
         state.solve(&step, edited);
         report.seconds.solve = clock.lap();
@@ -125,7 +125,7 @@ impl<S: Space> Follower<S> {
         }
     }
 
-    /// Nothing but the elements to begin with and an unjudged root.
+    /// State without a solution: the initial elements and an unjudged root pair.
     fn unsolved(goal: &S::Goal<'_>, time_s: f64) -> Self {
         Follower {
             time_s,
@@ -143,22 +143,22 @@ impl<S: Space> Follower<S> {
         }
     }
 
-    /// Whether a frame may start from here: what was extrapolated cannot be taken along when time jumps or goes back, or a
-    /// hand takes hold.
+    /// Whether a frame may start from this state: extrapolated links cannot be kept when time jumps or goes back, or when a
+    /// command moves a body.
     fn leads_on(&self, goal: &S::Goal<'_>, order: &Order<'_>) -> bool {
         let goes_on = || self.ticks.goes_on(self.time_s, order.label.time_s);
         self.is_settled() || (!self.is_broken && goes_on() && self.space.goes_on(goal))
     }
 
-    /// Whether this is what a goal asks for.
+    /// Whether this state is that of a goal.
     fn is_at(&self, goal: &S::Goal<'_>) -> bool {
         self.is_settled() && !self.is_unsolved && self.space.is_at(goal)
     }
 
-    /// The same state as that of another frame, in which nothing differs.
+    /// This state as that of another frame in which nothing differs.
     fn stay(mut self, goal: &S::Goal<'_>, label: &FrameReport) -> Self {
         if !self.space.stay(goal) || label.time_s < self.time_s {
-            // What was foreseen from a later time says nothing of an earlier one.
+            // Certificates from a later time do not cover an earlier one.
             self.ticks = Ticks::default();
             self.tree.forget_certificates();
         }
@@ -166,7 +166,7 @@ impl<S: Space> Follower<S> {
         Follower { time_s: label.time_s, events: Vec::new(), report, ..self }
     }
 
-    /// What the strategy predicts with from here on.
+    /// Prediction of the strategy from this frame on.
     fn predict(
         &mut self,
         goal: &S::Goal<'_>,
@@ -184,7 +184,7 @@ impl<S: Space> Follower<S> {
         self.space.prediction(goal, was, order.update, Clocked { ticks, tree, from_s, to_s })
     }
 
-    /// Brings the pairs down to the coarse elements up to date, and the coarse solution that verdicts weigh by.
+    /// Updates the pairs down to the coarse elements, and the coarse solution that verdicts weigh by.
     fn coarse(
         &mut self,
         step: &Step<'_, '_, S>,
@@ -198,7 +198,7 @@ impl<S: Space> Follower<S> {
         Ok(changes)
     }
 
-    /// Brings all pairs up to date, until every one is a link or culled.
+    /// Updates all pairs, until every leaf of the tree is a link or culled.
     fn fine(
         &mut self,
         step: &Step<'_, '_, S>,
@@ -214,7 +214,7 @@ impl<S: Space> Follower<S> {
         Ok(all)
     }
 
-    /// Brings pairs up to date, down to a level.
+    /// Updates pairs down to a level.
     fn bring(
         &mut self,
         step: &Step<'_, '_, S>,
@@ -242,7 +242,7 @@ impl<S: Space> Follower<S> {
         update(Pairs { tree: &mut self.tree, hash: &mut self.hash }, &mut judge, &scope)
     }
 
-    /// Carries what changed of the pairs over to elements, links and groups.
+    /// Applies the changes of pairs to elements, links and groups.
     fn edit(
         &mut self,
         step: &Step<'_, '_, S>,
@@ -260,7 +260,7 @@ impl<S: Space> Follower<S> {
         Edited { dirty, sources_differ }
     }
 
-    /// Carries the changes of the pair tree over to links and elements; what is to be gathered anew.
+    /// Applies edits of the pair tree to links and elements; returns the receivers to be gathered.
     fn edit_links(
         &mut self,
         step: &Step<'_, '_, S>,
@@ -298,7 +298,7 @@ impl<S: Space> Follower<S> {
         }
     }
 
-    /// Gathers who may have changed until the residual is small.
+    /// Solves for radiosity: gathers receivers that may have changed until the residual is small.
     fn solve(&mut self, step: &Step<'_, '_, S>, edited: Edited) {
         let Edited { dirty, sources_differ } = edited;
         let goal = step.goal;
@@ -309,14 +309,14 @@ impl<S: Space> Follower<S> {
         let residual = S::residual(goal, self.is_unsolved);
         let bound_w_m2 = S::mean_radiosity_bound_w_m2(goal);
         if let Some(dark) = self.space.if_dark(goal, &surfaces) {
-            // What is left of earlier light would fade for ever.
+            // Light of earlier frames would decay without end.
             self.radiosity = dark;
         } else if self.is_settled() {
             let bound = (residual, mean_radiosity_limit(bound_w_m2));
             self.radiosity.solve_bounded(&surfaces, &self.links, dirty, bound);
         } else {
             let mean = self.last_exact_mean_w_m2 * self.space.brightened(goal);
-            // From nothing on, no growth is too much.
+            // If the last exact solution was black, there is no growth bound.
             let mean = if mean > 0.0 { mean } else { f64::INFINITY };
             let stop = while_extrapolated(residual, mean, bound_w_m2);
             self.radiosity.solve(&surfaces, &self.links, dirty, stop);
@@ -330,8 +330,8 @@ impl<S: Space> Follower<S> {
         self.space.finish(is_settled);
     }
 
-    /// Puts elements and pairs together where much room is vacant, and gives back what is left over: memory follows the
-    /// present state, not the largest one met. Ids change, and nothing else does.
+    /// Compacts elements and pairs where many are vacant, and frees spare memory: memory follows the present state, not the
+    /// largest one so far. Only ids change.
     pub(crate) fn compact(&mut self) {
         if let Some(to) = self.space.compact() {
             self.links.renumber(&to);
@@ -347,7 +347,7 @@ impl<S: Space> Follower<S> {
         self.radiosity.trim();
     }
 
-    /// Counts what there is.
+    /// Counts pairs, elements and memory; measures the balance on request.
     fn tally(&self, step: &Step<'_, '_, S>, report: &mut FrameReport) {
         self.count(report);
         if step.order.balance {
@@ -360,7 +360,7 @@ impl<S: Space> Follower<S> {
         }
     }
 
-    /// Fills in the numbers of pairs and elements, and what the solver did last.
+    /// Fills in the numbers of pairs and elements, and the work of the solver.
     pub(crate) fn count(&self, report: &mut FrameReport) {
         let counts = self.tree.counts();
         report.hash = self.hash.to_string();
@@ -373,7 +373,7 @@ impl<S: Space> Follower<S> {
         report.residual = self.radiosity.residual;
     }
 
-    /// A solution of before found again, whatever it takes; from a state that leads there, where there is one.
+    /// An earlier solution, computed again without limits; from a given state where there is one.
     pub(crate) fn found_again(
         from: Option<Self>,
         goal: &S::Goal<'_>,
@@ -403,10 +403,10 @@ impl<S: Space> Follower<S> {
     }
 }
 
-/// What is to be gathered anew.
+/// Result of the edit phase.
 struct Edited {
     dirty: Dirty,
-    /// Whether sources that are no surfaces send otherwise.
+    /// Whether punctual lights or distant elements changed.
     sources_differ: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What a strategy predicts with.
+//! Prediction of a frame: certificates or extrapolation, by strategy.
 
 use crate::pair::PairTree;
 use crate::predict::{KnownMotion, Lookahead, MotionBounds, Ticks};
@@ -6,48 +6,53 @@ use crate::solver::Stop;
 
 use super::update::Update;
 
-/// How many times as bright as when no link was extrapolated last a scene may get before its frame is built anew:
-/// links that are a little too large feed each other.
-const SUDDEN: f64 = 1.25;
+/// Mean radiosity over that of the last exact solution from which an extrapolated frame is rebuilt: extrapolated links that
+/// are a little too large amplify each other.
+const GROWTH_MAX: f64 = 1.25;
 
-/// When to stop a solve over extrapolated links: given up where it gets brighter than it did without them, or than
-/// the scene can be. Mean radiosities, W/m2.
+/// Stop criterion of a solve over extrapolated links: it is given up where the mean radiosity passes that of the last exact
+/// solution, or the bound of the scene, by a factor. Mean radiosities, W/m2.
 pub(super) fn while_extrapolated(
     residual: f64,
     last_exact_mean_w_m2: f64,
     mean_radiosity_bound_w_m2: f64,
 ) -> Stop {
-    let mean_w_m2 = (SUDDEN * last_exact_mean_w_m2).min(ROUNDING * mean_radiosity_bound_w_m2);
+    let mean_w_m2 =
+        (GROWTH_MAX * last_exact_mean_w_m2).min(LINK_ERROR_RATIO * mean_radiosity_bound_w_m2);
     Stop::Bounded { residual, mean_w_m2 }
 }
 
-/// What the mean radiosity of a solution cannot reach, from what all that is emitted can make of it, W/m2.
+/// Mean radiosity from which a solve is given up, W/m2, from the upper bound of the scene.
 pub(super) fn mean_radiosity_limit(mean_radiosity_bound_w_m2: f64) -> f64 {
     // A scene that is dark at all times has nothing to be measured against.
-    if mean_radiosity_bound_w_m2 > 0.0 { BEYOND * mean_radiosity_bound_w_m2 } else { f64::INFINITY }
+    if mean_radiosity_bound_w_m2 > 0.0 {
+        DIVERGENCE_RATIO * mean_radiosity_bound_w_m2
+    } else {
+        f64::INFINITY
+    }
 }
 
-/// How many times as bright as it can be a solution gets before it is given up.
-const BEYOND: f64 = 2.0;
+/// Mean radiosity over the upper bound of the scene from which a solve is given up as diverging.
+const DIVERGENCE_RATIO: f64 = 2.0;
 
-/// By how much the errors of links may make a scene brighter than it can be.
-const ROUNDING: f64 = 1.1;
+/// Mean radiosity over the upper bound of the scene that errors of links may explain.
+const LINK_ERROR_RATIO: f64 = 1.1;
 
-/// What does not hold any more that certificates rest on.
+/// Assumptions of certificates that no longer hold.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Void {
-    /// What counts as rounding changed.
+    /// The size of rounding errors changed.
     pub(crate) rounding: bool,
-    /// Bodies move otherwise than was foreseen.
+    /// Bodies move otherwise than predicted.
     pub(crate) promise: bool,
 }
 
-/// What a strategy predicts with; nothing for those that do not.
+/// Prediction of a strategy; both `None` for strategies without one.
 #[derive(Default)]
 pub(crate) struct Prediction {
-    /// Of certificates.
+    /// Bounds of motion, for certificates.
     pub(crate) motion_bounds: Option<MotionBounds>,
-    /// Of extrapolation.
+    /// Settings of extrapolation.
     pub(crate) lookahead: Option<Lookahead>,
 }
 
@@ -64,7 +69,7 @@ pub(crate) struct Clocked<'a> {
 }
 
 impl Prediction {
-    /// From the second of two times on; what no longer holds is taken back.
+    /// Prediction from the second of two times on; voided certificates and histories are removed from the tree.
     pub(crate) fn new(
         update: Update,
         scene: &impl KnownMotion,

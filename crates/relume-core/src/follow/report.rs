@@ -175,8 +175,9 @@ pub struct Seconds {
     pub predict: f64,
     /// Exchange areas and visibilities.
     pub evaluate: f64,
-    /// Verdicts and edits.
-    pub judge: f64,
+    /// Edits of the links, the elements and the groups.
+    #[serde(rename = "judge")]
+    pub edit: f64,
     /// Gather, push, pull.
     pub solve: f64,
     /// The whole step.

@@ -1,6 +1,6 @@
-//! The light of one end of a pair, as far as a verdict may know it.
+//! Brightness of one end of a pair, as verdicts know it.
 
-/// What the oracle may know about the light of one coarse element; W/m2, mean of the channels.
+/// Brightness of one coarse element as the oracle knows it; W/m2, mean of the channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Brightness {
     /// Radiosity, emitted and reflected (or intensity of a punctual light).
@@ -12,10 +12,10 @@ pub struct Brightness {
 }
 
 impl Brightness {
-    /// The light of a scene in which every surface weighs the same.
+    /// Brightness of every element of a scene in which all surfaces weigh the same.
     pub const UNIFORM: Brightness = Brightness { radiosity: 1.0, reflected: 1.0, irradiance: 1.0 };
 
-    /// The light of what is distant, but for what it emits: nothing arrives there, and no error.
+    /// Brightness of a distant element without its emission: nothing arrives there, and no error counts.
     pub const DISTANT: Brightness =
         Brightness { radiosity: 0.0, reflected: 0.0, irradiance: f64::INFINITY };
 }

@@ -1,4 +1,4 @@
-//! Certificates of pairs in space: until when the known motion cannot change what was found.
+//! Certificates of pairs in space: until which tick the known motion cannot change a finding.
 //!
 //! All tests are conservative twice over: what can get anywhere is bounded by boxes, and where the
 //! exact test of a pair allows some slack, these allow half of it, so that rounding does not matter.
@@ -17,7 +17,7 @@ use crate::scene::{BodyId, Drift, PatchId};
 use super::certificate_tests::{CertificateTests, Moves};
 use super::ends::{LightPlace, body_of};
 
-/// A scene in space at one instant, with what comes.
+/// Certificate tests in space: a scene at one instant with the bounds of its motion.
 pub(super) struct SpaceCertificateTests<'a> {
     pub(super) forest: &'a Forest,
     pub(super) view: &'a WorldView,

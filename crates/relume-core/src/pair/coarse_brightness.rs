@@ -5,8 +5,8 @@ use crate::element::{ElementId, Forest};
 use super::brightness::Brightness;
 use super::margin::Shift;
 
-/// Canonical brightness: a pure function of the scene at one instant, never of the running
-/// solution, so that verdicts have no memory.
+/// Canonical brightness of all coarse elements and punctual lights: a pure function of the scene at one instant, never of the
+/// running solution, so that verdicts do not depend on history.
 #[derive(Clone, Debug, Default)]
 pub struct CoarseBrightness {
     coarse: Vec<Brightness>,
@@ -15,9 +15,8 @@ pub struct CoarseBrightness {
 }
 
 impl CoarseBrightness {
-    /// From the light of each coarse element, the mean intensity of each punctual light, and the
-    /// area below which elements weigh less than others, m2. Values are rounded to half powers of
-    /// two, so that they seldom change.
+    /// From the brightness of each coarse element, the mean intensity of each punctual light, and the area below which
+    /// elements weigh less than others, m2. Values are rounded down to 1, 1.5, 2, 3, 4 ..., so that they seldom change.
     pub fn new(
         coarse: Vec<Brightness>,
         lights: Vec<f64>,
@@ -35,7 +34,7 @@ impl CoarseBrightness {
         }
     }
 
-    /// The light of an element or punctual light.
+    /// Brightness of an element or punctual light.
     #[inline]
     pub fn of(&self, forest: &Forest, id: ElementId) -> Brightness {
         if let Some(light) = forest.light(id) {
@@ -45,8 +44,7 @@ impl CoarseBrightness {
         forest.coarse(id).map_or(Brightness::UNIFORM, |c| self.coarse[c])
     }
 
-    /// How the light of each coarse element, by number, and each punctual light changed since `before`, if
-    /// it did.
+    /// Changes since `before` of each coarse element, by number, and of each punctual light; `None` where there is none.
     pub fn shifts(&self, before: &CoarseBrightness) -> (Vec<Option<Shift>>, Vec<Option<Shift>>) {
         let elements = before.coarse.iter().zip(&self.coarse);
         let lights = before.lights.iter().zip(&self.lights);
@@ -56,7 +54,7 @@ impl CoarseBrightness {
         )
     }
 
-    /// Follows coarse elements to other numbers: for each the one that it had; what is new has any brightness.
+    /// Renumbers coarse elements; `old_of` holds the old number of each. New elements get [`Brightness::UNIFORM`].
     pub fn renumber(&mut self, old_of: &[Option<usize>]) {
         let of = |old: &Option<usize>| old.map_or(Brightness::UNIFORM, |old| self.coarse[old]);
         self.coarse = old_of.iter().map(of).collect();

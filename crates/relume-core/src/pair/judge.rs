@@ -27,32 +27,32 @@ use super::update::{Hierarchy, Judge, Judgement, Stale, Verdict};
 use super::world_change::WorldChange;
 use crate::transport::Side;
 
-/// How far pairs are decided.
+/// Level down to which pairs are judged.
 #[derive(Clone, Copy, Debug)]
 pub enum Stage<'a> {
-    /// Down to pairs of coarse elements, which are held.
+    /// Down to pairs of coarse elements, which become coarse links.
     Coarse,
-    /// By the oracle, with the brightness it weighs by.
+    /// Down to links by the oracle, which weighs by this brightness.
     Fine(&'a CoarseBrightness),
 }
 
-/// The forest placed in space, with what decides.
+/// Judge of pairs in space: the forest at one instant, with the oracle.
 pub struct SpaceJudge<'a> {
     /// The elements.
     pub forest: &'a mut Forest,
     /// Where they are.
     pub view: &'a WorldView,
-    /// How far to go.
+    /// Level down to which pairs are judged.
     pub stage: Stage<'a>,
-    /// What decides in the end.
+    /// Oracle that decides on links.
     pub oracle: Oracle,
     /// Vector instructions.
     pub simd: Simd,
-    /// What happened since the last update; `None` where there was none.
+    /// Difference from the last update; `None` in a cold build.
     pub change: Option<&'a WorldChange<'a>>,
-    /// What the known motion allows next; `None` where certificates are not asked for.
+    /// Bounds of the known motion; `None` where certificates are not asked for.
     pub motion_bounds: Option<&'a MotionBounds>,
-    /// How far ahead pairs are extrapolated, if they are.
+    /// Settings of extrapolation; `None` where pairs are not extrapolated.
     pub lookahead: Option<Lookahead>,
 }
 
@@ -233,7 +233,7 @@ fn refined(
     Some(Judgement { margin, ..passing(Verdict::Refine(side), segments) })
 }
 
-/// A verdict to link or to hold, with what the link carries.
+/// A verdict to link, finely or coarsely, with the values of the link.
 fn carrying(
     verdict: Verdict,
     x: &Exchange,

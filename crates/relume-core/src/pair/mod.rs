@@ -1,7 +1,9 @@
 //! The pair tree: which elements exchange light with which, and at what level.
 //!
-//! A verdict is a pure function of the poses, the materials' brightness bounds and the tolerance:
-//! this room knows no history, and no radiosity beyond the [`CoarseBrightness`] it is handed.
+//! [`update`] walks the tree and has pairs judged ([`Judge`]): a verdict is a link, a refinement or a cull. A verdict is a
+//! pure function of the poses, the brightness of coarse elements ([`CoarseBrightness`]) and the tolerance. Which pairs are
+//! judged again after a motion follows from [`WorldChange`], the margins of verdicts ([`Margin`]) and certificates
+//! ([`Finding`]). Must not know radiosities beyond the [`CoarseBrightness`] it is handed.
 
 mod brightness;
 mod certificate;

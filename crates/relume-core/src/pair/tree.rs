@@ -26,7 +26,7 @@ pub enum CullReason {
     NoReceiver,
 }
 
-/// What a pair is at this instant.
+/// State of a pair at this instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
     /// Not judged yet.
@@ -130,14 +130,14 @@ static VALUES: [f32; 256] = {
     values
 };
 
-/// What a link carries.
+/// Values of a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Carried {
     /// Exchange area X without occlusion, m2.
     pub exchange_area_m2: f32,
     /// Visibility V in 65,535ths.
     pub visibility: u16,
-    /// How what arrives varies over the ends.
+    /// Relative gradients of the arriving light over both ends.
     pub gradients: Gradients,
 }
 
@@ -188,7 +188,7 @@ struct Node {
     payload: [u32; 3],
 }
 
-/// Room is given back beyond this share of what is needed.
+/// Spare capacity that vectors keep, as one part in this many of their length.
 const SLACK: usize = 32;
 
 /// Bits of an element's id.
@@ -253,15 +253,15 @@ pub struct PairTree {
     /// First ids of vacant groups of siblings, by their number.
     vacant: Vec<Vec<u32>>,
     counts: StateCounts,
-    /// Until when each pair's certificate stands.
+    /// Expiry of each pair's certificate.
     expiry: SideTable<Tick>,
-    /// What extrapolation knows of each pair.
+    /// Last evaluations of each extrapolated pair.
     history: SideTable<History>,
     /// Pairs that are extrapolated.
     live: usize,
 }
 
-/// Something beside the nodes, by their ids: nothing at all where it is the default of all of them.
+/// Values by pair beside the nodes; takes no memory while all values are the default.
 #[derive(Clone, Debug, Default)]
 struct SideTable<T> {
     values: Vec<T>,
@@ -509,7 +509,7 @@ impl PairTree {
         }
     }
 
-    /// Until when a pair's certificate stands; 0 without one.
+    /// Expiry of a pair's certificate; 0 without one.
     #[inline]
     pub(super) fn expiry(&self, id: PairId) -> Tick {
         self.expiry.get(id)
@@ -519,7 +519,7 @@ impl PairTree {
         self.expiry.set(id, expiry, self.nodes.len());
     }
 
-    /// What extrapolation knows of a pair; empty where it is not asked for.
+    /// Last evaluations of a pair; empty where extrapolation is not asked for.
     #[inline]
     pub(super) fn history(&self, id: PairId) -> History {
         self.history.get(id)

@@ -1,4 +1,4 @@
-//! What happened since the last update, and which pairs it may concern.
+//! Difference of two world states, and which pairs it may affect.
 
 use crate::element::{ElementId, Forest, Kind, WorldElement, WorldView};
 use crate::scene::{BodyId, LightKind, PatchId, Scene};
@@ -8,7 +8,7 @@ use super::ends::{BoxShaft, LightPlace, body_of};
 use super::margin::{Growth, Shift};
 use super::update::Stale;
 
-/// How much of a node of the forest's fixed part has moved, appeared or vanished.
+/// Motion of a node of the forest's fixed part: its bodies that moved, appeared or vanished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Motion {
     Still,
@@ -16,26 +16,25 @@ enum Motion {
     All,
 }
 
-/// The difference between two instants, as far as pairs may feel it.
+/// Difference of two world states: moved bodies and changed brightness.
 ///
-/// Only the two instants count, not what lies between them: the state of a pair is a function of
-/// one of them.
+/// Only the two states count, not the motion between them: the state of a pair is a function of one instant.
 pub struct WorldChange<'a> {
     old: &'a WorldView,
     motion: Vec<Motion>,
     movers: Vec<BodyId>,
-    /// How the brightness of coarse elements changed, by number.
+    /// Change of brightness of each coarse element, by number; `None` where it did not change.
     shifts: Vec<Option<Shift>>,
-    /// How punctual lights changed theirs.
+    /// Change of intensity of each punctual light.
     lights: Vec<Option<Shift>>,
-    /// Kept nodes above the coarse level with such an element below.
+    /// Nodes above the coarse level with a changed coarse element or light below.
     brightness_changed_below: Vec<bool>,
-    /// Whether margins count from the first instant.
+    /// Whether all margins count from the first instant.
     knows_margins: bool,
 }
 
 impl<'a> WorldChange<'a> {
-    /// What moved between two instants. Cost: proportional to the forest's fixed part.
+    /// Motion between two instants, without changes of brightness. Cost: proportional to the forest's fixed part.
     pub fn new(
         scene: &Scene,
         forest: &Forest,
@@ -89,12 +88,12 @@ impl<'a> WorldChange<'a> {
         }
     }
 
-    /// The same where the last update was left half-way: some margins count from its beginning, others from its end.
+    /// Difference after an update that was left half-way: some margins count from its beginning, others from its end.
     pub fn after_a_stop(self) -> WorldChange<'a> {
         WorldChange { knows_margins: false, ..self }
     }
 
-    /// Adds how coarse elements (by number) changed their brightness.
+    /// Adds the changes of brightness of coarse elements (by number) and of punctual lights.
     pub fn set_brightness_shifts(
         &mut self,
         forest: &Forest,
@@ -118,7 +117,7 @@ impl<'a> WorldChange<'a> {
         (self.shifts, self.lights) = (shifts, lights);
     }
 
-    /// What the changes of brightness mean to a pair.
+    /// Staleness of a pair by changes of brightness.
     pub(super) fn brightness(&self, forest: &Forest, a: ElementId, b: ElementId) -> Stale {
         if self.shifts.is_empty() {
             return Stale::Nothing;
@@ -137,8 +136,7 @@ impl<'a> WorldChange<'a> {
         }
     }
 
-    /// By how much the errors of a pair at or below the coarse level grew since its margin was counted; `None` if that is
-    /// not known.
+    /// Growth of the errors of a pair at or below the coarse level since its margin was counted; `None` if unknown.
     pub(super) fn growth(&self, forest: &Forest, a: ElementId, b: ElementId) -> Option<Growth> {
         let shift = |id| {
             let of_light = || forest.light(id).and_then(|light| self.lights[light]);
@@ -164,7 +162,7 @@ impl<'a> WorldChange<'a> {
         !one_body && (moved(a) || moved(b))
     }
 
-    /// What the motion means to a pair.
+    /// Staleness of a pair by motion.
     pub(super) fn geometry(
         &self,
         forest: &Forest,

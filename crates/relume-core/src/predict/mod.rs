@@ -1,7 +1,7 @@
 //! Prediction: what the known motion allows within the coming time, and until when.
 //!
-//! This room knows no pairs and no light. Whoever has something that only a motion can change asks
-//! how far bodies can get before a tick, and waits until then.
+//! [`MotionBounds`] say how far bodies can get until coming ticks ([`Ticks`]): certificates rest on them. [`History`] draws a
+//! line through the last evaluations of a pair: extrapolation rests on it. Must not know pairs or light.
 
 mod history;
 mod motion_bounds;

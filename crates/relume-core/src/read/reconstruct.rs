@@ -19,7 +19,7 @@ use super::pieces::Sharing;
 
 /// Links whose line is off by less than this share of the tolerance times the mean radiosity are
 /// left as they are.
-const DIM: f64 = 0.001;
+const NEGLIGIBLE_SHARE: f64 = 0.001;
 
 /// Links that one task looks at.
 const LINKS_AT_ONCE: usize = 512;
@@ -35,7 +35,7 @@ pub(super) fn solve(solved: &Solved) -> (Links, Radiosity) {
         solved,
         sharing: Sharing::new(solved),
         leaves: Leaves::of(forest),
-        dim_w_m2: DIM * solved.space.tuning.tolerance * mean_radiosity(solved),
+        negligible_w_m2: NEGLIGIBLE_SHARE * solved.space.tuning.tolerance * mean_radiosity(solved),
     };
     let links: Vec<pair::Link> = solved.tree.links().collect();
     let of_links = |links: &[pair::Link]| {
@@ -90,7 +90,7 @@ struct Reconstruction<'a> {
     solved: &'a Solved,
     sharing: Sharing<'a>,
     leaves: Leaves,
-    dim_w_m2: f64,
+    negligible_w_m2: f64,
 }
 
 impl Reconstruction<'_> {
@@ -119,7 +119,7 @@ impl Reconstruction<'_> {
         }
         let sends = self.solved.radiosity.radiosity(source.0);
         let brightest = f64::from(sends.iter().fold(0.0_f32, |m, b| m.max(*b)));
-        if brightest * self.line_error(link, receiver) <= self.dim_w_m2 {
+        if brightest * self.line_error(link, receiver) <= self.negligible_w_m2 {
             return false;
         }
         let (ids, shapes) = self.leaves.below(receiver);

@@ -1,6 +1,6 @@
-//! How much there is to solve, said beforehand.
+//! Estimate of pairs, memory and time of a frame before it is solved.
 //!
-//! What decides is how many pairs of patches face each other that are in no group: all of them are judged, whatever the
+//! The estimate follows from the number of pairs of patches face each other that are in no group: all of them are judged, whatever the
 //! tolerance, and most of them become links. What refinement adds is small for many patches, and large for few. Patches of groups
 //! cost a number of pairs each. The numbers were fitted to scenes measured (docs/performance.md). Nothing that is solved depends on an
 //! estimate.

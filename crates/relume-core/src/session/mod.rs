@@ -95,8 +95,8 @@ fn names(surfaces: &[String]) -> String {
 
 /// One scene being solved, frame by frame.
 pub struct Session {
-    /// The scene as commands have made it, and what builds start from: where bodies came or left since the last step, that
-    /// of the scene before.
+    /// The scene as commands have made it, and the initial forest of builds: where bodies came or left since the last step,
+    /// the forest of the scene before.
     bed: Bed,
     /// Whether they belong together.
     is_planted: bool,
@@ -108,11 +108,11 @@ pub struct Session {
     edited: Option<Edited>,
     /// Whether the next step may not start from the last solution.
     starts_anew: bool,
-    /// What others may see of a step under way.
+    /// Progress of a step for other threads.
     watch: Arc<Watch>,
     /// Time that `moved` compares with, where it is not that of the last step.
     count_motion_from: Option<f64>,
-    /// What is held by hand.
+    /// Values set by commands in place of the clip's.
     held: Held,
     /// Bodies that are not where the scene has them at rest, as the seed knows them.
     displaced: BTreeSet<BodyId>,
@@ -157,7 +157,7 @@ impl Session {
         &self.bed.scene
     }
 
-    /// What can be seen of a step while it is under way, from any thread.
+    /// Progress of the step under way, for any thread.
     pub fn watch(&self) -> Arc<Watch> {
         Arc::clone(&self.watch)
     }
@@ -264,7 +264,7 @@ impl Session {
         self.time_s
     }
 
-    /// What commands hold in place of what the clip says.
+    /// Values set by commands in place of the clip's.
     pub fn held(&self) -> &Held {
         &self.held
     }
@@ -289,7 +289,7 @@ impl Session {
         Order { label, update, events, balance, max_memory_bytes, watch: Some(&self.watch) }
     }
 
-    /// Why a step came to nothing.
+    /// The error of a step that failed.
     fn error_of(&self, failed: &Failed<SpaceState>, frame: u32) -> SessionError {
         match failed.why.clone() {
             Why::Cancelled => SessionError::Cancelled { frame },

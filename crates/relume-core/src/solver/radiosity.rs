@@ -93,17 +93,16 @@ impl OverGroups {
 pub struct Radiosity {
     /// With first moments ([`Place::first_moments`]).
     radiosity: Field,
-    /// What an element's own links bring, without those of its ancestors. Gradients are per metre.
+    /// Irradiance over an element's own links, without those of its ancestors. Gradients are per metre.
     gathered: Field,
-    /// What of that came over links of groups.
+    /// Part of `gathered` that came over links of groups.
     over_groups: OverGroups,
-    /// By how much the irradiance of an element may have changed since it was gathered, W/m2.
+    /// Bound of the change of an element's irradiance since it was gathered, W/m2.
     pending: Vec<f32>,
-    /// By how much the radiosities at and below an element may be off, at most, for what was not pushed down
-    /// to them, W/m2: what is owed to itself, and the most that is owed below any of its children. Not kept where
-    /// the next solve will begin with everything.
+    /// Deferred error: bound of the error of radiosities at and below an element by irradiance not pushed down yet, W/m2.
+    /// Empty where the next solve will gather everything.
     deferred: Vec<f32>,
-    /// Kept instead.
+    /// Last change of each mean radiosity; replaces `deferred` while the next solve will gather everything.
     trend: Trend,
     /// Elements are taken to be constant, as the solution would grow without end if lines were handed down.
     constant: bool,
@@ -114,14 +113,13 @@ pub struct Radiosity {
     pub sweeps: u32,
     /// Receivers gathered by the last solve, each time counted.
     pub gathers: u64,
-    /// By how much a radiosity may be off what its links and the other radiosities say, relative to the mean one: it
-    /// stays, something is owed to it, and what it gathers may have changed a little. An estimate: all three at once, but not at
-    /// every level.
+    /// Estimate of the largest residual of a radiosity, relative to the mean radiosity: skipped changes, deferred changes and
+    /// pending changes of its sources, added up, but not over all levels.
     pub residual: f64,
-    /// The same of the last sweep over everything alone, W/m2.
-    passed_over: f32,
-    /// Largest change that may have been left undone since, W/m2.
-    held: f32,
+    /// Largest change that the last sweep over all elements skipped, W/m2.
+    skipped_in_full_sweep: f32,
+    /// Largest change that may have been skipped since, W/m2.
+    skipped: f32,
 }
 
 /// Links of elements, and what comes to an element over groups, if there are any.
@@ -134,7 +132,7 @@ const SWEEPS_MAX: u32 = 2_000;
 const CHUNK: usize = 256;
 
 /// What may be left undone, relative to what may be left undone now.
-const HELD_MAX: f32 = 2.0;
+const SKIPPED_MAX: f32 = 2.0;
 
 impl Radiosity {
     /// A solution to begin with: the exitance of surfaces. Sources other than surfaces are given by
@@ -279,7 +277,7 @@ impl Radiosity {
         self.deferred.clear();
         self.deferred.resize(self.pending.len(), 0.0);
         self.trend = Trend::default();
-        (self.held, self.passed_over, self.sweeps) = (0.0, 0.0, 0);
+        (self.skipped, self.skipped_in_full_sweep, self.sweeps) = (0.0, 0.0, 0);
     }
 
     /// Gathers, pushes and pulls until the solution is settled, beginning with what is dirty.
@@ -303,7 +301,7 @@ impl Radiosity {
         let mut last_mean = self.mean_w_m2(surfaces);
         let mut limit = stop.limit_w_m2(last_mean);
         if self.trend.is_wide {
-            // Nothing is known of what is owed.
+            // Nothing is known of what is deferred.
             work.start_all(surfaces);
             grow(&mut self.deferred, self.pending.len());
         }
@@ -315,7 +313,7 @@ impl Radiosity {
             false => self.mark_over_groups(surfaces, &mut work, limit),
         };
         loop {
-            if self.held > HELD_MAX * limit && !work.all && stop.is_by_residual() {
+            if self.skipped > SKIPPED_MAX * limit && !work.all && stop.is_by_residual() {
                 // What was little beside a brighter scene is too much beside this one.
                 work.start_all(surfaces);
             }
@@ -327,9 +325,9 @@ impl Radiosity {
             let over_groups = arriving.take().or_else(|| self.arriving(surfaces));
             let small = self.sweep((surfaces, links, over_groups.as_ref()), &mut work, limit);
             self.sweeps += 1;
-            (self.passed_over, self.held) = match all {
+            (self.skipped_in_full_sweep, self.skipped) = match all {
                 true => (small, 0.0),
-                false => (self.passed_over, self.held.max(limit)),
+                false => (self.skipped_in_full_sweep, self.skipped.max(limit)),
             };
             let (mean, before) = (self.mean_w_m2(surfaces), limit);
             limit = stop.limit_w_m2(mean);
@@ -368,9 +366,10 @@ impl Radiosity {
         (mean, (before, limit)): (f64, (f32, f32)),
         arriving: &mut Option<Arriving>,
     ) -> bool {
-        // A radiosity stays, what its ancestors gathered is owed to it, and they may gather other values.
+        // A radiosity stays, what its ancestors gathered is deferred for it, and they may gather other values.
         let gathered = if surfaces.groups().is_some() { 2.0 } else { 1.0 };
-        let left = self.passed_over + self.held * (1.0 + 1.0 + gathered * PENDING_SHARE);
+        let left =
+            self.skipped_in_full_sweep + self.skipped * (1.0 + 1.0 + gathered * PENDING_SHARE);
         self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
         match stop {
             Stop::Sweeps(count) => self.sweeps >= count,
@@ -379,7 +378,7 @@ impl Radiosity {
                 true
             }
             // Where the sweep itself made the scene much darker, what it left is no longer little.
-            _ if before > HELD_MAX * limit => {
+            _ if before > SKIPPED_MAX * limit => {
                 work.start_all(surfaces);
                 false
             }
@@ -405,10 +404,10 @@ impl Radiosity {
         let mut scratch = std::mem::take(&mut work.scratch);
         for batch in 0..work.batches.len() {
             let mut now = work.take(surfaces, batch);
-            let most_owed = if work.all { None } else { Some(limit) };
+            let most_deferred = if work.all { None } else { Some(limit) };
             let over_groups = |id: u32| Some(surfaces.groups()?.at(arriving?, id));
             let sources = (links, &over_groups as &dyn Fn(u32) -> Option<Linear>);
-            self.gather((surfaces, sources), &mut now, most_owed, &mut scratch.gathered);
+            self.gather((surfaces, sources), &mut now, most_deferred, &mut scratch.gathered);
             let path = if work.all { None } else { Some(work.path.mark(surfaces, &mut now)) };
             self.settle(surfaces, &now.facets, (limit, path), &mut scratch.settled);
             for settled in &scratch.settled[..now.facets.len()] {
@@ -484,12 +483,12 @@ impl Radiosity {
     }
 
     /// Gathers the receivers of a batch anew: over links, and what comes over groups. Those below which no more than
-    /// `most_owed` is owed after that are left out of it.
+    /// `most_deferred` is deferred after that are left out of it.
     fn gather(
         &mut self,
         (surfaces, (links, over_groups)): (&impl Surfaces, Sources<'_>),
         batch: &mut Batch,
-        most_owed: Option<f32>,
+        most_deferred: Option<f32>,
         found: &mut Vec<Linear>,
     ) {
         let receivers = &mut batch.receivers;
@@ -521,7 +520,7 @@ impl Radiosity {
                     *own
                 }
             };
-            let Some(most) = most_owed else {
+            let Some(most) = most_deferred else {
                 gathered.set(id, h);
                 deferred[id as usize] = 0.0;
                 return true;
@@ -534,7 +533,7 @@ impl Radiosity {
             if waits {
                 defer(deferred, surfaces, id, news);
             } else {
-                batch.news.push(change);
+                batch.changes.push(change);
             }
             !waits
         });

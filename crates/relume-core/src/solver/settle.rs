@@ -1,31 +1,31 @@
 //! One facet: irradiance pushed down, reflected at the leaves, radiosity pulled up.
 //!
-//! What changes a little is not pushed down to every leaf each time: it is *owed* to what lies below, and delivered once what is
-//! owed may add up to more than the limit, or something else leads there. What changes now is known as a function of place: what one
-//! level gains and another loses cancels, and where a change is small it waits though it may be large elsewhere.
+//! Small changes of irradiance are not pushed down to every leaf each time: they are *deferred*, and delivered once the deferred
+//! error of a subtree may exceed the limit, or another change leads there. Changes of the present sweep are known as linear
+//! functions of place, so that gains and losses of different levels cancel, and a change waits wherever it is small.
 
 use super::dirty_path::{DirtyPath, bit};
 use super::field::{Field, Linear};
 use super::place::Place;
 use super::surfaces::{FacetMaterial, Surfaces};
 
-/// What pushing and pulling through one facet found.
+/// Result of pushing and pulling through one facet.
 #[derive(Default)]
 pub(super) struct Settled {
     /// Elements with their new radiosities, and by how much those differ.
     pub(super) changed: Vec<(u32, Linear, f32)>,
     /// Largest difference within the limit.
     pub(super) small: f32,
-    /// What is now owed to elements; nothing where everything was settled.
+    /// Deferred error of elements, W/m2; empty where everything was settled.
     pub(super) deferred: Vec<(u32, f32)>,
 }
 
-/// What changed above an element.
+/// Change of the irradiance that an element inherits.
 #[derive(Clone, Copy, Default)]
 pub(super) struct IrradianceChange {
-    /// By how much the irradiance that is pushed down changed, W/m2 and per metre.
+    /// Change in this sweep, W/m2 and per metre.
     change: Linear,
-    /// By how much radiosities may change for earlier changes, of which no more is known, W/m2.
+    /// Bound of the change of radiosity by changes deferred before, W/m2.
     deferred: f32,
 }
 
@@ -39,27 +39,26 @@ impl IrradianceChange {
 pub(super) struct Below<'a, S> {
     pub(super) radiosity: &'a Field,
     pub(super) gathered: &'a Field,
-    /// By how much the radiosities at and below an element may be off, at most, for what was not pushed
-    /// down to them, W/m2.
+    /// Deferred error: bound of the error of radiosities at and below each element by irradiance not pushed down yet, W/m2.
     pub(super) deferred: &'a [f32],
-    /// What the irradiance of each leaf is divided by; empty where by nothing.
+    /// Divisor of the irradiance of each leaf; empty where there is none.
     pub(super) limits: &'a [f32],
     pub(super) surfaces: &'a S,
     pub(super) material: &'a FacetMaterial,
     pub(super) limit: f32,
-    /// The ways to what is concerned; `None` where everything is, small differences too.
+    /// Paths to the changed elements; `None` where everything is settled, small changes too.
     pub(super) path: Option<&'a DirtyPath>,
 }
 
 impl<S: Surfaces> Below<'_, S> {
-    /// Pushes irradiance down and pulls radiosity up; returns the new radiosity of `id`, and what is owed at
-    /// and below it. `news` is what changed above.
+    /// Pushes irradiance down and pulls radiosity up; returns the new radiosity of `id`, and the deferred error at and below
+    /// it. `change` is the change of the inherited irradiance.
     pub(super) fn settle(
         &self,
         id: u32,
         place: &Place,
         inherited: &Linear,
-        news: &IrradianceChange,
+        change: &IrradianceChange,
         out: &mut Settled,
     ) -> (Linear, f32) {
         let h = self.gathered.get(id).plus(inherited);
@@ -71,24 +70,24 @@ impl<S: Surfaces> Below<'_, S> {
                 None => self.reflect(&h, place),
             }
         } else {
-            let news = match self.path {
-                Some(path) => self.add_own(news, path, id),
+            let change = match self.path {
+                Some(path) => self.add_own(change, path, id),
                 None => IrradianceChange::default(),
             };
             let mut fit = Fit::default();
             let moment = self.surfaces.source_moment();
             for child in children {
                 let at = self.surfaces.place(child);
-                let news = news.about(place, &at);
+                let change = change.about(place, &at);
                 let (b, below) =
-                    match self.path.and_then(|path| self.may_wait(path, child, &at, &news)) {
+                    match self.path.and_then(|path| self.may_wait(path, child, &at, &change)) {
                         Some(deferred) => {
                             if deferred > self.deferred[child as usize] {
                                 out.deferred.push((child, deferred));
                             }
                             (self.radiosity.get(child), deferred)
                         }
-                        None => self.settle(child, &at, &h.about(place, &at), &news, out),
+                        None => self.settle(child, &at, &h.about(place, &at), &change, out),
                     };
                 deferred = deferred.max(below);
                 fit.add(self.surfaces.area_m2(child), (place, &at), moment, &b);
@@ -108,32 +107,32 @@ impl<S: Surfaces> Below<'_, S> {
         (b, deferred)
     }
 
-    /// What is owed to an element with what changed above, if it can wait.
+    /// Deferred error of an element with the inherited change, if the change can wait.
     fn may_wait(
         &self,
         path: &DirtyPath,
         id: u32,
         place: &Place,
-        news: &IrradianceChange,
+        change: &IrradianceChange,
     ) -> Option<f32> {
         let deferred = self.deferred[id as usize]
-            + news.deferred
-            + self.material.most(&news.change, place.radius);
+            + change.deferred
+            + self.material.most(&change.change, place.radius);
         (!bit(&path.on, id) && deferred <= self.limit).then_some(deferred)
     }
 
-    /// News from above with those of an element itself.
+    /// Inherited change with the change of an element itself.
     fn add_own(&self, above: &IrradianceChange, path: &DirtyPath, id: u32) -> IrradianceChange {
         let deferred = above.deferred + self.deferred_from(id);
-        match path.news(id) {
+        match path.changes(id) {
             Some(Some(own)) => IrradianceChange { change: above.change.plus(own), deferred },
-            // Whose children came or went, concerns all that is below.
+            // Children came or went: everything below is affected.
             Some(None) => IrradianceChange { deferred: f32::INFINITY, ..*above },
             None => IrradianceChange { deferred, ..*above },
         }
     }
 
-    /// What of that which is owed at and below an element has not come further than to itself.
+    /// Part of the deferred error that no child has inherited yet, W/m2.
     fn deferred_from(&self, id: u32) -> f32 {
         let below = self.surfaces.children(id).map(|child| self.deferred[child as usize]);
         (self.deferred[id as usize] - below.fold(0.0, f32::max)).max(0.0)

@@ -17,7 +17,7 @@ pub(super) struct Trend {
 }
 
 /// One in so many elements that change is most of the scene: for as many all sources are gathered anew.
-const WIDE: usize = 4;
+const WIDE_SHARE: usize = 4;
 
 /// Three changes in steps of a power of two.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -66,7 +66,7 @@ impl Trend {
             self.steps[id] = Step::of(change);
         });
         self.share = if last > 0.0 { (along / last).clamp(0.0, 1.0) as f32 } else { 1.0 };
-        if wide * WIDE < all {
+        if wide * WIDE_SHARE < all {
             *self = Trend::default();
         }
     }

@@ -46,10 +46,10 @@ pub(super) struct Scratch {
 const BATCHES: usize = 16;
 
 /// Share of the receivers above which all are gathered: to find out which is dearer then.
-const MANY: usize = 4;
+const SOME_SHARE: usize = 4;
 
 /// Share of the elements that must change in a sweep over all for the next to be over all.
-const FEW: usize = 16;
+const ALL_SHARE: usize = 16;
 
 /// Share of the residual to which changes of sources may add up before a receiver gathers anew.
 pub(super) const PENDING_SHARE: f32 = 0.5;
@@ -77,7 +77,9 @@ impl Work {
             scratch: Scratch::default(),
         };
         match dirty {
-            Dirty::Some { receivers, parents } if receivers.len() <= surfaces.len() / MANY => {
+            Dirty::Some { receivers, parents }
+                if receivers.len() <= surfaces.len() / SOME_SHARE =>
+            {
                 for parent in parents {
                     let batch = work.batch_of(surfaces, parent);
                     work.batches[batch].parents.push(parent);
@@ -149,7 +151,7 @@ impl Work {
         let mut facets: Vec<u32> = concerned.map(|&id| surfaces.facet_of(id)).collect();
         facets.sort_unstable();
         facets.dedup();
-        Batch { receivers, news: Vec::new(), facets, parents }
+        Batch { receivers, changes: Vec::new(), facets, parents }
     }
 
     /// Whether another sweep is needed.
@@ -160,7 +162,8 @@ impl Work {
         limit: f32,
         pending: &mut [f32],
     ) -> bool {
-        let many = self.changed.len() > surfaces.len() / if self.all { FEW } else { MANY };
+        let many =
+            self.changed.len() > surfaces.len() / if self.all { ALL_SHARE } else { SOME_SHARE };
         if self.all && !many {
             // From now on only what depends on a change.
             self.all = false;

@@ -1,4 +1,4 @@
-//! How what arrives over a link bends over its receiver: the second order, beyond the link's line.
+//! Second-order variation (bend) of the arriving light over a receiver, beyond the gradient that a link stores.
 
 use fearless_simd::dispatch;
 use glam::{DMat3, DVec2, DVec3};
@@ -9,8 +9,8 @@ use super::point::{LANES, PointBundle, form_factors_from_points};
 use crate::element::{WorldElement, WorldLight, bilinear_area};
 use crate::geometry::ConvexPolygon;
 
-/// How much of each of three parabolas is in what arrives over an element, relative to its mean, with lengths in
-/// radii of the element: see [`Receiver::polynomial`].
+/// Coefficients of three parabolas in the arriving light over an element, relative to its mean, with lengths in radii of the
+/// element: see [`Receiver::polynomial`].
 pub type Bend = [f64; 3];
 
 /// (Sum of the radii / distance)^2 from which what arrives is known in closed form only.
@@ -29,7 +29,7 @@ const G3: [(f64, f64); 3] = [
 /// Points of a receiver.
 const POINTS: usize = 9;
 
-/// An element made ready to be asked how what it receives bends.
+/// An element prepared for computing the bend of the light that it receives.
 pub struct Receiver<'a> {
     element: &'a WorldElement,
     /// Nine Gauss points; the other lanes are at the centre.
@@ -91,7 +91,7 @@ impl<'a> Receiver<'a> {
         Receiver { element, points, shares, fit, lines }
     }
 
-    /// The bend of what a source sends, without occlusion.
+    /// Bend of the light from a source, without occlusion.
     ///
     /// Error: that of nine Gauss points, which find the parabola that fits best beside a line in anything up to third
     /// order. About 40 ns, near the source 0.2 microseconds.
@@ -113,7 +113,7 @@ impl<'a> Receiver<'a> {
         self.fitted(&values)
     }
 
-    /// The bend of what a punctual light sends.
+    /// Bend of the light from a punctual light.
     pub fn light_bend(&self, light: &WorldLight) -> Bend {
         let sent = |k: usize| light_at(light, self.points.point(k), self.element.plane.normal);
         self.fitted(&std::array::from_fn(sent))

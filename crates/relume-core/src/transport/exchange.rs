@@ -16,7 +16,7 @@ use crate::element::{WorldElement, WorldLight, bilinear, bilinear_area};
 use crate::geometry::{ConvexPolygon, no_smaller};
 use crate::scene::LightKind;
 
-/// How two elements face each other.
+/// Relation of two elements' planes: how they face each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Meeting {
     /// At least one is wholly behind the other's plane: they exchange nothing.
@@ -30,7 +30,7 @@ pub enum Meeting {
     Coplanar,
 }
 
-/// How what arrives on one end varies over it, relative to its mean.
+/// Variation of the arriving light over one end, relative to its mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Variation {
     /// Relative gradient in the patch's frame, 1/m.
@@ -41,16 +41,16 @@ pub struct Variation {
     pub bend: f64,
 }
 
-/// The exchange of a pair with how unevenly it falls on both ends.
+/// Exchange area of a pair, with the variation of the arriving light over both ends.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Exchange {
     /// Exchange area without occlusion, m2.
     pub area_m2: f64,
-    /// How it varies over the first end.
+    /// Variation over the first end.
     pub over_a: Variation,
-    /// How it varies over the second end.
+    /// Variation over the second end.
     pub over_b: Variation,
-    /// It varies more than a few points of either end can tell.
+    /// Whether the kernel varies more than a few points of either end can resolve.
     pub is_steep: bool,
 }
 
@@ -398,7 +398,7 @@ fn integrate_polygon(
 /// Range of form factors over a quadrilateral above which it is integrated in four parts.
 const STEEP: f64 = 0.5;
 
-/// A side of a near pair: an element whose points look at a polygon.
+/// The end of a near pair from whose points the other is seen.
 struct Viewer<'a> {
     simd: Simd,
     e: &'a WorldElement,

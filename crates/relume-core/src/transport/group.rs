@@ -57,7 +57,7 @@ const GAUSS: f64 = 0.577_350_269_189_625_8;
 /// Segments that a pair with a group is sampled by.
 pub const GROUP_SEGMENTS: u32 = 16;
 
-/// The body in whose frame a pair is looked at, if both ends are of that one.
+/// Body in whose frame a pair is evaluated, if both ends belong to it.
 pub fn common_body(
     forest: &Forest,
     view: &WorldView,

@@ -1,6 +1,8 @@
-//! Exchange area and visibility of two elements: pure queries.
+//! Exchange area X and visibility V of two elements: pure queries.
 //!
-//! Nothing here knows radiosity, time or the pair tree.
+//! [`exchange`](exchange()) computes X, [`visibility`](visibility()) computes V over fixed segments and [`clipping`] in closed form past
+//! occluders, [`Shaft`] finds the occluders between two elements, [`GroupSight`] answers for groups of patches. Must not know
+//! radiosity, time or the pair tree.
 
 mod bend;
 mod clip;

@@ -1,4 +1,4 @@
-//! What points of an end see of the other: exact from each of a few points, past occluders.
+//! View from points of one end of a pair to the other end, past occluders: exact from each point.
 //!
 //! The part of a polygon that a point sees is a set of convex fragments ([`super::clip`]), whose form factors
 //! are known in closed form. What does not depend on the point is made ready once for many.
@@ -52,7 +52,7 @@ impl<'a> Between<'a> {
         self.faces.push((normal, solid));
     }
 
-    /// Adds a solid, two or more of whose faces were or will be pushed: it may be looked at in their place.
+    /// Adds a solid, two or more of whose faces were or will be pushed: its silhouette may replace them.
     pub(super) fn push_solid(&mut self, solid: PlacedSolid<'a>) {
         self.solids.push(solid);
     }
@@ -87,7 +87,7 @@ impl<'a> Between<'a> {
         })
     }
 
-    /// As they are seen from points of the looker's plane: parts in front of both ends' planes, in the
+    /// As they are seen from points of the observer's plane: parts in front of both ends' planes, in the
     /// other's frame.
     fn seen(
         &self,
@@ -131,21 +131,21 @@ impl<'a> Between<'a> {
     }
 }
 
-/// One end of a pair made ready to look at the other.
+/// View from one end of a pair, the observer, to the other end: data that does not depend on the point.
 pub struct PreparedView {
     simd: Simd,
     frame: TargetFrame,
     /// The other's plane.
     other: Plane,
-    /// The part of the other that faces the looker's plane.
+    /// The part of the other that faces the observer's plane.
     target: Vec<DVec2>,
     between: Occluders,
-    /// The looker's, in the frame.
+    /// The observer's, in the frame.
     normal: DVec3,
     scratch: Scratch,
 }
 
-/// What looking fills and empties: made once a thread, since most lookouts look only a few times.
+/// Buffers of a view: made once a thread, since most views are used for a few points only.
 #[derive(Default)]
 struct Scratch {
     cutter: Cutter,
@@ -185,7 +185,7 @@ impl PreparedView {
         }
     }
 
-    /// Visibility of the other from a part of the looker, in [0, 1]: from 2 x 2 Gauss points in each of
+    /// Visibility of the other from a part of the observer, in [0, 1]: from 2 x 2 Gauss points in each of
     /// `cells` x `cells` parts of that.
     ///
     /// Error: exact from each point; over the part it falls with the square of `cells`, as V has kinks.
@@ -193,7 +193,7 @@ impl PreparedView {
         self.look(part, cells).visibility()
     }
 
-    /// Visibility of the other from the middle of each of some parts of the looker, in [0, 1]; 0 where a
+    /// Visibility of the other from the middle of each of some parts of the observer, in [0, 1]; 0 where a
     /// middle does not face the other.
     pub fn from_middles<'a>(&mut self, parts: impl Iterator<Item = &'a WorldElement>) -> Vec<f64> {
         self.scratch.views.start();
@@ -203,7 +203,7 @@ impl PreparedView {
         self.scratch.views.points.iter().map(|point| share(point).clamp(0.0, 1.0)).collect()
     }
 
-    /// Whether the other end, in parts of each of which one occluder hides all, is hidden from all of the looker, its
+    /// Whether the other end, in parts of each of which one occluder hides all, is hidden from all of the observer, its
     /// rim aside.
     fn is_hidden(&mut self, observer: &WorldElement) -> bool {
         let corners =
@@ -267,20 +267,20 @@ impl<'a> Clipping<'a> {
         Clipping { observer, other, a_looks, prepare_view }
     }
 
-    /// Visibility, exact from 2 x 2 Gauss points in each of `cells` x `cells` parts of the looker. Each point
+    /// Visibility, exact from 2 x 2 Gauss points in each of `cells` x `cells` parts of the observer. Each point
     /// counts as a segment.
     pub fn visibility(&mut self, cells: u32) -> Visibility {
         let Clipping { observer, other, a_looks, ref mut prepare_view } = *self;
         let sums = prepare_view.look(observer, cells);
         let value = sums.visibility();
-        let over_looker =
-            gradient(observer, sums.at_looker, sums.at_looker_clear, sums.all, sums.clear);
+        let over_observer =
+            gradient(observer, sums.at_observer, sums.at_observer_clear, sums.all, sums.clear);
         let over_other = gradient(other, sums.at_other, sums.at_other_clear, sums.all, sums.clear);
-        let (of_looker, of_other) = sums.spreads(value);
+        let (of_observer, of_other) = sums.spreads(value);
         let (gradient_a, gradient_b) =
-            if a_looks { (over_looker, over_other) } else { (over_other, over_looker) };
+            if a_looks { (over_observer, over_other) } else { (over_other, over_observer) };
         let (spread_a, spread_b) =
-            if a_looks { (of_looker, of_other) } else { (of_other, of_looker) };
+            if a_looks { (of_observer, of_other) } else { (of_other, of_observer) };
         Visibility {
             value,
             gradient_a,
@@ -370,7 +370,7 @@ const UNSEEN: f64 = 0.075;
 pub const CELLS_MAX: u32 = 8;
 
 /// How many times as much shadows move over the other end for the larger to be looked from.
-const MUCH: f64 = 16.0;
+const MOTION_RATIO: f64 = 16.0;
 
 /// Share of an end that must face the other for that not to matter. A value that quadtree elements do not meet
 /// exactly.
@@ -397,8 +397,8 @@ fn looks_best(a: &WorldElement, b: &WorldElement, between: &Between<'_>) -> bool
     let (by_a, by_b) =
         (a.radius * around.distance(&b.bounds), b.radius * around.distance(&a.bounds));
     match no_smaller(b.area, a.area) {
-        true => by_a <= MUCH * by_b,
-        false => by_b > MUCH * by_a,
+        true => by_a <= MOTION_RATIO * by_b,
+        false => by_b > MOTION_RATIO * by_a,
     }
 }
 
@@ -531,13 +531,13 @@ impl TargetFrame {
     }
 }
 
-/// What points of the looker see, with form factors evaluated many edges at a time.
+/// Views from points of the observer, with form factors evaluated many edges at a time.
 #[derive(Default)]
 struct PointViews {
     sums: Sums,
     /// Form factors from each point, of the target and of what is clear of it.
     points: Vec<(f64, f64)>,
-    /// If first moments are wanted, the looker's normal.
+    /// If first moments are wanted, the observer's normal.
     moments: Option<DVec3>,
     edges: EdgeBundles,
     seen: Vec<Seen>,
@@ -611,7 +611,7 @@ impl PointViews {
                 self.points.push((f, 0.0));
                 sums.all += f;
                 if self.moments.is_some() {
-                    sums.at_looker += seen.at * f;
+                    sums.at_observer += seen.at * f;
                     sums.at_other += seen.middle * f;
                 }
             }
@@ -622,7 +622,7 @@ impl PointViews {
             };
             self.points.last_mut().expect("a target comes first").1 += clear;
             if self.moments.is_some() {
-                sums.at_looker_clear += seen.at * clear;
+                sums.at_observer_clear += seen.at * clear;
                 sums.at_other_clear += seen.middle * clear;
             }
         }
@@ -643,8 +643,8 @@ impl PointViews {
 struct Sums {
     all: f64,
     clear: f64,
-    at_looker: DVec2,
-    at_looker_clear: DVec2,
+    at_observer: DVec2,
+    at_observer_clear: DVec2,
     at_other: DVec2,
     at_other_clear: DVec2,
     /// Sum over the points of their clear part squared over all.
@@ -662,7 +662,7 @@ impl Sums {
         if self.all > 0.0 { (self.clear / self.all).clamp(0.0, 1.0) } else { 0.0 }
     }
 
-    /// Standard deviations of visibility over the looker (between its points) and over the
+    /// Standard deviations of visibility over the observer (between its points) and over the
     /// other end (within what each point sees: there it is 0 or 1).
     fn spreads(&self, value: f64) -> (f64, f64) {
         if self.all <= 0.0 {

@@ -5,10 +5,10 @@ use glam::DVec3;
 
 use crate::scene::{Solid, SolidEdge, SolidFace};
 
-/// A solid in some frame, made ready to be looked at from points of one polygon, the looker.
+/// A solid in some frame, prepared for views from points of one polygon, the observer.
 pub(super) struct Silhouette {
     corners: Vec<DVec3>,
-    /// Faces that some points of the looker see and others do not.
+    /// Faces that some points of the observer see and others do not.
     faces: Vec<Face>,
     /// Those that bound the shadow seen from every point.
     always: Vec<[usize; 2]>,
@@ -28,7 +28,7 @@ struct Edge {
     faces: [Sight; 2],
 }
 
-/// Whether the looker sees a face.
+/// Whether the observer sees a face.
 #[derive(Clone, Copy, PartialEq)]
 enum Sight {
     All,
@@ -38,8 +38,8 @@ enum Sight {
 }
 
 impl Silhouette {
-    /// Corners and normals by `place` and `turn` to the frame, in which the looker's corners are; `is_low`
-    /// says of a corner in the frame whether it is in the looker's plane or behind it.
+    /// Corners and normals by `place` and `turn` to the frame, in which the observer's corners are; `is_low`
+    /// says of a corner in the frame whether it is in the observer's plane or behind it.
     pub(super) fn new(
         solid: &Solid,
         (place, turn): (impl Fn(DVec3) -> DVec3, impl Fn(DVec3) -> DVec3),
@@ -48,7 +48,7 @@ impl Silhouette {
     ) -> Silhouette {
         let corners: Vec<DVec3> = solid.corners.iter().map(|&c| place(c)).collect();
         let low: Vec<bool> = corners.iter().map(|&c| is_low(c)).collect();
-        // An edge in the looker's plane, or behind it, bounds nothing in front; and a face of such edges
+        // An edge in the observer's plane, or behind it, bounds nothing in front; and a face of such edges
         // nobody sees.
         let is_high = |edge: &&SolidEdge| !edge.ends.iter().all(|&c| low[c as usize]);
         let mut is_low = vec![true; solid.faces.len()];

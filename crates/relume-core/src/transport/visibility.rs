@@ -1,5 +1,5 @@
-//! Partial visibility of a pair: which bodies stand in its shaft, and which of its fixed
-//! segments they block.
+//! Visibility V of a pair: the occluders in its shaft ([`Shaft`]), and V past them, over fixed segments ([`visibility`]) or by
+//! clipping ([`clipping`]).
 
 use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldView};
 use crate::geometry::{Aabb, Plane, Pose, ShaftOfBoxes, shaft_meets_box};
@@ -14,8 +14,8 @@ use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use super::side::Side;
 use glam::{DVec2, DVec3};
 
-/// Nodes of the forest's fixed part that may stand between the two ends of a pair: clusters and
-/// patch roots. Conservative: what is not below one of them blocks nothing.
+/// Candidate occluders of a pair: nodes of the forest's fixed part (clusters and patch roots) that may stand between its ends.
+/// Conservative: a patch below none of them blocks nothing.
 pub type Candidates = [u32];
 
 /// The visibility of a pair, kernel-weighted over its segments.
@@ -23,9 +23,9 @@ pub type Candidates = [u32];
 pub struct Visibility {
     /// Unoccluded share, in [0, 1].
     pub value: f64,
-    /// What occlusion adds to the relative gradient of what arrives over the first end, 1/m.
+    /// Contribution of occlusion to the relative gradient of the arriving light over the first end, 1/m.
     pub gradient_a: DVec2,
-    /// The same over the second end.
+    /// Contribution of occlusion to the relative gradient over the second end, 1/m.
     pub gradient_b: DVec2,
     /// Standard deviation between the quadrants of the first end, absolute.
     pub spread_a: f64,
@@ -36,7 +36,7 @@ pub struct Visibility {
 }
 
 impl Visibility {
-    /// Nothing in the way.
+    /// Visibility of a pair without occluders.
     pub const CLEAR: Visibility = Visibility {
         value: 1.0,
         gradient_a: DVec2::ZERO,
@@ -71,7 +71,7 @@ const COVER: f64 = 0.5;
 /// disregarded because it is close to an end.
 const LIFT: f64 = 8.0;
 
-/// Sizes of what stands between two ends; infinite where nothing does.
+/// Sizes of the blockers between two ends; infinite where there are none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BlockerSizes {
     /// For each end the width (area over length, m) of the narrowest blocker that emits light at any time and shines
@@ -96,7 +96,7 @@ impl BlockerSizes {
     };
 }
 
-/// How a patch stands to a shaft.
+/// Relation of a patch to a shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Standing {
     /// It blocks neither this pair nor any below it.
@@ -107,7 +107,7 @@ enum Standing {
     Between,
 }
 
-/// The two ends in the frame in which a body is looked at, and their boxes' shaft.
+/// The two ends in the frame in which a body is tested against their shaft, and their boxes' shaft.
 #[derive(Clone, Copy)]
 struct SeenEnds<'a> {
     own: bool,
@@ -165,7 +165,7 @@ impl<'a> Shaft<'a> {
         self.a.rounding_m + self.b.rounding_m
     }
 
-    /// The two ends in the frame in which a body is looked at: its own for the body that both ends
+    /// The two ends in the frame in which a body is tested against their shaft: its own for the body that both ends
     /// ride on, so that the answer does not depend on where that is.
     fn seen_by(&self, body: Option<BodyId>) -> (bool, &'a WorldElement, &'a WorldElement) {
         match self.own {
@@ -612,7 +612,7 @@ pub fn clipping<'a>(simd: Simd, shaft: &Shaft<'a>, blockers: &[PatchId]) -> Clip
     Clipping::new(simd, ends, &shaft.between(blockers))
 }
 
-/// One end of a pair made ready to look at the other past blockers; in the frame of the body that both
+/// View from one end of a pair to the other past blockers, prepared for many points; in the frame of the body that both
 /// ride on, if they do.
 pub fn prepare_view(
     simd: Simd,

@@ -38,12 +38,12 @@ pub(crate) enum Why {
     Cancelled,
     /// Light does not settle.
     Unsettled {
-        /// What the last sweep left, relative to the mean radiosity.
+        /// Residual of the last sweep, relative to the mean radiosity.
         residual: f64,
         /// Names of the surfaces whose rows exceed 1 by most.
         surfaces: Vec<String>,
     },
-    /// What is absorbed and lost is not what is emitted.
+    /// Absorbed and escaped flux differ from the emitted flux.
     Unbalanced {
         /// Share of what is emitted.
         share: f64,

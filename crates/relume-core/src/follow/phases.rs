@@ -23,7 +23,7 @@ use super::watch::Watch;
 pub(crate) struct Order<'a> {
     /// Head of the report: frame, time, and names of moved bodies.
     pub(crate) label: FrameReport,
-    /// How the pairs follow the motion.
+    /// Strategy by which the pairs follow motion.
     pub(crate) update: Update,
     /// Whether events of links are kept.
     pub(crate) events: bool,
@@ -418,8 +418,8 @@ impl<S: Space> Failed<S> {
 
     /// A state from which a frame may lead back to where the failed one began; `None` where it began with nothing.
     ///
-    /// What a frame may have changed of a pair lies between its two instants, so a frame the other way finds it, however
-    /// far the first one came: the links are those of before, bit for bit.
+    /// A frame in the opposite direction re-evaluates every pair that the failed frame may have changed, however far that came:
+    /// the links are those of before, bit for bit.
     pub(crate) fn into_way_back(self) -> Option<Follower<S>> {
         let Failed { mut state, is_cold, why } = self;
         if is_cold || !state.is_settled() {

@@ -33,7 +33,7 @@ pub(super) const EFFORT: u32 = 256;
 struct Ends<'a> {
     bounds: (Aabb, Aabb),
     bodies: (Option<BodyId>, Option<BodyId>),
-    /// Of elements.
+    /// Places of both ends, where both are elements.
     places: Option<(&'a WorldElement, &'a WorldElement)>,
     patches: (Option<PatchId>, Option<PatchId>),
     /// More than the exact test of this pair, or of any below it, allows.
@@ -270,7 +270,7 @@ impl SpaceCertificateTests<'_> {
         turns_c || !(a_lo.min(b_lo) >= -half || a_hi.max(b_hi) <= half)
     }
 
-    /// How far from a blocker's plane what it covers can be, however it is turned.
+    /// Distance from a blocker's plane up to which it may cover an end, however it is turned, metres.
     ///
     /// All of the blocker's corners within s of a plane tilt it by at most 2 s by its width, and a
     /// convex polygon is no narrower than its area by its diameter.
@@ -319,7 +319,7 @@ impl SpaceCertificateTests<'_> {
     }
 }
 
-/// How a blocker lies to an end at all times.
+/// Position of a blocker relative to an end, at all times up to a horizon.
 struct AtEnd {
     behind: bool,
     may_cover: bool,

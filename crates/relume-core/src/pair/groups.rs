@@ -33,12 +33,12 @@ const MISSED: f64 = 0.01;
 /// Share of its area that a group shows, for each radius over distance of the other end, beyond what it shows to its middle.
 const TURNED: f64 = 0.5;
 
-/// What a group pair carries, before occlusion.
+/// Exchange of a pair with a group, without occlusion.
 struct GroupExchange {
     area_m2: f64,
     /// Radius over distance of both ends.
     size: (f64, f64),
-    /// What each end may show the other at most, m2.
+    /// Largest projected area of each end towards the other, m2.
     shows_m2: (f64, f64),
 }
 
@@ -242,7 +242,7 @@ impl SpaceJudge<'_> {
     }
 }
 
-/// What two ends exchange without occlusion.
+/// Exchange of two ends without occlusion.
 fn exchange_of(a: &Spread<'_>, b: &Spread<'_>) -> GroupExchange {
     let apart = a.centre.distance(b.centre).max(f64::MIN_POSITIVE);
     let size = (a.radius / apart, b.radius / apart);

@@ -40,7 +40,7 @@ pub enum Stage<'a> {
 pub struct SpaceJudge<'a> {
     /// The elements.
     pub forest: &'a mut Forest,
-    /// Where they are.
+    /// Places of the elements at this instant.
     pub view: &'a WorldView,
     /// Level down to which pairs are judged.
     pub stage: Stage<'a>,
@@ -720,7 +720,7 @@ impl SpaceJudge<'_> {
     }
 }
 
-/// Where the two elements of a pair are.
+/// Places of the two elements of a pair.
 struct Places {
     /// In the frame that their light must not depend on: their body's if they have one in common.
     own: (WorldElement, WorldElement),

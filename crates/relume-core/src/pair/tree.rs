@@ -162,7 +162,7 @@ pub struct Link {
     pub a: ElementId,
     /// Second end; the order is inherited from the pair of facets above.
     pub b: ElementId,
-    /// What it carries.
+    /// Its values.
     pub carried: Carried,
 }
 
@@ -183,8 +183,8 @@ impl Link {
 struct Node {
     a: u32,
     b: u32,
-    /// Of a link X, V (below its margin) and gradients; of a refined pair its first child, their number
-    /// and its margins.
+    /// For a link X, V (below its margin) and gradients; for a refined pair its first child, the number of children and its
+    /// margins.
     payload: [u32; 3],
 }
 
@@ -286,7 +286,7 @@ impl<T: Copy + Default + PartialEq> SideTable<T> {
         self.values[at] = value;
     }
 
-    /// What was at `order[k]` comes to k.
+    /// Moves the value at `order[k]` to k.
     fn reorder(&mut self, order: &[u32]) {
         if !self.values.is_empty() {
             self.values = order.iter().map(|&from| self.get(PairId(from))).collect();
@@ -441,7 +441,7 @@ impl PairTree {
         (ElementId(node.a & ID_MASK), ElementId(node.b & ID_MASK))
     }
 
-    /// What a pair is.
+    /// State of a pair.
     #[inline]
     pub fn state(&self, id: PairId) -> State {
         self.nodes[id.0 as usize].state()
@@ -487,7 +487,7 @@ impl PairTree {
         self.nodes[id.0 as usize].set_carried(carried);
     }
 
-    /// What a pair's verdict withstands.
+    /// Margin of a pair's verdict.
     #[inline]
     pub(super) fn margin(&self, id: PairId) -> Margin {
         let node = &self.nodes[id.0 as usize];
@@ -536,7 +536,7 @@ impl PairTree {
         self.live
     }
 
-    /// Those of them that are to be evaluated, ascending.
+    /// Extrapolated pairs that are due for evaluation, ascending.
     pub(super) fn due_pairs(&self, ahead: &Lookahead) -> Vec<PairId> {
         if self.live == 0 {
             return Vec::new();

@@ -91,7 +91,7 @@ pub enum CommandError {
         what: &'static str,
         /// Its index.
         index: u32,
-        /// How many there are.
+        /// Number of such things in the scene.
         count: usize,
     },
     /// A value is outside of what can be computed with.
@@ -99,9 +99,9 @@ pub enum CommandError {
     Value {
         /// Kind and name of the thing.
         subject: String,
-        /// What is wrong.
+        /// The flaw.
         what: String,
-        /// What to do.
+        /// The remedy.
         remedy: String,
     },
     /// The new body is none.
@@ -257,7 +257,7 @@ fn check_emission(subject: String, to: &Option<[f64; 3]>) -> Result<(), CommandE
     }
 }
 
-/// What is wrong with a pose.
+/// Flaw of a pose, if it has one.
 fn flaw_of(pose: &Pose) -> Option<String> {
     if !is_place(&pose.translation.to_array()) {
         let at = pose.translation;

@@ -62,12 +62,12 @@ pub enum SessionError {
     Unsettled {
         /// The frame being computed.
         frame: u32,
-        /// What the last sweep left, relative to the mean radiosity.
+        /// Residual of the last sweep, relative to the mean radiosity.
         residual: f64,
         /// Names of the surfaces whose rows exceed 1 by most.
         surfaces: Vec<String>,
     },
-    /// What is absorbed and escapes is not what is emitted.
+    /// Absorbed and escaped flux differ from the emitted flux.
     #[error(
         "frame {frame}: {:.0} % of the light that is emitted is unaccounted for; most of it between {}: they pierce each other, or lie so close that form factors between them sum to more than 1; move them apart, make their materials reflect less, or use a finer tolerance", 100.0 * share, names(surfaces)
     )]

@@ -2,7 +2,7 @@
 
 use crate::follow::Update;
 
-/// How a scene is solved.
+/// Options of a solution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Relative error of irradiance aimed at (RMS), in (0, 1). Default 0.02.

@@ -32,7 +32,7 @@ pub(super) enum Edit {
     Out(BodyId),
 }
 
-/// Where a step starts.
+/// Start of a step.
 pub(super) struct Start {
     /// The state to start from, in the session's scene.
     pub(super) last: Option<Solved>,

@@ -36,7 +36,7 @@ pub struct Receiver<'a> {
     points: PointBundle,
     /// Shares of the area.
     shares: [f64; POINTS],
-    /// What of a function's values at the points is in each parabola.
+    /// Weights by which values at the points give the coefficient of each parabola.
     fit: [[f64; POINTS]; 3],
     /// The mean of x x, x y and y y, and the line that fits each of them best; lengths in radii.
     lines: [[f64; 3]; 3],
@@ -48,7 +48,7 @@ fn squares(p: DVec2) -> [f64; 3] {
 }
 
 impl<'a> Receiver<'a> {
-    /// Of any quadrilateral or triangle.
+    /// Receiver from any quadrilateral or triangle.
     pub fn new(element: &'a WorldElement) -> Receiver<'a> {
         let WorldElement { corners, plane, centre, radius, .. } = element;
         let mut points = PointBundle::default();
@@ -133,7 +133,7 @@ impl<'a> Receiver<'a> {
         reach * reach / (centre - self.element.centre).length_squared().max(f64::MIN_POSITIVE)
     }
 
-    /// What arrives at the points from some others with a normal and weights.
+    /// Kernel sums at the points over source points with a normal and weights.
     #[inline(always)]
     fn receive(&self, from: &[(DVec3, f64)], m: DVec3, values: &mut [f64; LANES]) {
         let (n, at) = (self.element.plane.normal, &self.points);
@@ -166,7 +166,7 @@ impl<'a> Receiver<'a> {
         values
     }
 
-    /// What of the values at the points is in each parabola, relative to their mean.
+    /// Coefficients of the parabolas in values at the points, relative to their mean.
     fn fitted(&self, values: &[f64; LANES]) -> Bend {
         let over = |weights: &[f64; POINTS]| {
             weights.iter().zip(values).map(|(weight, value)| weight * value).sum::<f64>()

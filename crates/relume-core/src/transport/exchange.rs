@@ -54,7 +54,7 @@ pub struct Exchange {
     pub is_steep: bool,
 }
 
-/// How two elements face each other; corners within rounding of a plane count as on it.
+/// Relation of two elements' planes; corners within rounding of a plane count as on it.
 #[inline]
 pub fn meeting(a: &WorldElement, b: &WorldElement) -> Meeting {
     let slack = a.rounding_m + b.rounding_m;
@@ -134,7 +134,7 @@ pub fn exchange_by_points(
     }
 }
 
-/// The same as if each element were a point, with the gradients that follow; no bends.
+/// Exchange as if each element were a point, with the gradients that follow; no bends.
 ///
 /// Error: the square of (sum of the radii / distance), relative.
 pub fn exchange_of_points(a: &WorldElement, b: &WorldElement) -> Exchange {
@@ -165,7 +165,7 @@ struct Fit {
     xx: f64,
     xy: f64,
     yy: f64,
-    /// Of some points beside each other the values differ too much for a line.
+    /// Whether values at neighbouring points differ too much for a linear fit.
     is_steep: bool,
 }
 

@@ -22,7 +22,7 @@ const NOTHING: f64 = 1e-12;
 /// Edges whose form factors are evaluated together.
 const EDGES_AT_ONCE: usize = 512;
 
-/// What stands between two ends, all in one frame: convex polygons, and solids that some of them are faces of.
+/// Blockers between two ends, in one frame: convex polygons, and solids that some of them are faces of.
 #[derive(Default)]
 pub(super) struct Between<'a> {
     corners: Vec<DVec3>,
@@ -254,7 +254,7 @@ pub struct Clipping<'a> {
 }
 
 impl<'a> Clipping<'a> {
-    /// Of two elements past convex occluders, all in one frame.
+    /// Clipping of two elements past convex occluders, all in one frame.
     pub(super) fn new(
         simd: Simd,
         (a, b): (&'a WorldElement, &'a WorldElement),
@@ -414,7 +414,7 @@ pub struct FactorPast {
     pub is_exact: bool,
 }
 
-/// What a single point sees of a convex polygon past convex occluders.
+/// View from a single point to a convex polygon past convex occluders.
 struct PointView {
     frame: TargetFrame,
     /// The point, and the polygon, in it.
@@ -504,7 +504,7 @@ impl TargetFrame {
         TargetFrame { origin: e.centre, axes: [e.axes[0], e.axes[1], e.plane.normal] }
     }
 
-    /// Of a planar polygon with three or more corners.
+    /// Frame of a planar polygon with three or more corners.
     fn of_polygon(c: &[DVec3]) -> TargetFrame {
         let fan = |k: usize| (c[k] - c[0]).cross(c[k + 1] - c[0]);
         let up = (1..c.len() - 1).map(fan).sum::<DVec3>().normalize_or_zero();
@@ -550,7 +550,7 @@ struct Seen {
     at: DVec2,
     /// The middle of what the polygon sends.
     middle: DVec2,
-    /// Where its edges end in the list of edges.
+    /// End of its edges in the list of edges.
     edges_end: usize,
 }
 
@@ -675,7 +675,7 @@ impl Sums {
     }
 }
 
-/// What occlusion adds to the relative gradient over an element: the shift of the centre of what
+/// Contribution of occlusion to the relative gradient over an element: the shift of the centre of what
 /// passes, against the element's second moment.
 fn gradient(e: &WorldElement, at: DVec2, at_clear: DVec2, all: f64, clear: f64) -> DVec2 {
     if clear <= NOTHING * all {

@@ -10,9 +10,9 @@ pub(super) struct Silhouette {
     corners: Vec<DVec3>,
     /// Faces that some points of the observer see and others do not.
     faces: Vec<Face>,
-    /// Those that bound the shadow seen from every point.
+    /// Edges that bound the shadow from every point.
     always: Vec<[usize; 2]>,
-    /// Those of which it depends on the point.
+    /// Edges that bound the shadow from some points only.
     sometimes: Vec<Edge>,
 }
 

@@ -152,7 +152,7 @@ fn span(polygon: &OccluderPolygon<'_>, plane: &Plane) -> (f64, f64) {
     polygon.corners.iter().fold((f64::INFINITY, f64::NEG_INFINITY), with)
 }
 
-/// How far two elements reach to either side of a plane, the smaller of both, metres; negative where they
+/// Reach of two elements to either side of a plane, the smaller of both, metres; negative where they
 /// stay away from it.
 #[inline]
 fn reach(plane: &Plane, a: &WorldElement, b: &WorldElement) -> f64 {
@@ -187,7 +187,7 @@ impl<'a> Shaft<'a> {
         SeenEnds { own, a, b, shaft }
     }
 
-    /// How a patch stands to the shaft.
+    /// Relation of a patch to the shaft.
     fn standing(&self, shafts: &ShaftsOfBoxes, patch: PatchId) -> Standing {
         if patch == self.patches.0 || patch == self.patches.1 || self.view.is_hidden_twin(patch) {
             return Standing::Out;
@@ -416,14 +416,14 @@ impl<'a> Shaft<'a> {
         blockers
     }
 
-    /// Those of the blockers of a pair above that may block segments of this one.
+    /// Blockers of this pair among those of a pair above.
     pub fn those_that_block(&self, blockers: &[PatchId]) -> Vec<PatchId> {
         let shafts = self.shafts();
         let blocks = |patch: &PatchId| self.standing(&shafts, *patch) == Standing::Between;
         blockers.iter().copied().filter(blocks).collect()
     }
 
-    /// How many occluders blockers make up: solids that hide with their silhouettes count as one for every
+    /// Number of occluders that blockers make up: solids that hide with their silhouettes count as one for every
     /// eight of their faces, which may have to be clipped one by one after all.
     pub fn occluders(&self, blockers: &[PatchId]) -> usize {
         let whole = self.whole_solids(blockers);
@@ -671,7 +671,7 @@ impl SideTally {
         self.clear_moment += at * clear;
     }
 
-    /// What occlusion adds to the relative gradient: the shift of the centre of what arrives,
+    /// Contribution of occlusion to the relative gradient: the shift of the centre of what arrives,
     /// against the element's own second moment.
     fn gradient(&self, e: &WorldElement) -> DVec2 {
         let (total, clear): (f64, f64) = (self.total.iter().sum(), self.clear.iter().sum());

@@ -173,7 +173,7 @@ struct Aim {
     weight: f64,
 }
 
-/// How often the facets of an end were seen, by weight.
+/// Weighted counts of rays that reached each facet of an end.
 struct Tally {
     clear: Vec<f64>,
     all: Vec<f64>,
@@ -252,7 +252,7 @@ impl<'a> Rays<'a> {
 }
 
 impl GroupSight<'_> {
-    /// What each facet sees of the other end: rays from each facet of the end that has more of them, to points of the other by
+    /// Visibility of each facet to the other end, by rays from each facet of the end that has more of them, to points of the other by
     /// what they weigh. A pure function of the places and of `key`.
     pub fn by_facets(&self, a: &Spread<'_>, b: &Spread<'_>, key: u64) -> FacetSight {
         let Some(rays) = Rays::new(a, b, key) else { return FacetSight::default() };

@@ -208,9 +208,9 @@ const PHASES: [(&str, ReadSeconds); 6] = [
     ("move", |s| s.moving),
     ("predict", |s| s.predict),
     ("evaluate", |s| s.evaluate),
-    ("judge", |s| s.judge),
+    ("judge", |s| s.edit),
     ("solve", |s| s.solve),
-    ("tally", |s| s.total - s.moving - s.predict - s.evaluate - s.judge - s.solve),
+    ("tally", |s| s.total - s.moving - s.predict - s.evaluate - s.edit - s.solve),
 ];
 
 impl Measured {

@@ -505,7 +505,8 @@ impl Run<'_> {
                 return Ok(Outcome::Interrupted);
             }
             let before = wanted.iter().rev().find(|&&earlier| earlier < frame);
-            self.session.came_from(before.map(|&f| frames::time_of(f, self.job.solve.clip.fps)));
+            self.session
+                .count_motion_from(before.map(|&f| frames::time_of(f, self.job.solve.clip.fps)));
             self.frame(frame)?;
             if let Some((mut meanwhile, path)) = meanwhile.take() {
                 meanwhile.end(&path);

@@ -52,7 +52,7 @@ impl Stepping for Session {
     }
 
     fn count_from(&mut self, time_s: Option<f64>) {
-        self.came_from(time_s);
+        self.count_motion_from(time_s);
     }
 
     fn held(&self) -> Memory {
@@ -83,7 +83,7 @@ impl Stepping for FlatSession {
     }
 
     fn count_from(&mut self, time_s: Option<f64>) {
-        self.came_from(time_s);
+        self.count_motion_from(time_s);
     }
 
     fn held(&self) -> Memory {

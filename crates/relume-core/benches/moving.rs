@@ -454,7 +454,7 @@ fn print_frames(frames: &[(f64, FrameReport)]) {
         "    milliseconds: poses {:.2}, pairs {:.2}, links and elements {:.2}, solve {:.2}, all {:.2}",
         part(&|r| r.seconds.moving),
         part(&|r| r.seconds.evaluate),
-        part(&|r| r.seconds.judge),
+        part(&|r| r.seconds.edit),
         part(&|r| r.seconds.solve),
         part(&|r| r.seconds.total),
     );

@@ -9,11 +9,11 @@
 
 // The rooms, from the ground up; each may use those above it and no other (`tests/layers.rs` of `relume` checks the order).
 pub mod element; // the element forest: clusters, patches and their quadtrees
-pub mod event; // what the known motion allows within the coming time, and until when
 pub mod flat; // the plane: another space for the same pairs, events, solver and frames
 pub mod follow; // the phases of a frame, in any space
 pub mod geometry; // polygons, bounds, shafts, rigid motion: pure functions
 pub mod pair; // the pair tree, oracles and verdicts
+pub mod predict; // what the known motion allows within the coming time, and until when
 pub mod read; // what is read from a solution
 pub mod scene; // bodies, patches, materials, motion, and worlds made of them
 pub mod session; // owns all state; commands in, frames out

@@ -12,7 +12,7 @@ const ROOMS: [&str; 12] = [
     "scene",
     "element",
     "transport",
-    "event",
+    "predict",
     "pair",
     "solver",
     "follow",

@@ -50,13 +50,13 @@ pub struct ElementKey {
 struct Node {
     /// Where an element lies within its facet.
     place: Place,
-    fan: Fan,
+    children: ChildRange,
     area_m2: f32,
 }
 
 /// What two siblings have in common; a node of the fixed part has one of its own. 20 bytes.
 #[derive(Clone, Copy, Debug)]
-struct Twins {
+struct Siblings {
     parent: u32,
     facet: u32,
     /// Path of the first of them; that of the other is one more.
@@ -69,35 +69,35 @@ struct Twins {
 
 /// The children of a node in 32 bits: the first one's id, and their number in the two highest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Fan(u32);
+struct ChildRange(u32);
 
-impl Fan {
+impl ChildRange {
     const SHIFT: u32 = 30;
-    const LEAF: Fan = Fan(0);
+    const LEAF: ChildRange = ChildRange(0);
     /// In the fixed part: as many children as [`Fixed::child_counts`] says. Beyond it: no node.
-    const OTHER: Fan = Fan(3 << Fan::SHIFT);
+    const OTHER: ChildRange = ChildRange(3 << ChildRange::SHIFT);
 
     /// Two or four children.
-    fn new(first: u32, count: usize) -> Fan {
-        debug_assert!(first >> Fan::SHIFT == 0, "more than 2^30 elements");
-        Fan(first | (count as u32 / 2) << Fan::SHIFT)
+    fn new(first: u32, count: usize) -> ChildRange {
+        debug_assert!(first >> ChildRange::SHIFT == 0, "more than 2^30 elements");
+        ChildRange(first | (count as u32 / 2) << ChildRange::SHIFT)
     }
 
-    fn other(first: u32) -> Fan {
-        Fan(first | Fan::OTHER.0)
+    fn other(first: u32) -> ChildRange {
+        ChildRange(first | ChildRange::OTHER.0)
     }
 
     fn is_other(self) -> bool {
-        self.0 >= Fan::OTHER.0
+        self.0 >= ChildRange::OTHER.0
     }
 
     fn first(self) -> u32 {
-        self.0 & !Fan::OTHER.0
+        self.0 & !ChildRange::OTHER.0
     }
 
-    /// The children of anything but [`Fan::other`].
+    /// The children of anything but [`ChildRange::other`].
     fn range(self) -> Range<u32> {
-        let count = (self.0 >> Fan::SHIFT) * 2;
+        let count = (self.0 >> ChildRange::SHIFT) * 2;
         self.first()..self.first() + count
     }
 }
@@ -128,7 +128,7 @@ const LEVELS_MAX: u32 = 15;
 pub struct Forest {
     nodes: Vec<Node>,
     /// One for each node of the fixed part, then one for every two.
-    twins: Vec<Twins>,
+    siblings: Vec<Siblings>,
     /// Area of what light can reach of the elements that are partly or wholly covered, m2.
     exposed: BTreeMap<u32, f32>,
     fixed_len: u32,
@@ -259,8 +259,8 @@ impl Forest {
         if layout.has_groups() {
             let groups = Groups::of(scene, &forest, &layout);
             for id in groups.ids() {
-                let twins = &mut forest.twins[id.0 as usize];
-                (twins.facet, twins.path) = (id.0, 1);
+                let siblings = &mut forest.siblings[id.0 as usize];
+                (siblings.facet, siblings.path) = (id.0, 1);
             }
             forest.fixed_mut().groups = groups;
         }
@@ -271,7 +271,7 @@ impl Forest {
         let solids = scene.solids();
         let mut forest = Forest {
             nodes: Vec::new(),
-            twins: Vec::new(),
+            siblings: Vec::new(),
             exposed: BTreeMap::new(),
             // All that is planted here.
             fixed_len: u32::MAX,
@@ -332,14 +332,14 @@ impl Forest {
         let made_children = after_lights + u32::from(!far.is_empty()) - 1;
         let children = made_children + scene.inserted_bodies().len() as u32;
         self.push_fixed(Kind::Light, 0, children);
-        self.nodes[0].fan = Fan::other(1);
+        self.nodes[0].children = ChildRange::other(1);
         self.fixed_mut().made_children = made_children;
         self.fixed_mut().child_counts[0] =
             u16::try_from(children).expect("fewer than 65,536 lights and inserted bodies");
         for (light, id) in (first_light..after_lights).enumerate() {
             self.fixed_mut().subjects[id as usize] = light as u32;
-            let twins = &mut self.twins[id as usize];
-            (twins.facet, twins.path) = (id, 1);
+            let siblings = &mut self.siblings[id as usize];
+            (siblings.facet, siblings.path) = (id, 1);
         }
         Rows { near, far, after_lights, first_inserted: made_children + 1 }
     }
@@ -375,8 +375,8 @@ impl Forest {
     fn push_fixed(&mut self, kind: Kind, parent: u32, count: u32) -> u32 {
         let first = self.nodes.len() as u32;
         let len = self.nodes.len() + count as usize;
-        self.nodes.resize(len, Node { fan: Fan::LEAF, ..Node::VACANT });
-        self.twins.resize(len, Twins { parent, ..Twins::VACANT });
+        self.nodes.resize(len, Node { children: ChildRange::LEAF, ..Node::VACANT });
+        self.siblings.resize(len, Siblings { parent, ..Siblings::VACANT });
         let fixed = self.fixed_mut();
         fixed.kinds.resize(len, kind);
         fixed.child_counts.resize(len, 0);
@@ -500,8 +500,8 @@ impl Forest {
         fixed.charts[at as usize] = Chart::of(&shape);
         fixed.facets.push(ElementId(at));
         self.nodes[at as usize].place = Place::whole(shape.len);
-        let twins = &mut self.twins[at as usize];
-        (twins.facet, twins.path) = (at, 1);
+        let siblings = &mut self.siblings[at as usize];
+        (siblings.facet, siblings.path) = (at, 1);
         self.counts.elements += 1;
         self.counts.leaves += 1;
     }
@@ -514,7 +514,7 @@ impl Forest {
 
     fn add_children(&mut self, at: u32, count: u16) -> u32 {
         let first = self.push_fixed(Kind::Cluster, at, u32::from(count));
-        self.nodes[at as usize].fan = Fan::other(first);
+        self.nodes[at as usize].children = ChildRange::other(first);
         self.fixed_mut().child_counts[at as usize] = count;
         first
     }
@@ -597,8 +597,8 @@ impl Forest {
             + self.loose.capacity()
             + self.changed.capacity();
         let nodes = self.nodes.capacity() * size_of::<Node>();
-        let twins = self.twins.capacity() * size_of::<Twins>();
-        (nodes + twins + lists * 4) as u64
+        let siblings = self.siblings.capacity() * size_of::<Siblings>();
+        (nodes + siblings + lists * 4) as u64
     }
 
     /// Bytes held once by all clones of this forest: none of them grows when elements are split.
@@ -622,7 +622,7 @@ impl Forest {
 
     /// Index of what a node has in common with its twin.
     #[inline]
-    fn twins_of(&self, id: u32) -> usize {
+    fn siblings_of(&self, id: u32) -> usize {
         match id.checked_sub(self.fixed_len) {
             None => id as usize,
             Some(beyond) => self.fixed_len as usize + beyond as usize / 2,
@@ -630,8 +630,8 @@ impl Forest {
     }
 
     #[inline]
-    fn twins(&self, id: ElementId) -> &Twins {
-        &self.twins[self.twins_of(id.0)]
+    fn siblings(&self, id: ElementId) -> &Siblings {
+        &self.siblings[self.siblings_of(id.0)]
     }
 
     /// What the node is.
@@ -640,26 +640,26 @@ impl Forest {
         if id.0 < self.fixed_len {
             return self.fixed.kinds[id.0 as usize];
         }
-        if self.nodes[id.0 as usize].fan.is_other() { Kind::Vacant } else { Kind::Element }
+        if self.nodes[id.0 as usize].children.is_other() { Kind::Vacant } else { Kind::Element }
     }
 
     /// The node's parent; `None` for the root.
     #[inline]
     pub fn parent(&self, id: ElementId) -> Option<ElementId> {
-        let parent = self.twins(id).parent;
+        let parent = self.siblings(id).parent;
         (parent != NONE).then_some(ElementId(parent))
     }
 
     /// Ids of the node's children; empty for a leaf.
     #[inline]
     pub fn children(&self, id: ElementId) -> Range<u32> {
-        let fan = self.nodes[id.0 as usize].fan;
-        if !fan.is_other() {
-            return fan.range();
+        let children = self.nodes[id.0 as usize].children;
+        if !children.is_other() {
+            return children.range();
         }
         // Vacant room has none.
         let count = self.fixed.child_counts.get(id.0 as usize).map_or(0, |n| u32::from(*n));
-        fan.first()..fan.first() + count
+        children.first()..children.first() + count
     }
 
     /// Area, m2; 0 for a light and for what is distant. Exact up to single precision.
@@ -722,15 +722,15 @@ impl Forest {
                 Some(PatchId(self.fixed.subjects[id.0 as usize]))
             }
             Some(_) => None,
-            None if self.nodes[id.0 as usize].fan.is_other() => None,
-            None => Some(PatchId(self.fixed.subjects[self.twins(id).facet as usize])),
+            None if self.nodes[id.0 as usize].children.is_other() => None,
+            None => Some(PatchId(self.fixed.subjects[self.siblings(id).facet as usize])),
         }
     }
 
     /// The node of the fixed part that an element is in; the node itself for any other.
     #[inline]
     pub fn fixed(&self, id: ElementId) -> ElementId {
-        if id.0 < self.fixed_len { id } else { ElementId(self.twins(id).facet) }
+        if id.0 < self.fixed_len { id } else { ElementId(self.siblings(id).facet) }
     }
 
     /// Index of a light in the scene.
@@ -781,11 +781,12 @@ impl Forest {
     /// The name of an element or light that does not depend on history.
     #[inline]
     pub fn key(&self, id: ElementId) -> ElementKey {
-        let twins = self.twins(id);
+        let siblings = self.siblings(id);
         // Beyond the fixed part twins are an even number of ids from its end.
         let second = if id.0 < self.fixed_len { 0 } else { (id.0 - self.fixed_len) & 1 };
-        let facet = self.fixed.names.get(twins.facet as usize).copied().unwrap_or(twins.facet);
-        ElementKey { facet, path: twins.path + second }
+        let facet =
+            self.fixed.names.get(siblings.facet as usize).copied().unwrap_or(siblings.facet);
+        ElementKey { facet, path: siblings.path + second }
     }
 
     /// The facet, light or group of a name.
@@ -814,7 +815,7 @@ impl Forest {
 
     #[inline]
     fn chart(&self, id: ElementId) -> &Chart {
-        &self.fixed.charts[self.twins(id).facet as usize]
+        &self.fixed.charts[self.siblings(id).facet as usize]
     }
 
     /// Index of the coarse element that holds this one, if coarse elements have been numbered.
@@ -822,7 +823,7 @@ impl Forest {
     pub fn coarse(&self, id: ElementId) -> Option<usize> {
         let coarse = match self.fixed.coarse.get(id.0 as usize) {
             Some(number) => *number,
-            None => self.twins(id).coarse,
+            None => self.siblings(id).coarse,
         };
         (coarse != NONE).then_some(coarse as usize)
     }
@@ -933,7 +934,7 @@ impl Forest {
         self.kept_len = self.nodes.len() as u32;
         self.changed = Vec::new();
         self.nodes.shrink_to_fit();
-        self.twins.shrink_to_fit();
+        self.siblings.shrink_to_fit();
         self.fixed_mut().coarse.shrink_to_fit();
     }
 
@@ -950,14 +951,15 @@ impl Forest {
         }
         assert!(self.kind(id) == Kind::Element && self.can_split(id), "{id:?} cannot be split");
         let (key, place, chart) = (self.key(id), self.nodes[id.0 as usize].place, *self.chart(id));
-        let facet = self.twins(id).facet;
+        let facet = self.siblings(id).facet;
         let coarse = self.coarse(id).map_or(NONE, |number| number as u32);
         let (places, count) = place.children(chart.len, chart.shape(&place).cut());
         let first = self.room_for(count);
         for (k, place) in places[..count].iter().enumerate() {
             let shape = chart.shape(place);
             let area_m2 = shape.area() as f32;
-            self.nodes[first as usize + k] = Node { place: *place, fan: Fan::LEAF, area_m2 };
+            self.nodes[first as usize + k] =
+                Node { place: *place, children: ChildRange::LEAF, area_m2 };
             if self.exposed.contains_key(&id.0) {
                 let exposed_m2 = exposed_m2(&shape, self.covered(id)) as f32;
                 if exposed_m2 < area_m2 {
@@ -966,12 +968,12 @@ impl Forest {
             }
         }
         for k in (0..count as u32).step_by(2) {
-            let twins = self.twins_of(first + k);
+            let siblings = self.siblings_of(first + k);
             let path = key.path << 2 | k;
-            self.twins[twins] = Twins { parent: id.0, facet, path, coarse, users: 0 };
+            self.siblings[siblings] = Siblings { parent: id.0, facet, path, coarse, users: 0 };
         }
         *self.users(first) = 1;
-        self.nodes[id.0 as usize].fan = Fan::new(first, count);
+        self.nodes[id.0 as usize].children = ChildRange::new(first, count);
         self.counts.elements += count as u64;
         self.counts.leaves += count as u64 - 1;
         self.changed.push(id);
@@ -982,16 +984,16 @@ impl Forest {
         self.vacant[count / 4].pop().unwrap_or_else(|| {
             let first = self.nodes.len();
             self.nodes.resize(first + count, Node::VACANT);
-            let twins = self.twins_of((first + count) as u32);
-            self.twins.resize(twins, Twins::VACANT);
+            let siblings = self.siblings_of((first + count) as u32);
+            self.siblings.resize(siblings, Siblings::VACANT);
             first as u32
         })
     }
 
     /// Users of the element whose first child this is.
     fn users(&mut self, first_child: u32) -> &mut u32 {
-        let twins = self.twins_of(first_child);
-        &mut self.twins[twins].users
+        let siblings = self.siblings_of(first_child);
+        &mut self.siblings[siblings].users
     }
 
     /// Takes back one use of an element's children; [`Forest::reap`] removes what has none left.
@@ -999,7 +1001,7 @@ impl Forest {
     /// # Panics
     /// If there is no user.
     pub fn release(&mut self, id: ElementId) {
-        let users = self.users(self.nodes[id.0 as usize].fan.first());
+        let users = self.users(self.nodes[id.0 as usize].children.first());
         *users = users.checked_sub(1).expect("released more often than split");
         if *users == 0 {
             self.loose.push(id.0);
@@ -1027,7 +1029,7 @@ impl Forest {
         self.counts.elements -= count;
         self.counts.leaves -= count - 1;
         for child in children.clone() {
-            let below = self.nodes[child as usize].fan.range();
+            let below = self.nodes[child as usize].children.range();
             debug_assert!(
                 below.is_empty() || *self.users(below.start) == 0,
                 "a child outlives its parent's pair"
@@ -1037,11 +1039,11 @@ impl Forest {
             self.exposed.remove(&child);
         }
         for first in children.clone().step_by(2) {
-            let twins = self.twins_of(first);
-            self.twins[twins] = Twins::VACANT;
+            let siblings = self.siblings_of(first);
+            self.siblings[siblings] = Siblings::VACANT;
         }
         self.vacant[children.len() / 4].push(children.start);
-        self.nodes[id.0 as usize].fan = Fan::LEAF;
+        self.nodes[id.0 as usize].children = ChildRange::LEAF;
         self.changed.push(id);
         count
     }
@@ -1057,25 +1059,26 @@ impl Forest {
     pub fn compact(&mut self) -> Renumbering {
         let kept = self.kept_len as usize;
         let alive = self.nodes.len() - self.vacant_len();
-        let twins = self.twins_of(alive as u32);
-        let (old, old_twins) = (std::mem::take(&mut self.nodes), std::mem::take(&mut self.twins));
+        let siblings = self.siblings_of(alive as u32);
+        let (old, old_siblings) =
+            (std::mem::take(&mut self.nodes), std::mem::take(&mut self.siblings));
         self.nodes.reserve_exact(alive);
-        self.twins.reserve_exact(twins);
+        self.siblings.reserve_exact(siblings);
         self.nodes.extend_from_slice(&old[..kept]);
-        self.twins.extend_from_slice(&old_twins[..self.twins_of(self.kept_len)]);
+        self.siblings.extend_from_slice(&old_siblings[..self.siblings_of(self.kept_len)]);
         let mut old_of: Vec<u32> = (0..self.kept_len).collect();
         let mut at = 0;
         while at < self.nodes.len() {
-            let fan = self.nodes[at].fan;
-            if !fan.is_other() && fan.first() >= self.kept_len {
+            let children = self.nodes[at].children;
+            if !children.is_other() && children.first() >= self.kept_len {
                 let first = self.nodes.len() as u32;
-                let children = fan.range();
-                self.nodes[at].fan = Fan::new(first, children.len());
+                let children = children.range();
+                self.nodes[at].children = ChildRange::new(first, children.len());
                 self.nodes.extend_from_slice(&old[children.start as usize..children.end as usize]);
                 old_of.extend(children.clone());
                 for child in children.step_by(2) {
-                    let twins = old_twins[self.twins_of(child)];
-                    self.twins.push(Twins { parent: at as u32, ..twins });
+                    let siblings = old_siblings[self.siblings_of(child)];
+                    self.siblings.push(Siblings { parent: at as u32, ..siblings });
                 }
             }
             at += 1;
@@ -1092,7 +1095,7 @@ impl Forest {
     /// Gives back room beyond a small reserve.
     pub fn trim(&mut self) {
         self.nodes.shrink_to(self.nodes.len() + self.nodes.len() / SLACK);
-        self.twins.shrink_to(self.twins.len() + self.twins.len() / SLACK);
+        self.siblings.shrink_to(self.siblings.len() + self.siblings.len() / SLACK);
         self.vacant.iter_mut().for_each(|list| list.shrink_to(2 * list.len()));
     }
 }
@@ -1175,11 +1178,12 @@ fn names_in(len: u32, beds: &[Bed]) -> Vec<u32> {
 }
 
 impl Node {
-    const VACANT: Node = Node { place: Place::WHOLE, fan: Fan::OTHER, area_m2: 0.0 };
+    const VACANT: Node = Node { place: Place::WHOLE, children: ChildRange::OTHER, area_m2: 0.0 };
 }
 
-impl Twins {
-    const VACANT: Twins = Twins { parent: NONE, facet: NONE, path: 0, coarse: NONE, users: 0 };
+impl Siblings {
+    const VACANT: Siblings =
+        Siblings { parent: NONE, facet: NONE, path: 0, coarse: NONE, users: 0 };
 }
 
 /// Box of a body where it is at time 0, or in its own frame if it is absent then.

@@ -7,9 +7,9 @@
 use glam::{DVec2, DVec3};
 
 use crate::element::ElementId;
-use crate::event::Foresight;
 use crate::geometry::{Aabb, shaft_meets_box};
-use crate::pair::{Moves, Outlook};
+use crate::pair::{CertificateTests, Moves};
+use crate::predict::MotionBounds;
 use crate::scene::{BodyId, Drift};
 
 use super::forest::FlatForest;
@@ -18,11 +18,11 @@ use super::scene::{BodyIndex, FlatScene};
 use super::view::PlaneView;
 
 /// A scene in the plane at one instant, with what comes.
-pub(super) struct FlatOutlook<'a> {
+pub(super) struct PlaneCertificateTests<'a> {
     pub(super) scene: &'a FlatScene,
     pub(super) forest: &'a FlatForest,
     pub(super) now: &'a PlaneView,
-    pub(super) ahead: &'a Foresight,
+    pub(super) motion_bounds: &'a MotionBounds,
 }
 
 /// Two ends of a pair as far as shafts are concerned.
@@ -45,9 +45,9 @@ const CLEAR: f64 = 1e-9;
 /// what touches.
 const ALIKE: f64 = 0.01;
 
-impl Outlook for FlatOutlook<'_> {
-    fn ahead(&self) -> &Foresight {
-        self.ahead
+impl CertificateTests for PlaneCertificateTests<'_> {
+    fn motion_bounds(&self) -> &MotionBounds {
+        self.motion_bounds
     }
 
     fn rest(&self, h: usize, a: ElementId, b: ElementId) -> bool {
@@ -61,7 +61,7 @@ impl Outlook for FlatOutlook<'_> {
         let Some(ends) = self.ends(h, a, b) else { return true };
         let own = ends.bodies.0;
         if self.rests(h, own) {
-            let mut movers = self.ahead.movers(h);
+            let mut movers = self.motion_bounds.movers(h);
             return movers.any(|BodyId(mover)| self.may_block(h, &ends, BodyIndex(mover)));
         }
         // Seen from a moving body, everything else moves.
@@ -117,13 +117,13 @@ fn least_m(s: &Segment, by: &Aabb) -> f64 {
     axis(s.start.x, s.end.x).max(axis(s.start.y, s.end.y)) - longest(by)
 }
 
-impl FlatOutlook<'_> {
+impl PlaneCertificateTests<'_> {
     fn bodies(&self) -> impl Iterator<Item = BodyIndex> {
         (0..self.scene.bodies().len() as u32).map(BodyIndex)
     }
 
     fn drift(&self, h: usize, body: BodyIndex) -> Drift {
-        self.ahead.drift(h, BodyId(body.0))
+        self.motion_bounds.drift(h, BodyId(body.0))
     }
 
     fn rests(&self, h: usize, body: BodyIndex) -> bool {

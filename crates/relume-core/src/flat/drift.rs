@@ -3,8 +3,8 @@
 
 use glam::DVec2;
 
-use crate::event::KnownMotion;
 use crate::geometry::Aabb;
+use crate::predict::KnownMotion;
 use crate::scene::{BodyId, Drift};
 
 use super::plane::in_space;

@@ -5,13 +5,13 @@ use std::ops::Range;
 use glam::DVec2;
 
 use crate::element::{ElementId, ElementKey};
-use crate::event::{Foresight, Lookahead, Tick};
 use crate::pair::{
-    Carried, CullReason, Finding, Gradients, Hierarchy, Judge, Judgement, Margin, Outlook, Side,
-    Stale, Verdict, in_steps,
+    Carried, CertificateTests, CullReason, Finding, Gradients, Hierarchy, Judge, Judgement, Margin,
+    Side, Stale, Verdict, in_steps,
 };
+use crate::predict::{Lookahead, MotionBounds, Tick};
 
-use super::certificate::FlatOutlook;
+use super::certificate::PlaneCertificateTests;
 use super::forest::{FlatForest, FlatKind};
 use super::plane::Segment;
 use super::scene::{BodyIndex, FlatScene};
@@ -19,7 +19,7 @@ use super::strings::Shaft;
 use super::view::PlaneView;
 
 /// The forest of the plane placed at one instant, with what decides.
-pub(crate) struct FlatPlaced<'a> {
+pub(crate) struct PlaneJudge<'a> {
     pub(super) scene: &'a FlatScene,
     pub(super) forest: &'a mut FlatForest,
     pub(super) now: &'a PlaneView,
@@ -32,7 +32,7 @@ pub(crate) struct FlatPlaced<'a> {
     /// Links carry no gradients.
     pub(super) constant: bool,
     /// What the known motion allows next; `None` where certificates are not asked for.
-    pub(super) ahead: Option<&'a Foresight>,
+    pub(super) motion_bounds: Option<&'a MotionBounds>,
     pub(super) lookahead: Option<Lookahead>,
 }
 
@@ -46,7 +46,7 @@ struct Ends {
     walls: (u32, u32),
 }
 
-impl Hierarchy for FlatPlaced<'_> {
+impl Hierarchy for PlaneJudge<'_> {
     fn children(&self, id: ElementId) -> Range<u32> {
         self.forest.children(id)
     }
@@ -73,7 +73,7 @@ impl Hierarchy for FlatPlaced<'_> {
     }
 }
 
-impl Judge for FlatPlaced<'_> {
+impl Judge for PlaneJudge<'_> {
     fn judge(
         &self,
         (a, b): (ElementId, ElementId),
@@ -143,12 +143,12 @@ impl Judge for FlatPlaced<'_> {
         true
     }
 
-    fn dimmed(&self, _: ElementId, _: ElementId) -> bool {
+    fn brightness_changed(&self, _: ElementId, _: ElementId) -> bool {
         false
     }
 
-    fn certified(&self, due: Tick) -> bool {
-        self.ahead.is_some_and(|ahead| ahead.holds(due))
+    fn certified(&self, until: Tick) -> bool {
+        self.motion_bounds.is_some_and(|motion_bounds| motion_bounds.holds(until))
     }
 
     fn lookahead(&self) -> Option<&Lookahead> {
@@ -167,13 +167,13 @@ impl Judge for FlatPlaced<'_> {
             .is_some_and(|shaft| !narrowed.iter().any(|wall| enters(&shaft, wall)))
     }
 
-    fn foresee(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick {
-        let Some(ahead) = self.ahead else { return 0 };
+    fn expiry(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick {
+        let Some(motion_bounds) = self.motion_bounds else { return 0 };
         let (scene, forest, now) = (self.scene, &*self.forest, self.now);
-        FlatOutlook { scene, forest, now, ahead }.until(a, b, finding)
+        PlaneCertificateTests { scene, forest, now, motion_bounds }.until(a, b, finding)
     }
 
-    fn holds(&self, _: ElementId, _: ElementId) -> bool {
+    fn is_coarse_pair(&self, _: ElementId, _: ElementId) -> bool {
         false
     }
 }
@@ -201,7 +201,7 @@ fn gradients(ends: &Ends, blockers: &[Segment]) -> Gradients {
     Gradients::new(slope(&ends.a, &ends.b), slope(&ends.b, &ends.a))
 }
 
-impl FlatPlaced<'_> {
+impl PlaneJudge<'_> {
     fn are_elements(&self, a: ElementId, b: ElementId) -> bool {
         self.forest.is_element(a) && self.forest.is_element(b)
     }

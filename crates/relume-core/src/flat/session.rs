@@ -19,7 +19,7 @@ pub struct FlatSession {
     seed: FlatForest,
     solved: Option<FlatSolved>,
     /// Time that dynamic links of a cold build are counted from.
-    came_from: Option<f64>,
+    count_motion_from: Option<f64>,
 }
 
 impl FlatSession {
@@ -31,7 +31,7 @@ impl FlatSession {
         options.check()?;
         scene.check()?;
         let seed = FlatForest::new(&scene);
-        Ok(FlatSession { scene, options, seed, solved: None, came_from: None })
+        Ok(FlatSession { scene, options, seed, solved: None, count_motion_from: None })
     }
 
     /// The scene being solved.
@@ -58,9 +58,10 @@ impl FlatSession {
         let last = self.solved.take();
         let back = last.as_ref().map(|last| (last.space.view.clone(), last.said()));
         let view = PlaneView::new(&self.scene, time_s);
-        let came_from = self.came_from.take().map(|from_s| PlaneView::new(&self.scene, from_s));
+        let count_motion_from =
+            self.count_motion_from.take().map(|from_s| PlaneView::new(&self.scene, from_s));
         let last_view = back.as_ref().map(|(view, _)| view);
-        let goal = self.goal(&view, came_from.as_ref().or(last_view));
+        let goal = self.goal(&view, count_motion_from.as_ref().or(last_view));
         let moved = last_view.map_or(Vec::new(), |last_view| self.moved(last_view, &view));
         let label = FrameReport { frame, time_s, moved, ..FrameReport::default() };
         match Follower::follow(last, &goal, &Order { max_memory_bytes, ..self.order(label) }) {
@@ -112,8 +113,8 @@ impl FlatSession {
 
     /// Says at which time the frame before the next step was, where that is not the last step:
     /// [`FrameReport::dynamic_links`] of a cold build count from there. Nothing else depends on it.
-    pub fn came_from(&mut self, time_s: Option<f64>) {
-        self.came_from = time_s;
+    pub fn count_motion_from(&mut self, time_s: Option<f64>) {
+        self.count_motion_from = time_s;
     }
 
     /// Bytes that the engine's structures hold now.

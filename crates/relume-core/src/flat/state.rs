@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use crate::element::ElementId;
 use crate::follow::{
-    Ahead, Balance, Clocked, Follower, FrameReport, Level, Motion, Space, Update, Void, balance_of,
+    Balance, Clocked, Follower, FrameReport, Level, Motion, Prediction, Space, Update, Void,
+    balance_of,
 };
 use crate::pair::{Link, PairTree};
 use crate::solver::Radiosity;
 
 use super::forest::FlatForest;
-use super::judge::FlatPlaced;
+use super::judge::PlaneJudge;
 use super::options::FlatOptions;
 use super::scene::{BodyIndex, FlatScene};
 use super::surfaces::LitPlane;
@@ -41,14 +42,14 @@ pub struct PlaneState {
 impl Space for PlaneState {
     type Goal<'g> = FlatGoal<'g>;
     type Was = PlaneView;
-    type Since<'m> = &'m PlaneView;
-    type Judge<'j> = FlatPlaced<'j>;
+    type Change<'m> = &'m PlaneView;
+    type Judge<'j> = PlaneJudge<'j>;
     type Forest = FlatForest;
-    type Lit<'l> = LitPlane<'l>;
+    type LitSurfaces<'l> = LitPlane<'l>;
 
     const ROOT: ElementId = FlatForest::ROOT;
 
-    fn blank(goal: &FlatGoal<'_>) -> PlaneState {
+    fn unsolved(goal: &FlatGoal<'_>) -> PlaneState {
         let &FlatGoal { scene, seed, view, .. } = goal;
         PlaneState { scene: Arc::clone(scene), forest: seed.clone(), view: view.clone() }
     }
@@ -69,18 +70,18 @@ impl Space for PlaneState {
         std::mem::replace(&mut self.view, goal.view.clone())
     }
 
-    fn since<'m>(&self, _: &FlatGoal<'_>, was: &'m PlaneView) -> &'m PlaneView {
+    fn change<'m>(&self, _: &FlatGoal<'_>, was: &'m PlaneView) -> &'m PlaneView {
         was
     }
 
-    fn ahead(
+    fn prediction(
         &self,
         _: &FlatGoal<'_>,
         _: &PlaneView,
         update: Update,
         clocked: Clocked<'_>,
-    ) -> Ahead {
-        Ahead::new(update, &*self.scene, clocked, Void::default())
+    ) -> Prediction {
+        Prediction::new(update, &*self.scene, clocked, Void::default())
     }
 
     fn candidates(goal: &FlatGoal<'_>) -> Vec<u32> {
@@ -92,17 +93,17 @@ impl Space for PlaneState {
         goal: &'j FlatGoal<'_>,
         _: Level,
         motion: &Motion<'j, &PlaneView>,
-    ) -> FlatPlaced<'j> {
-        FlatPlaced {
+    ) -> PlaneJudge<'j> {
+        PlaneJudge {
             scene: goal.scene,
             forest: &mut self.forest,
             now: &self.view,
-            before: motion.since.copied(),
+            before: motion.change.copied(),
             epsilon: goal.options.epsilon,
             min_length_m: goal.options.min_length_m,
             constant: goal.options.constant,
-            ahead: motion.ahead.foresight.as_ref(),
-            lookahead: motion.ahead.lookahead,
+            motion_bounds: motion.prediction.motion_bounds.as_ref(),
+            lookahead: motion.prediction.lookahead,
         }
     }
 
@@ -122,7 +123,7 @@ impl Space for PlaneState {
         Radiosity::new(lit)
     }
 
-    fn lit(&self, _: &FlatGoal<'_>, _: bool) -> LitPlane<'_> {
+    fn surfaces(&self, _: &FlatGoal<'_>, _: bool) -> LitPlane<'_> {
         LitPlane::new(&self.scene, &self.forest)
     }
 
@@ -134,7 +135,7 @@ impl Space for PlaneState {
         goal.options.residual
     }
 
-    fn most_mean_w_m2(goal: &FlatGoal<'_>) -> f64 {
+    fn mean_radiosity_bound_w_m2(goal: &FlatGoal<'_>) -> f64 {
         let (mut emitted, mut length_m, mut rho) = (0.0, 0.0, 0.0_f64);
         for wall in goal.scene.walls() {
             let long = wall.local.length();
@@ -153,8 +154,8 @@ impl Space for PlaneState {
     fn balance(state: &FlatSolved) -> Balance {
         let PlaneState { scene, forest, .. } = &state.space;
         let facets = forest.facets().iter().copied();
-        let lit = (&state.links, &state.radiosity);
-        let (rows, energy) = balance_of(&LitPlane::new(scene, forest), lit, facets, &|_| true);
+        let solution = (&state.links, &state.radiosity);
+        let (rows, energy) = balance_of(&LitPlane::new(scene, forest), solution, facets, &|_| true);
         Balance { rows, energy, suspects: Vec::new() }
     }
 

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::element::ElementId;
 use crate::follow::Receivers;
-use crate::solver::{Lit, Place, Surfaces};
+use crate::solver::{FacetMaterial, Place, Surfaces};
 
 use super::forest::FlatForest;
 use super::scene::{FlatScene, Wall};
@@ -26,13 +26,13 @@ impl Receivers for FlatForest {
 /// The forest of the plane as the solver sees it: an area is a length, and nothing varies across.
 pub(crate) struct LitPlane<'a> {
     forest: &'a FlatForest,
-    lit: Vec<Lit>,
+    lit: Vec<FacetMaterial>,
 }
 
 impl<'a> LitPlane<'a> {
     pub(super) fn new(scene: &FlatScene, forest: &'a FlatForest) -> LitPlane<'a> {
         let single = |v: [f64; 3]| v.map(|x| x as f32);
-        let of = |wall: &Wall| Lit {
+        let of = |wall: &Wall| FacetMaterial {
             reflectance: single(wall.material.reflectance),
             exitance: single(wall.material.exitance),
         };
@@ -89,7 +89,7 @@ impl Surfaces for LitPlane<'_> {
         1.0 / 3.0
     }
 
-    fn lit(&self, facet: u32) -> &Lit {
+    fn material(&self, facet: u32) -> &FacetMaterial {
         &self.lit[self.forest.wall(ElementId(facet)).0.0 as usize]
     }
 }

@@ -1,4 +1,4 @@
-//! What an update may hold: pairs and elements as they are, and what is made of them later.
+//! Memory budget of an update: pairs and elements, and the links and radiosities made of them later.
 //!
 //! Must not know space, light or what else the process holds.
 

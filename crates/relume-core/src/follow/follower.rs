@@ -1,7 +1,7 @@
-//! A solved state, whatever it is of.
+//! The solved state of a space.
 
-use crate::event::Ticks;
 use crate::pair::{LinkEvent, PairHash, PairTree};
+use crate::predict::Ticks;
 use crate::solver::{Links, Radiosity};
 
 use super::report::FrameReport;
@@ -10,26 +10,26 @@ use super::report::FrameReport;
 pub struct Follower<S> {
     /// Time of the clip, seconds.
     pub(crate) time_s: f64,
-    /// Where everything is.
+    /// Elements and their places.
     pub(crate) space: S,
     pub(crate) tree: PairTree,
     pub(crate) hash: PairHash,
     pub(crate) links: Links,
     pub(crate) radiosity: Radiosity,
-    /// What happened to links in the last frame, where that is kept.
+    /// Events of links in the last frame, if they are kept.
     pub(crate) events: Vec<LinkEvent>,
     pub(crate) report: FrameReport,
-    /// By which certificates expire.
+    /// Clock of the certificates.
     pub(super) ticks: Ticks,
-    /// Mean radiosity when no link was extrapolated last, W/m2.
-    pub(super) sound_mean_w_m2: f64,
-    /// Whether something moved that no motion foresaw.
+    /// Mean radiosity of the last solution without extrapolated links, W/m2.
+    pub(super) last_exact_mean_w_m2: f64,
+    /// Whether a body moved otherwise than predicted.
     pub(super) is_broken: bool,
-    /// Whether the radiosities say nothing.
-    pub(super) is_dim: bool,
+    /// Whether there is no solution yet to start the solver from.
+    pub(super) is_unsolved: bool,
 }
 
-/// Why there is no solution.
+/// Reason why a frame has no solution.
 #[derive(Clone, Debug)]
 pub(crate) enum Why {
     /// There is no memory for more pairs.
@@ -38,12 +38,12 @@ pub(crate) enum Why {
     Cancelled,
     /// Light does not settle.
     Unsettled {
-        /// What the last sweep left, relative to the mean radiosity.
+        /// Residual of the last sweep, relative to the mean radiosity.
         residual: f64,
         /// Names of the surfaces whose rows exceed 1 by most.
         surfaces: Vec<String>,
     },
-    /// What is absorbed and lost is not what is emitted.
+    /// Absorbed and escaped flux differ from the emitted flux.
     Unbalanced {
         /// Share of what is emitted.
         share: f64,
@@ -52,7 +52,7 @@ pub(crate) enum Why {
     },
 }
 
-/// What is said of a solution.
+/// Report and events of a solution.
 #[derive(Clone)]
 pub(crate) struct Said {
     pub(crate) report: FrameReport,
@@ -65,13 +65,13 @@ impl<S> Follower<S> {
         self.tree.live_count() == 0
     }
 
-    /// Is told that something moved that no motion foresaw.
+    /// Voids all certificates: a body moved otherwise than predicted.
     pub(crate) fn break_promise(&mut self) {
         self.tree.forget_certificates();
         self.is_broken = true;
     }
 
-    /// What is said of this solution.
+    /// Report and events of this solution.
     pub(crate) fn said(&self) -> Said {
         Said { report: self.report.clone(), events: self.events.clone() }
     }

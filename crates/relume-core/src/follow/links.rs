@@ -1,10 +1,10 @@
-//! Links by receiver, from the pairs of a tree: all at once, or by its edits.
+//! Links by receiver, built from the pairs of a tree or updated by its edits.
 
 use crate::element::ElementId;
 use crate::pair::{self, Edit, PairTree};
 use crate::solver::{Link, Links, LinksBuilder};
 
-/// Who receives over links: all that turning pairs into links asks of a hierarchy.
+/// Receivers of a hierarchy: what is needed to turn pairs into links.
 pub(crate) trait Receivers {
     /// Room for elements: ids are below this.
     fn room(&self) -> usize;

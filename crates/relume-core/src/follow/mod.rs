@@ -1,24 +1,24 @@
-//! Following a space from one instant to another: the phases of a frame.
+//! The frame loop: a solved state ([`Follower`]) and the phases that bring it to another instant.
 //!
-//! A [`Follower`] is a solved state, and its methods are the phases that bring it to another instant; what they ask of where
-//! things are they ask of its `Space`. Must not know polygons, segments, scenes or files.
+//! `phases` has the order of a frame (`Follower::frame`). Everything about places, emission and reflection is asked of the
+//! follower's `Space`, which space and plane implement. Must not know polygons, segments, scenes or files.
 
-mod ahead;
 mod budget;
 mod clock;
 mod follower;
 mod links;
 mod phases;
+mod prediction;
 mod report;
 mod space;
 mod tally;
 mod update;
 mod watch;
 
-pub(crate) use ahead::{Ahead, Clocked, Void};
 pub(crate) use follower::{Said, Why};
 pub(crate) use links::{Receivers, directions, set_pairs};
 pub(crate) use phases::{Failed, Order};
+pub(crate) use prediction::{Clocked, Prediction, Void};
 pub(crate) use space::{Balance, Level, Motion, Space};
 pub(crate) use tally::balance_of;
 

@@ -1,29 +1,29 @@
-//! The phases of a frame, which bring a solved state to another instant.
+//! The phases of a frame: move, predict, coarse, fine, edit, solve, tally (`Follower::frame`).
 //!
-//! Without a state to start from, the same phases build it: a cold build is the update of nothing.
+//! A cold build runs the same phases without a state to start from.
 
 use crate::element::ElementId;
-use crate::event::Ticks;
 use crate::pair::{
     Changes, Edit, OutOfMemory, PairHash, PairId, PairTree, Pairs, Record, Scope, update,
 };
+use crate::predict::Ticks;
 use crate::solver::{Dirty, Links, Radiosity};
 
-use super::ahead::{Ahead, Clocked, most_mean, while_extrapolated};
 use super::budget;
 use super::clock::Clock;
 use super::follower::{Follower, Said, Why};
 use super::links::{Receivers, apply_edits, links_of};
+use super::prediction::{Clocked, Prediction, mean_radiosity_limit, while_extrapolated};
 use super::report::{FrameReport, Memory, PairCounts};
 use super::space::{Balance, Level, Motion, Space};
 use super::update::Update;
 use super::watch::Watch;
 
-/// How a frame is made.
+/// Settings of one frame.
 pub(crate) struct Order<'a> {
-    /// The report to be: frame, time, and what moved.
+    /// Head of the report: frame, time, and names of moved bodies.
     pub(crate) label: FrameReport,
-    /// How the pairs follow the motion.
+    /// Strategy by which the pairs follow motion.
     pub(crate) update: Update,
     /// Whether events of links are kept.
     pub(crate) events: bool,
@@ -31,13 +31,13 @@ pub(crate) struct Order<'a> {
     pub(crate) balance: bool,
     /// Limit on memory, bytes.
     pub(crate) max_memory_bytes: Option<u64>,
-    /// What others see of the frame under way, and call it off by.
+    /// Progress of the frame for other threads, by which they may also cancel it.
     pub(crate) watch: Option<&'a Watch>,
 }
 
-/// A frame that came to nothing.
+/// A frame that failed.
 pub(crate) struct Failed<S> {
-    /// As it was left.
+    /// State at the failure.
     state: Follower<S>,
     is_cold: bool,
     pub(crate) why: Why,
@@ -48,18 +48,18 @@ struct Step<'f, 'g, S: Space> {
     goal: &'f S::Goal<'g>,
     order: &'f Order<'f>,
     was: &'f S::Was,
-    ahead: Ahead,
-    /// Whether there was nothing to start from.
+    prediction: Prediction,
+    /// Whether this is a cold build.
     is_cold: bool,
 }
 
-/// Share of the pairs' room that may be vacant.
+/// The pair tree is compacted when more than one pair in this many is vacant.
 const VACANT_PAIRS: usize = 16;
 
 // Spaces are the engine's own: nobody else has one to follow.
 #[allow(private_bounds)]
 impl<S: Space> Follower<S> {
-    /// The state that a goal asks for, from the last one where there is one.
+    /// The state at a goal, from the last state where there is one.
     pub(crate) fn follow(
         last: Option<Self>,
         goal: &S::Goal<'_>,
@@ -82,7 +82,7 @@ impl<S: Space> Follower<S> {
         }
     }
 
-    /// One frame, phase by phase.
+    /// One frame, phase by phase: the place where it is decided what is evaluated again.
     fn frame(
         last: Option<Self>,
         goal: &S::Goal<'_>,
@@ -90,19 +90,19 @@ impl<S: Space> Follower<S> {
     ) -> Result<Self, Box<Failed<S>>> {
         let (mut clock, mut report) = (Clock::start(), order.label.clone());
         let is_cold = last.is_none();
-        let mut state = last.unwrap_or_else(|| Follower::blank(goal, order.label.time_s));
+        let mut state = last.unwrap_or_else(|| Follower::unsolved(goal, order.label.time_s));
         let failed = |state, why| Err(Box::new(Failed { state, is_cold, why }));
 
         let was = state.space.go(goal);
-        let mut since = (!is_cold).then(|| state.space.since(goal, &was));
+        let mut change = (!is_cold).then(|| state.space.change(goal, &was));
         report.seconds.moving = clock.lap();
 
-        let ahead = state.predict(goal, &was, order, is_cold);
-        let step = Step { goal, order, was: &was, ahead, is_cold };
+        let prediction = state.predict(goal, &was, order, is_cold);
+        let step = Step { goal, order, was: &was, prediction, is_cold };
         report.seconds.predict = clock.lap();
 
-        let coarse = state.coarse(&step, &mut since);
-        let changes = coarse.and_then(|coarse| state.fine(&step, since.as_ref(), coarse));
+        let coarse = state.coarse(&step, &mut change);
+        let changes = coarse.and_then(|coarse| state.fine(&step, change.as_ref(), coarse));
         let Ok(changes) = changes else {
             let is_called_off = order.watch.is_some_and(Watch::is_cancelled);
             return failed(state, if is_called_off { Why::Cancelled } else { Why::OutOfMemory });
@@ -110,7 +110,7 @@ impl<S: Space> Follower<S> {
         report.seconds.evaluate = clock.lap();
 
         let edited = state.edit(&step, changes, &mut report);
-        report.seconds.judge = clock.lap();
+        report.seconds.edit = clock.lap();
 
         state.solve(&step, edited);
         report.seconds.solve = clock.lap();
@@ -125,11 +125,11 @@ impl<S: Space> Follower<S> {
         }
     }
 
-    /// Nothing but the elements to begin with and an unjudged root.
-    fn blank(goal: &S::Goal<'_>, time_s: f64) -> Self {
+    /// State without a solution: the initial elements and an unjudged root pair.
+    fn unsolved(goal: &S::Goal<'_>, time_s: f64) -> Self {
         Follower {
             time_s,
-            space: S::blank(goal),
+            space: S::unsolved(goal),
             tree: PairTree::new(S::ROOT),
             hash: PairHash::default(),
             links: Links::default(),
@@ -137,28 +137,28 @@ impl<S: Space> Follower<S> {
             events: Vec::new(),
             report: FrameReport::default(),
             ticks: Ticks::default(),
-            sound_mean_w_m2: 0.0,
+            last_exact_mean_w_m2: 0.0,
             is_broken: false,
-            is_dim: true,
+            is_unsolved: true,
         }
     }
 
-    /// Whether a frame may start from here: what was extrapolated cannot be taken along when time jumps or goes back, or a
-    /// hand takes hold.
+    /// Whether a frame may start from this state: extrapolated links cannot be kept when time jumps or goes back, or when a
+    /// command moves a body.
     fn leads_on(&self, goal: &S::Goal<'_>, order: &Order<'_>) -> bool {
         let goes_on = || self.ticks.goes_on(self.time_s, order.label.time_s);
         self.is_settled() || (!self.is_broken && goes_on() && self.space.goes_on(goal))
     }
 
-    /// Whether this is what a goal asks for.
+    /// Whether this state is that of a goal.
     fn is_at(&self, goal: &S::Goal<'_>) -> bool {
-        self.is_settled() && !self.is_dim && self.space.is_at(goal)
+        self.is_settled() && !self.is_unsolved && self.space.is_at(goal)
     }
 
-    /// The same state as that of another frame, in which nothing differs.
+    /// This state as that of another frame in which nothing differs.
     fn stay(mut self, goal: &S::Goal<'_>, label: &FrameReport) -> Self {
         if !self.space.stay(goal) || label.time_s < self.time_s {
-            // What was foreseen from a later time says nothing of an earlier one.
+            // Certificates from a later time do not cover an earlier one.
             self.ticks = Ticks::default();
             self.tree.forget_certificates();
         }
@@ -166,47 +166,47 @@ impl<S: Space> Follower<S> {
         Follower { time_s: label.time_s, events: Vec::new(), report, ..self }
     }
 
-    /// What the strategy predicts with from here on.
+    /// Prediction of the strategy from this frame on.
     fn predict(
         &mut self,
         goal: &S::Goal<'_>,
         was: &S::Was,
         order: &Order<'_>,
         is_cold: bool,
-    ) -> Ahead {
+    ) -> Prediction {
         self.is_broken = false;
         let to_s = order.label.time_s;
         let from_s = std::mem::replace(&mut self.time_s, to_s);
         if is_cold {
-            return Ahead::default();
+            return Prediction::default();
         }
         let (ticks, tree) = (&mut self.ticks, &mut self.tree);
-        self.space.ahead(goal, was, order.update, Clocked { ticks, tree, from_s, to_s })
+        self.space.prediction(goal, was, order.update, Clocked { ticks, tree, from_s, to_s })
     }
 
-    /// Brings the pairs down to the coarse elements up to date, and the coarse solution that verdicts weigh by.
+    /// Updates the pairs down to the coarse elements, and the coarse solution that verdicts weigh by.
     fn coarse(
         &mut self,
         step: &Step<'_, '_, S>,
-        since: &mut Option<S::Since<'_>>,
+        change: &mut Option<S::Change<'_>>,
     ) -> Result<Changes, OutOfMemory> {
         if !S::has_coarse(step.goal) {
             return Ok(Changes::default());
         }
-        let changes = self.bring(step, Level::Coarse, since.as_ref(), &[])?;
-        self.space.weigh(step.goal, step.was, &changes, since.as_mut());
+        let changes = self.bring(step, Level::Coarse, change.as_ref(), &[])?;
+        self.space.weigh(step.goal, step.was, &changes, change.as_mut());
         Ok(changes)
     }
 
-    /// Brings all pairs up to date, until every one is a link or culled.
+    /// Updates all pairs, until every leaf of the tree is a link or culled.
     fn fine(
         &mut self,
         step: &Step<'_, '_, S>,
-        since: Option<&S::Since<'_>>,
+        change: Option<&S::Change<'_>>,
         coarse: Changes,
     ) -> Result<Changes, OutOfMemory> {
         let mut all = coarse;
-        let fine = self.bring(step, Level::Fine, since, &all.refined)?;
+        let fine = self.bring(step, Level::Fine, change, &all.refined)?;
         all.work.add_after_coarse(fine.work);
         all.edits.extend(fine.edits);
         all.apart.extend(fine.apart);
@@ -214,12 +214,12 @@ impl<S: Space> Follower<S> {
         Ok(all)
     }
 
-    /// Brings pairs up to date, down to a level.
+    /// Updates pairs down to a level.
     fn bring(
         &mut self,
         step: &Step<'_, '_, S>,
         level: Level,
-        since: Option<&S::Since<'_>>,
+        change: Option<&S::Change<'_>>,
         fresh: &[PairId],
     ) -> Result<Changes, OutOfMemory> {
         let Step { goal, order, is_cold, .. } = step;
@@ -231,7 +231,7 @@ impl<S: Space> Follower<S> {
             });
             is_wanted && within(tree, elements, scratch)
         };
-        let motion = Motion { since, ahead: &step.ahead };
+        let motion = Motion { change, prediction: &step.prediction };
         let mut judge = self.space.judge(goal, level, &motion);
         let scope = Scope {
             candidates: &S::candidates(goal),
@@ -242,7 +242,7 @@ impl<S: Space> Follower<S> {
         update(Pairs { tree: &mut self.tree, hash: &mut self.hash }, &mut judge, &scope)
     }
 
-    /// Carries what changed of the pairs over to elements, links and groups.
+    /// Applies the changes of pairs to elements, links and groups.
     fn edit(
         &mut self,
         step: &Step<'_, '_, S>,
@@ -260,7 +260,7 @@ impl<S: Space> Follower<S> {
         Edited { dirty, sources_differ }
     }
 
-    /// Carries the changes of the pair tree over to links and elements; what is to be gathered anew.
+    /// Applies edits of the pair tree to links and elements; returns the receivers to be gathered.
     fn edit_links(
         &mut self,
         step: &Step<'_, '_, S>,
@@ -279,16 +279,16 @@ impl<S: Space> Follower<S> {
             Some(receivers)
         };
         let mut parents = self.space.take_changed();
-        let lit = self.space.lit(step.goal, false);
-        if self.is_dim {
-            self.radiosity = self.space.first_guess(step.goal, &lit);
+        let surfaces = self.space.surfaces(step.goal, false);
+        if self.is_unsolved {
+            self.radiosity = self.space.first_guess(step.goal, &surfaces);
             return Dirty::All;
         }
         let forest = self.space.forest();
         self.radiosity.extend(forest.room());
         let receives = |id: &u32| forest.receives(ElementId(*id));
         parents.retain(receives);
-        parents.iter().for_each(|&parent| self.radiosity.inherit(&lit, parent));
+        parents.iter().for_each(|&parent| self.radiosity.inherit(&surfaces, parent));
         match receivers {
             None => Dirty::All,
             Some(mut receivers) => {
@@ -298,40 +298,40 @@ impl<S: Space> Follower<S> {
         }
     }
 
-    /// Gathers who may have changed until the residual is small.
+    /// Solves for radiosity: gathers receivers that may have changed until the residual is small.
     fn solve(&mut self, step: &Step<'_, '_, S>, edited: Edited) {
         let Edited { dirty, sources_differ } = edited;
         let goal = step.goal;
-        let lit = self.space.lit(goal, matches!(dirty, Dirty::All));
+        let surfaces = self.space.surfaces(goal, matches!(dirty, Dirty::All));
         if sources_differ {
-            self.space.set_sources(goal, &lit, &mut self.radiosity);
+            self.space.set_sources(goal, &surfaces, &mut self.radiosity);
         }
-        let residual = S::residual(goal, self.is_dim);
-        let most_w_m2 = S::most_mean_w_m2(goal);
-        if let Some(dark) = self.space.if_dark(goal, &lit) {
-            // What is left of earlier light would fade for ever.
+        let residual = S::residual(goal, self.is_unsolved);
+        let bound_w_m2 = S::mean_radiosity_bound_w_m2(goal);
+        if let Some(dark) = self.space.if_dark(goal, &surfaces) {
+            // Light of earlier frames would decay without end.
             self.radiosity = dark;
         } else if self.is_settled() {
-            let bound = (residual, most_mean(most_w_m2));
-            self.radiosity.solve_bounded(&lit, &self.links, dirty, bound);
+            let bound = (residual, mean_radiosity_limit(bound_w_m2));
+            self.radiosity.solve_bounded(&surfaces, &self.links, dirty, bound);
         } else {
-            let mean = self.sound_mean_w_m2 * self.space.brightened(goal);
-            // From nothing on, no growth is too much.
+            let mean = self.last_exact_mean_w_m2 * self.space.brightened(goal);
+            // If the last exact solution was black, there is no growth bound.
             let mean = if mean > 0.0 { mean } else { f64::INFINITY };
-            let stop = while_extrapolated(residual, mean, most_w_m2);
-            self.radiosity.solve(&lit, &self.links, dirty, stop);
+            let stop = while_extrapolated(residual, mean, bound_w_m2);
+            self.radiosity.solve(&surfaces, &self.links, dirty, stop);
         }
-        self.is_dim = false;
+        self.is_unsolved = false;
         let is_settled = self.is_settled();
         if is_settled {
-            self.sound_mean_w_m2 = self.radiosity.mean_w_m2(&lit);
+            self.last_exact_mean_w_m2 = self.radiosity.mean_w_m2(&surfaces);
         }
-        drop(lit);
+        drop(surfaces);
         self.space.finish(is_settled);
     }
 
-    /// Puts elements and pairs together where much room is vacant, and gives back what is left over: memory follows the
-    /// present state, not the largest one met. Ids change, and nothing else does.
+    /// Compacts elements and pairs where many are vacant, and frees spare memory: memory follows the present state, not the
+    /// largest one so far. Only ids change.
     pub(crate) fn compact(&mut self) {
         if let Some(to) = self.space.compact() {
             self.links.renumber(&to);
@@ -347,7 +347,7 @@ impl<S: Space> Follower<S> {
         self.radiosity.trim();
     }
 
-    /// Counts what there is.
+    /// Counts pairs, elements and memory; measures the balance on request.
     fn tally(&self, step: &Step<'_, '_, S>, report: &mut FrameReport) {
         self.count(report);
         if step.order.balance {
@@ -360,7 +360,7 @@ impl<S: Space> Follower<S> {
         }
     }
 
-    /// Fills in the numbers of pairs and elements, and what the solver did last.
+    /// Fills in the numbers of pairs and elements, and the work of the solver.
     pub(crate) fn count(&self, report: &mut FrameReport) {
         let counts = self.tree.counts();
         report.hash = self.hash.to_string();
@@ -373,7 +373,7 @@ impl<S: Space> Follower<S> {
         report.residual = self.radiosity.residual;
     }
 
-    /// A solution of before found again, whatever it takes; from a state that leads there, where there is one.
+    /// An earlier solution, computed again without limits; from a given state where there is one.
     pub(crate) fn found_again(
         from: Option<Self>,
         goal: &S::Goal<'_>,
@@ -403,10 +403,10 @@ impl<S: Space> Follower<S> {
     }
 }
 
-/// What is to be gathered anew.
+/// Result of the edit phase.
 struct Edited {
     dirty: Dirty,
-    /// Whether sources that are no surfaces send otherwise.
+    /// Whether punctual lights or distant elements changed.
     sources_differ: bool,
 }
 
@@ -418,8 +418,8 @@ impl<S: Space> Failed<S> {
 
     /// A state from which a frame may lead back to where the failed one began; `None` where it began with nothing.
     ///
-    /// What a frame may have changed of a pair lies between its two instants, so a frame the other way finds it, however
-    /// far the first one came: the links are those of before, bit for bit.
+    /// A frame in the opposite direction re-evaluates every pair that the failed frame may have changed, however far that came:
+    /// the links are those of before, bit for bit.
     pub(crate) fn into_way_back(self) -> Option<Follower<S>> {
         let Failed { mut state, is_cold, why } = self;
         if is_cold || !state.is_settled() {
@@ -429,7 +429,7 @@ impl<S: Space> Failed<S> {
         state.ticks = Ticks::default();
         state.space.stop();
         // A solution that did not settle is no guess.
-        state.is_dim = !matches!(why, Why::OutOfMemory | Why::Cancelled);
+        state.is_unsolved = !matches!(why, Why::OutOfMemory | Why::Cancelled);
         Some(state)
     }
 }

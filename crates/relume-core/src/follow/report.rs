@@ -1,4 +1,4 @@
-//! What happened in a frame: exact counters, energies, seconds.
+//! Report of a frame: exact counters, energies, seconds.
 
 use serde::Serialize;
 
@@ -40,11 +40,11 @@ pub struct FrameReport {
     pub certified: u64,
     /// Pairs judged for the coarse solution, beforehand: all of them are visited again.
     pub coarse_examined: u64,
-    /// Of these, pairs judged because an end moved against the other, or for the first time.
+    /// Examined pairs that were judged because an end moved against the other, or for the first time.
     pub reevaluated: u64,
-    /// Of these, pairs of which only the visibility may have changed.
+    /// Examined pairs of which only the visibility may have changed.
     pub visibility_only: u64,
-    /// Of these, pairs of which only the light on their ends may have changed.
+    /// Examined pairs of which only the brightness of their ends may have changed.
     pub brightness_only: u64,
     /// Pairs of which the state, or what they carry as a link, differs from before.
     pub changed: u64,
@@ -66,16 +66,16 @@ pub struct FrameReport {
     pub gathers: u64,
     /// Largest change of radiosity that the last sweep left undone, relative to the mean radiosity.
     pub residual: f64,
-    /// How far the row sums of the form factors are from 1, where it was asked for.
+    /// Distance of the row sums of the form factors from 1, where it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row_sum_error: Option<RowSumError>,
-    /// Where the flux goes, summed over the three channels, where it was asked for.
+    /// Flux balance, summed over the three channels, where it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy: Option<Energy>,
     /// Errors of the solution, where they were estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy: Option<Accuracy>,
-    /// Where the balance is off, the surfaces that receive most light over rows that sum to more than 1.
+    /// Surfaces that receive most light over rows that sum to more than 1; empty unless the balance is off.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub suspects: Vec<String>,
     /// Hash over the active pairs with their exchange areas and visibilities, in key order.
@@ -149,7 +149,7 @@ pub struct Accuracy {
     pub mean: f64,
     /// Largest of the errors, with its sign: positive where the solution is too bright.
     pub largest: f64,
-    /// Where that is, metres.
+    /// Point of the largest error, metres.
     pub largest_at: [f64; 3],
 }
 
@@ -160,7 +160,7 @@ pub struct Memory {
     pub pairs: u64,
     /// Element forest, radiosities, and where each element's links are.
     pub elements: u64,
-    /// What is as large at every tolerance: the forest that builds start from, what is known of
+    /// Structures of the same size at every tolerance: the forest that builds start from, data of
     /// facets and clusters alone (one copy for all), the coarse solution.
     pub fixed: u64,
 }
@@ -175,8 +175,9 @@ pub struct Seconds {
     pub predict: f64,
     /// Exchange areas and visibilities.
     pub evaluate: f64,
-    /// Verdicts and edits.
-    pub judge: f64,
+    /// Edits of the links, the elements and the groups.
+    #[serde(rename = "judge")]
+    pub edit: f64,
     /// Gather, push, pull.
     pub solve: f64,
     /// The whole step.

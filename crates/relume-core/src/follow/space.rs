@@ -1,16 +1,16 @@
-//! What a follower asks of the space that it follows.
+//! The interface between the frame loop and a space: polygons in space, or segments in the plane.
 
 use crate::element::{ElementId, Renumbering};
 use crate::pair::{Changes, Judge, PairId, PairTree};
 use crate::solver::{Dirty, Radiosity, Surfaces};
 
-use super::ahead::{Ahead, Clocked};
 use super::follower::{Follower, Why};
 use super::links::Receivers;
+use super::prediction::{Clocked, Prediction};
 use super::report::{Energy, FrameReport, RowSumError};
 use super::update::Update;
 
-/// How far pairs are judged.
+/// Level down to which pairs are judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Level {
     /// Down to the coarse elements.
@@ -19,118 +19,118 @@ pub(crate) enum Level {
     Fine,
 }
 
-/// What pairs may feel of a motion: what lies behind, and what is known of what lies ahead.
-pub(crate) struct Motion<'m, Since> {
-    /// What happened since the last frame; `None` in a cold build.
-    pub(crate) since: Option<&'m Since>,
-    /// What is predicted with.
-    pub(crate) ahead: &'m Ahead,
+/// Motion as pairs see it: the change since the last frame, and the prediction.
+pub(crate) struct Motion<'m, Change> {
+    /// Change since the last frame; `None` in a cold build.
+    pub(crate) change: Option<&'m Change>,
+    /// Prediction from this frame on.
+    pub(crate) prediction: &'m Prediction,
 }
 
-/// Where the flux of a solution goes.
+/// Row sums and flux balance of a solution.
 pub(crate) struct Balance {
-    /// How far row sums are from 1.
+    /// Distance of row sums from 1.
     pub(crate) rows: RowSumError,
-    /// What is emitted, absorbed and lost.
+    /// Flux emitted, absorbed and escaped.
     pub(crate) energy: Energy,
-    /// Names of surfaces, where the balance is off.
+    /// Names of the surfaces where the balance is off.
     pub(crate) suspects: Vec<String>,
 }
 
-/// The part of a solved state that knows where things are: elements, their places, what they emit and reflect.
+/// The geometric part of a solved state: elements, their places, their emission and reflectance.
 ///
-/// Every method that takes a goal is asked within one frame, in the order in which they stand here.
+/// Methods that take a goal are called within one frame, in the order in which they stand here.
 pub(crate) trait Space: Sized + Send {
-    /// What a frame leads to, and what it is solved with.
+    /// World and options that a frame leads to.
     type Goal<'g>: Sync;
-    /// What was before the frame.
+    /// State before the frame, as far as later phases need it.
     type Was: Sync;
-    /// The difference between what was and what is, as pairs feel it.
-    type Since<'m>: Sync
+    /// Difference between the state before and now.
+    type Change<'m>: Sync
     where
         Self: 'm;
-    /// What decides on pairs.
+    /// Judge of pairs.
     type Judge<'j>: Judge
     where
         Self: 'j;
     /// The elements.
     type Forest: Receivers;
-    /// The elements with their light.
-    type Lit<'l>: Surfaces
+    /// Elements with exitance and reflectance, for the solver.
+    type LitSurfaces<'l>: Surfaces
     where
         Self: 'l;
 
-    /// The node of the forest that holds all.
+    /// Root node of the forest.
     const ROOT: ElementId;
 
     // Before a frame.
 
-    /// Elements as a cold build begins with them.
-    fn blank(goal: &Self::Goal<'_>) -> Self;
-    /// Whether this is what the goal asks for.
+    /// State with the elements that a cold build begins with, and no solution.
+    fn unsolved(goal: &Self::Goal<'_>) -> Self;
+    /// Whether this state is that of the goal.
     fn is_at(&self, goal: &Self::Goal<'_>) -> bool;
-    /// Takes over the goal's promises where nothing else differs. Whether bodies move as they promised before.
+    /// Takes over the goal's promises of motion, where nothing else differs. Returns whether they equal those before.
     fn stay(&mut self, goal: &Self::Goal<'_>) -> bool;
-    /// Is told that a frame was left half-way: what is kept with a pair may be of either of its instants.
+    /// Called when a frame was left half-way: data kept with pairs may belong to either of its two instants.
     fn stop(&mut self) {}
     /// Whether nothing but the clip moves anything since the last frame, so that links may be extrapolated on.
     fn goes_on(&self, goal: &Self::Goal<'_>) -> bool;
 
     // Move.
 
-    /// Goes where the goal says; what was before.
+    /// Moves to the goal; returns the state before.
     fn go(&mut self, goal: &Self::Goal<'_>) -> Self::Was;
-    /// What differs.
-    fn since<'m>(&self, goal: &Self::Goal<'_>, was: &'m Self::Was) -> Self::Since<'m>;
-    /// What is predicted with from here on.
-    fn ahead(
+    /// Difference from the state before.
+    fn change<'m>(&self, goal: &Self::Goal<'_>, was: &'m Self::Was) -> Self::Change<'m>;
+    /// Prediction from the goal on.
+    fn prediction(
         &self,
         goal: &Self::Goal<'_>,
         was: &Self::Was,
         update: Update,
         clocked: Clocked<'_>,
-    ) -> Ahead;
+    ) -> Prediction;
 
     // Coarse and fine.
 
-    /// What may stand between any two elements.
+    /// Candidate occluders of the root pair.
     fn candidates(goal: &Self::Goal<'_>) -> Vec<u32>;
-    /// What decides on pairs, down to a level.
+    /// Judge of pairs, down to a level.
     fn judge<'j>(
         &'j mut self,
         goal: &'j Self::Goal<'_>,
         level: Level,
-        motion: &Motion<'j, Self::Since<'_>>,
+        motion: &Motion<'j, Self::Change<'_>>,
     ) -> Self::Judge<'j>;
     /// Whether verdicts weigh by a coarse solution.
     fn has_coarse(_goal: &Self::Goal<'_>) -> bool {
         false
     }
-    /// Follows the coarse pairs with the coarse solution; what of it changed is added to `since`.
+    /// Updates the coarse solution from the changed coarse pairs; adds changes of brightness to `change`.
     fn weigh(
         &mut self,
         _goal: &Self::Goal<'_>,
         _was: &Self::Was,
         _changes: &Changes,
-        _since: Option<&mut Self::Since<'_>>,
+        _change: Option<&mut Self::Change<'_>>,
     ) {
     }
 
     // Edit.
 
-    /// Links that are made anew although no verdict on them changed.
+    /// Links to be set again although no verdict on them changed.
     fn remade(&self, _was: &Self::Was, _tree: &PairTree) -> Vec<PairId> {
         Vec::new()
     }
     /// The elements.
     fn forest(&self) -> &Self::Forest;
-    /// Removes elements that no pair is refined on any more; how many.
+    /// Removes elements that no pair is refined on any more; returns their number.
     fn reap(&mut self) -> u64;
-    /// Elements whose children came or went since this was asked last.
+    /// Elements whose children came or went since the last call.
     fn take_changed(&mut self) -> Vec<u32>;
-    /// A solution to begin with.
-    fn first_guess(&self, goal: &Self::Goal<'_>, lit: &Self::Lit<'_>) -> Radiosity;
-    /// Works out links that end on groups; `apart` are those that were looked at again, `None` in a cold build.
+    /// Initial solution.
+    fn first_guess(&self, goal: &Self::Goal<'_>, surfaces: &Self::LitSurfaces<'_>) -> Radiosity;
+    /// Evaluates links that end on groups, facet by facet; `apart` are those that were judged again, `None` in a cold build.
     fn place_groups(
         &mut self,
         _goal: &Self::Goal<'_>,
@@ -139,49 +139,56 @@ pub(crate) trait Space: Sized + Send {
         _apart: Option<Vec<(ElementId, ElementId)>>,
     ) {
     }
-    /// Adds what emits or reflects otherwise than before. Whether sources that are no surfaces do, or what is distant.
+    /// Adds elements with changed exitance or reflectance. Returns whether punctual lights or distant elements changed.
     fn add_dirty(&self, _goal: &Self::Goal<'_>, _was: &Self::Was, _dirty: &mut Dirty) -> bool {
         false
     }
 
     // Solve.
 
-    /// The elements with their light; with places worked out beforehand if most of them are to be gathered.
-    fn lit(&self, goal: &Self::Goal<'_>, everywhere: bool) -> Self::Lit<'_>;
-    /// Gives sources that are no surfaces what they send.
-    fn set_sources(&self, _goal: &Self::Goal<'_>, _lit: &Self::Lit<'_>, _light: &mut Radiosity) {}
-    /// The solution, where nothing emits.
-    fn if_dark(&self, goal: &Self::Goal<'_>, lit: &Self::Lit<'_>) -> Option<Radiosity>;
+    /// Elements with exitance and reflectance; with places computed beforehand if most of them are to be gathered.
+    fn surfaces(&self, goal: &Self::Goal<'_>, everywhere: bool) -> Self::LitSurfaces<'_>;
+    /// Sets the radiosity of sources that are no surfaces.
+    fn set_sources(
+        &self,
+        _goal: &Self::Goal<'_>,
+        _surfaces: &Self::LitSurfaces<'_>,
+        _light: &mut Radiosity,
+    ) {
+    }
+    /// The solution where nothing emits; else `None`.
+    fn if_dark(&self, goal: &Self::Goal<'_>, surfaces: &Self::LitSurfaces<'_>)
+    -> Option<Radiosity>;
     /// Residual to solve to, relative to the mean radiosity.
     fn residual(goal: &Self::Goal<'_>, is_cold: bool) -> f64;
-    /// The mean radiosity that the space cannot pass at any time, W/m2, whatever hides what.
-    fn most_mean_w_m2(goal: &Self::Goal<'_>) -> f64;
-    /// How many times as much is emitted as when [`Space::finish`] was told last of a solution without extrapolated links.
+    /// Upper bound of the mean radiosity at any time, W/m2, whatever the visibilities.
+    fn mean_radiosity_bound_w_m2(goal: &Self::Goal<'_>) -> f64;
+    /// Emitted flux relative to that of the last exact solution ([`Space::finish`] with `is_settled`): 1.
     fn brightened(&self, _goal: &Self::Goal<'_>) -> f64 {
         1.0
     }
-    /// Is told that a solution was found, and whether without extrapolated links.
+    /// Called when a solution was found; `is_settled` if no link is extrapolated.
     fn finish(&mut self, _is_settled: bool) {}
 
     // Tally.
 
-    /// Gives back room of elements that are gone; new ids, if they changed.
+    /// Frees the storage of removed elements; new ids, if they changed.
     fn compact(&mut self) -> Option<Renumbering> {
         None
     }
-    /// Gives back room beyond a small reserve.
+    /// Frees spare capacity beyond a small reserve.
     fn trim(&mut self) {}
     /// Fills in numbers of elements.
     fn count(&self, tree: &PairTree, report: &mut FrameReport);
     /// Row sums and energies: a pass over all links and elements.
     fn balance(state: &Follower<Self>) -> Balance;
-    /// Links with an end that is elsewhere, against the other, than in the frame before.
+    /// Links of which one end moved against the other since the frame before.
     fn dynamic_links(&self, goal: &Self::Goal<'_>, tree: &PairTree) -> u64;
-    /// Whether a solution can be one.
+    /// Checks that a solution is plausible.
     fn check(_goal: &Self::Goal<'_>, _state: &Follower<Self>) -> Result<(), Why> {
         Ok(())
     }
 
-    /// Bytes of what grows with the pairs; of what grows with the elements; of the rest.
+    /// Bytes that grow with the pairs, bytes that grow with the elements, and the rest.
     fn bytes(&self) -> [u64; 3];
 }

@@ -18,7 +18,7 @@ pub(crate) fn balance_of(
     let mut sums = Vec::new();
     let linear = !radiosity.is_bounded();
     for facet in facets {
-        let lit = surfaces.lit(facet.0);
+        let material = surfaces.material(facet.0);
         sums.clear();
         row_sums(surfaces, (links, linear), is_surface, facet.0, &mut |_, sum| sums.push(sum));
         let mut next = sums.iter();
@@ -32,8 +32,9 @@ pub(crate) fn balance_of(
             area += a;
             let b = radiosity.radiosity(id);
             for c in 0..3 {
-                energy.emitted_w += a * f64::from(lit.exitance[c]);
-                energy.absorbed_w += a * f64::from((1.0 - lit.reflectance[c]) * h.mean[c].max(0.0));
+                energy.emitted_w += a * f64::from(material.exitance[c]);
+                energy.absorbed_w +=
+                    a * f64::from((1.0 - material.reflectance[c]) * h.mean[c].max(0.0));
                 energy.escaped_w -= off * a * f64::from(b[c]);
             }
         });

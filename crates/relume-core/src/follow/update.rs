@@ -1,6 +1,6 @@
 //! Strategies of following a motion.
 
-/// How the pair tree follows the motion.
+/// Strategy by which the pair tree follows motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Update {
     /// Rebuild everything in every frame: the reference that others are checked against.

@@ -1,4 +1,4 @@
-//! What can be seen of a step from outside while it is under way, and how it is called off.
+//! Progress and cancellation of a step under way.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 

@@ -25,18 +25,18 @@ impl Plane {
     }
 }
 
-const ROOM: usize = 16;
+const CAPACITY: usize = 16;
 
 /// A convex planar polygon in space with up to 16 corners, on the stack.
 #[derive(Clone, Copy, Debug)]
 pub struct ConvexPolygon {
-    corners: [DVec3; ROOM],
+    corners: [DVec3; CAPACITY],
     len: usize,
 }
 
 impl ConvexPolygon {
     /// Corners there is room for: a quadrilateral cut by a dozen planes.
-    pub const ROOM: usize = ROOM;
+    pub const CAPACITY: usize = CAPACITY;
 
     /// Corners a polygon may start with, so that it can still be cut.
     pub const START_MAX: usize = 12;
@@ -46,7 +46,7 @@ impl ConvexPolygon {
     /// # Panics
     /// With more than 16 corners.
     pub fn new(corners: &[DVec3]) -> ConvexPolygon {
-        let mut out = ConvexPolygon { corners: [DVec3::ZERO; ROOM], len: corners.len() };
+        let mut out = ConvexPolygon { corners: [DVec3::ZERO; CAPACITY], len: corners.len() };
         out.corners[..corners.len()].copy_from_slice(corners);
         out
     }
@@ -60,7 +60,7 @@ impl ConvexPolygon {
     /// The part in front of `plane` (Sutherland & Hodgman 1974); corners within `slack_m` of the
     /// plane count as on it and are kept.
     pub fn clipped(&self, plane: &Plane, slack_m: f64) -> ConvexPolygon {
-        let mut out = ConvexPolygon { corners: [DVec3::ZERO; ROOM], len: 0 };
+        let mut out = ConvexPolygon { corners: [DVec3::ZERO; CAPACITY], len: 0 };
         for i in 0..self.len {
             let (p, q) = (self.corners[i], self.corners[(i + 1) % self.len]);
             let (dp, dq) = (plane.distance(p), plane.distance(q));
@@ -76,7 +76,7 @@ impl ConvexPolygon {
 
     /// The parts in front of and behind `plane`; either may be empty.
     pub fn split(&self, plane: &Plane) -> (ConvexPolygon, ConvexPolygon) {
-        let none = ConvexPolygon { corners: [DVec3::ZERO; ROOM], len: 0 };
+        let none = ConvexPolygon { corners: [DVec3::ZERO; CAPACITY], len: 0 };
         let (mut front, mut back) = (none, none);
         if self.len < 3 {
             return (front, back);
@@ -102,7 +102,7 @@ impl ConvexPolygon {
     }
 
     fn push(&mut self, p: DVec3) {
-        if self.len < ROOM {
+        if self.len < CAPACITY {
             self.corners[self.len] = p;
             self.len += 1;
         }

@@ -1,83 +1,21 @@
-//! The brightness bounds that the error oracle weighs links by.
+//! Brightness of one end of a pair, as verdicts know it.
 
-use crate::element::{ElementId, Forest};
-
-use super::light::Light;
-use super::margin::Shift;
-
-/// Canonical brightness: a pure function of the scene at one instant, never of the running
-/// solution, so that verdicts have no memory.
-#[derive(Clone, Debug, Default)]
+/// Brightness of one coarse element as the oracle knows it; W/m2, mean of the channels.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Brightness {
-    coarse: Vec<Light>,
-    lights: Vec<f64>,
-    reference_area_m2: f64,
+    /// Radiosity, emitted and reflected (or intensity of a punctual light).
+    pub radiosity: f64,
+    /// The reflected part of it, which varies over the element; the emitted part does not.
+    pub reflected: f64,
+    /// Irradiance that errors on this element are measured against; positive.
+    pub irradiance: f64,
 }
 
 impl Brightness {
-    /// From the light of each coarse element, the mean intensity of each punctual light, and the
-    /// area below which elements weigh less than others, m2. Values are rounded to half powers of
-    /// two, so that they seldom change.
-    pub fn new(coarse: Vec<Light>, lights: Vec<f64>, reference_area_m2: f64) -> Brightness {
-        let step = |l: Light| Light {
-            radiosity: coarsen(l.radiosity),
-            reflected: coarsen(l.reflected),
-            irradiance: coarsen(l.irradiance),
-        };
-        Brightness {
-            coarse: coarse.into_iter().map(step).collect(),
-            lights: lights.into_iter().map(coarsen).collect(),
-            reference_area_m2,
-        }
-    }
+    /// Brightness of every element of a scene in which all surfaces weigh the same.
+    pub const UNIFORM: Brightness = Brightness { radiosity: 1.0, reflected: 1.0, irradiance: 1.0 };
 
-    /// The light of an element or punctual light.
-    #[inline]
-    pub fn of(&self, forest: &Forest, id: ElementId) -> Light {
-        if let Some(light) = forest.light(id) {
-            let radiosity = self.lights[light];
-            return Light { radiosity, reflected: 0.0, irradiance: f64::INFINITY };
-        }
-        forest.coarse(id).map_or(Light::UNIFORM, |c| self.coarse[c])
-    }
-
-    /// How the light of each coarse element, by number, and each punctual light changed since `before`, if
-    /// it did.
-    pub fn shifts(&self, before: &Brightness) -> (Vec<Option<Shift>>, Vec<Option<Shift>>) {
-        let elements = before.coarse.iter().zip(&self.coarse);
-        let lights = before.lights.iter().zip(&self.lights);
-        (
-            elements.map(|(before, after)| Shift::between(before, after)).collect(),
-            lights.map(|(&before, &after)| Shift::of_light(before, after)).collect(),
-        )
-    }
-
-    /// Follows coarse elements to other numbers: for each the one that it had; what is new has any brightness.
-    pub fn renumber(&mut self, old_of: &[Option<usize>]) {
-        let of = |old: &Option<usize>| old.map_or(Light::UNIFORM, |old| self.coarse[old]);
-        self.coarse = old_of.iter().map(of).collect();
-    }
-
-    /// Area at which an element weighs 1 in the error norm, m2.
-    pub fn reference_area_m2(&self) -> f64 {
-        self.reference_area_m2
-    }
-}
-
-/// Rounds down to 1, 1.5, 2, 3, 4, 6, 8 ...: all but the first bit of the mantissa is dropped.
-fn coarsen(x: f64) -> f64 {
-    f64::from_bits(x.to_bits() & !((1 << 51) - 1))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rounding_keeps_half_powers_of_two() {
-        for (x, y) in [(1.0, 1.0), (1.4, 1.0), (1.5, 1.5), (1.99, 1.5), (5.9, 4.0), (0.0, 0.0)] {
-            assert_eq!(coarsen(x), y);
-        }
-        assert!(coarsen(f64::INFINITY).is_infinite());
-    }
+    /// Brightness of a distant element without its emission: nothing arrives there, and no error counts.
+    pub const DISTANT: Brightness =
+        Brightness { radiosity: 0.0, reflected: 0.0, irradiance: f64::INFINITY };
 }

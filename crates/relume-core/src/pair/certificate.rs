@@ -1,4 +1,4 @@
-//! Certificates of pairs in space: until when the known motion cannot change what was found.
+//! Certificates of pairs in space: until which tick the known motion cannot change a finding.
 //!
 //! All tests are conservative twice over: what can get anywhere is bounded by boxes, and where the
 //! exact test of a pair allows some slack, these allow half of it, so that rounding does not matter.
@@ -10,18 +10,18 @@ use glam::DVec3;
 use crate::element::{
     ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldPatch, WorldView,
 };
-use crate::event::Foresight;
 use crate::geometry::{Aabb, Plane, Pose, shaft_meets_box};
+use crate::predict::MotionBounds;
 use crate::scene::{BodyId, Drift, PatchId};
 
+use super::certificate_tests::{CertificateTests, Moves};
 use super::ends::{LightPlace, body_of};
-use super::outlook::{Moves, Outlook};
 
-/// A scene in space at one instant, with what comes.
-pub(super) struct SpaceOutlook<'a> {
+/// Certificate tests in space: a scene at one instant with the bounds of its motion.
+pub(super) struct SpaceCertificateTests<'a> {
     pub(super) forest: &'a Forest,
     pub(super) view: &'a WorldView,
-    pub(super) ahead: &'a Foresight,
+    pub(super) motion_bounds: &'a MotionBounds,
     /// Nodes that may still be looked at; then anything may be in the way.
     pub(super) effort: Cell<u32>,
 }
@@ -33,7 +33,7 @@ pub(super) const EFFORT: u32 = 256;
 struct Ends<'a> {
     bounds: (Aabb, Aabb),
     bodies: (Option<BodyId>, Option<BodyId>),
-    /// Of elements.
+    /// Places of both ends, where both are elements.
     places: Option<(&'a WorldElement, &'a WorldElement)>,
     patches: (Option<PatchId>, Option<PatchId>),
     /// More than the exact test of this pair, or of any below it, allows.
@@ -46,9 +46,9 @@ const OFF: f64 = 8.0;
 /// The span of nothing.
 const NO_SPAN: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 
-impl Outlook for SpaceOutlook<'_> {
-    fn ahead(&self) -> &Foresight {
-        self.ahead
+impl CertificateTests for SpaceCertificateTests<'_> {
+    fn motion_bounds(&self) -> &MotionBounds {
+        self.motion_bounds
     }
 
     fn rest(&self, h: usize, a: ElementId, b: ElementId) -> bool {
@@ -57,12 +57,12 @@ impl Outlook for SpaceOutlook<'_> {
     }
 
     fn is_entered(&self, h: usize, a: ElementId, b: ElementId) -> bool {
-        let own = self.body(a).filter(|&body| self.ahead.drift(h, body) != Drift::Rests);
+        let own = self.body(a).filter(|&body| self.motion_bounds.drift(h, body) != Drift::Rests);
         self.with_ends(a, b, &mut |ends| match own {
             // Seen from a moving body, everything else moves.
             Some(own) => self.may_block(h, ends, Forest::ROOT, Some(own)),
             None => {
-                let mut movers = self.ahead.movers(h);
+                let mut movers = self.motion_bounds.movers(h);
                 movers.any(|m| self.may_block(h, ends, self.forest.body_root(m), None))
             }
         })
@@ -79,42 +79,42 @@ impl Outlook for SpaceOutlook<'_> {
     }
 
     fn stays_away(&self, h: usize, a: ElementId, b: ElementId) -> bool {
-        let lit = |id| self.forest.kind(id) == Kind::Light;
-        if lit(a) && lit(b) {
+        let is_light = |id| self.forest.kind(id) == Kind::Light;
+        if is_light(a) && is_light(b) {
             return true;
         }
         // What is absent stays so up to every horizon.
-        let absent = |id| !lit(id) && self.view.end_box(self.forest.fixed(id)).is_empty();
+        let absent = |id| !is_light(id) && self.view.end_box(self.forest.fixed(id)).is_empty();
         if absent(a) || absent(b) {
             return true;
         }
-        if lit(a) || lit(b) {
+        if is_light(a) || is_light(b) {
             return false;
         }
         self.is_behind(h, a, b) || self.is_behind(h, b, a)
     }
 }
 
-impl SpaceOutlook<'_> {
+impl SpaceCertificateTests<'_> {
     fn body(&self, id: ElementId) -> Option<BodyId> {
         body_of(self.forest, self.view, id)
     }
 
     fn rests(&self, h: usize, id: ElementId) -> bool {
         if let Some(light) = self.forest.light(id) {
-            return self.ahead.light_rests(h, light);
+            return self.motion_bounds.light_rests(h, light);
         }
         match self.body(id) {
-            Some(body) => self.ahead.drift(h, body) == Drift::Rests,
+            Some(body) => self.motion_bounds.drift(h, body) == Drift::Rests,
             None => self.widest(h, id) == Drift::Rests.reach(),
         }
     }
 
     /// Displacements of all bodies of a group together.
     fn widest(&self, h: usize, id: ElementId) -> Aabb {
-        let near = self.ahead.widest(h);
+        let near = self.motion_bounds.widest(h);
         if self.forest.is_distant(id) || id == Forest::ROOT {
-            return near.union(self.ahead.widest_distant(h));
+            return near.union(self.motion_bounds.widest_distant(h));
         }
         near
     }
@@ -200,12 +200,12 @@ impl SpaceOutlook<'_> {
     /// Displacements of both ends and of what may come between.
     fn moves(&self, h: usize, ends: &Ends<'_>, body: Option<BodyId>) -> Moves {
         let of = |body: Option<BodyId>| match body {
-            Some(body) => self.ahead.drift(h, body),
+            Some(body) => self.motion_bounds.drift(h, body),
             None => Drift::Rests,
         };
         let c = match body {
-            Some(body) => self.ahead.drift(h, body),
-            None => Drift::Turns(self.ahead.widest(h)),
+            Some(body) => self.motion_bounds.drift(h, body),
+            None => Drift::Turns(self.motion_bounds.widest(h)),
         };
         let end = |end: Option<BodyId>| (of(end), end == body);
         Moves::new(end(ends.bodies.0), end(ends.bodies.1), c)
@@ -270,7 +270,7 @@ impl SpaceOutlook<'_> {
         turns_c || !(a_lo.min(b_lo) >= -half || a_hi.max(b_hi) <= half)
     }
 
-    /// How far from a blocker's plane what it covers can be, however it is turned.
+    /// Distance from a blocker's plane up to which it may cover an end, however it is turned, metres.
     ///
     /// All of the blocker's corners within s of a plane tilt it by at most 2 s by its width, and a
     /// convex polygon is no narrower than its area by its diameter.
@@ -285,14 +285,14 @@ impl SpaceOutlook<'_> {
     /// Whether `b` stays wholly behind the plane of `a`.
     fn is_behind(&self, h: usize, a: ElementId, b: ElementId) -> bool {
         let (Some(patch), Some(body)) = (self.forest.patch(a), self.body(a)) else { return false };
-        let drift = self.ahead.drift(h, body);
+        let drift = self.motion_bounds.drift(h, body);
         if matches!(drift, Drift::Turns(_)) {
             return false;
         }
         let patch = self.view.patch(patch);
         let plane = Plane::through(patch.world.origin, patch.world.normal);
         let by = match self.body(b) {
-            Some(body) => self.ahead.drift(h, body).reach(),
+            Some(body) => self.motion_bounds.drift(h, body).reach(),
             None => self.widest(h, b),
         };
         let shift = by.difference(&drift.reach()).along(plane.normal).1;
@@ -308,7 +308,7 @@ impl SpaceOutlook<'_> {
         };
         // What may come to lie in the plane and faces it may touch it.
         let opposes = || match self.body(b) {
-            Some(body) if matches!(self.ahead.drift(h, body), Drift::Turns(_)) => true,
+            Some(body) if matches!(self.motion_bounds.drift(h, body), Drift::Turns(_)) => true,
             Some(body) => {
                 let pose = self.view.poses()[body.0 as usize].unwrap_or(Pose::IDENTITY);
                 self.forest.may_oppose(b, pose.rotation.transpose() * plane.normal)
@@ -319,7 +319,7 @@ impl SpaceOutlook<'_> {
     }
 }
 
-/// How a blocker lies to an end at all times.
+/// Position of a blocker relative to an end, at all times up to a horizon.
 struct AtEnd {
     behind: bool,
     may_cover: bool,

@@ -39,7 +39,7 @@ impl LightPlace {
         LightPlace { stand_in, away_m }
     }
 
-    /// Where its light comes from, or seems to: rays of a directional light are parallel to rounding.
+    /// Point that the light comes from, or seems to come from: rays of a directional light are parallel to rounding.
     pub(super) fn from(&self, lamp: &WorldLight, e: &WorldElement) -> DVec3 {
         match lamp.kind {
             LightKind::Directional => e.centre - lamp.direction * (self.away_m * PARALLEL),
@@ -69,7 +69,7 @@ pub(super) struct BoxShaft<'a> {
     view: &'a WorldView,
     forest: &'a Forest,
     world: ShaftOfBoxes,
-    /// Of both boxes in the frame of the one body that they are in.
+    /// Shaft of both boxes in the frame of the one body that they are in.
     own: Option<(BodyId, ShaftOfBoxes)>,
     /// Ends that are patches.
     patches: [Option<PatchId>; 2],
@@ -79,7 +79,7 @@ pub(super) struct BoxShaft<'a> {
 }
 
 impl<'a> BoxShaft<'a> {
-    /// Of two nodes, at least one of which is a group; `body` if both are in that one.
+    /// Shaft of two nodes, at least one of which is a group; `body` if both are in that one.
     pub(super) fn new(
         view: &'a WorldView,
         forest: &'a Forest,

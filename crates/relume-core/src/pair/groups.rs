@@ -4,15 +4,15 @@ use crate::element::{ElementId, Kind};
 use crate::geometry::no_smaller;
 use crate::transport::{GroupSight, Spread, common_body, light_at};
 
-use super::brightness::Brightness;
+use super::coarse_brightness::CoarseBrightness;
 use super::ends::{BoxShaft, body_of};
 use super::hash::pair_key;
-use super::judge::{Placed, Stage, culled, passing};
+use super::judge::{SpaceJudge, Stage, culled, passing};
 use super::margin::{Margin, SideMargin};
 use super::oracle::Oracle;
-use super::side::Side;
 use super::tree::{Carried, CullReason, Gradients, in_steps};
 use super::update::{Judgement, Verdict};
+use crate::transport::Side;
 
 /// Distance of two ends, in sums of their radii, below which they are refined whatever they bring: neither reaches into the
 /// ball around the other.
@@ -33,16 +33,16 @@ const MISSED: f64 = 0.01;
 /// Share of its area that a group shows, for each radius over distance of the other end, beyond what it shows to its middle.
 const TURNED: f64 = 0.5;
 
-/// What a group pair carries, before occlusion.
+/// Exchange of a pair with a group, without occlusion.
 struct GroupExchange {
     area_m2: f64,
     /// Radius over distance of both ends.
     size: (f64, f64),
-    /// What each end may show the other at most, m2.
+    /// Largest projected area of each end towards the other, m2.
     shows_m2: (f64, f64),
 }
 
-impl Placed<'_> {
+impl SpaceJudge<'_> {
     /// Whether a node is a cluster that may be an end of links.
     pub(super) fn is_group(&self, id: ElementId) -> bool {
         self.forest.group(id).is_some()
@@ -75,7 +75,7 @@ impl Placed<'_> {
         if a == b {
             return match (self.forest.group(a).is_some_and(|group| group.is_convex), self.stage) {
                 (true, _) => culled(CullReason::FacingAway),
-                (false, Stage::Coarse) => passing(Verdict::Hold, 0),
+                (false, Stage::Coarse) => passing(Verdict::CoarseLink, 0),
                 (false, Stage::Fine(_)) => {
                     narrowed.extend_from_slice(candidates);
                     passing(Verdict::RefineSelf, 0)
@@ -113,7 +113,7 @@ impl Placed<'_> {
                 true => sight.visibility(&ends.0, &ends.1, key),
                 false => (1.0, 0),
             };
-            return carrying(Verdict::Hold, area_m2, v, Margin::Firm, segments);
+            return carrying(Verdict::CoarseLink, area_m2, v, Margin::Firm, segments);
         };
         self.decide_group_pair((a, b), (&ends.0, &ends.1), &sight, key, brightness)
     }
@@ -124,7 +124,7 @@ impl Placed<'_> {
         (end_a, end_b): (&Spread<'_>, &Spread<'_>),
         sight: &GroupSight<'_>,
         key: u64,
-        brightness: &Brightness,
+        brightness: &CoarseBrightness,
     ) -> Judgement {
         let Oracle::Error { threshold } = self.oracle else {
             unreachable!("only the error oracle has groups")
@@ -167,7 +167,7 @@ impl Placed<'_> {
     /// that faces the other end, never of those that happened to be looked at.
     fn group_error(
         &self,
-        brightness: &Brightness,
+        brightness: &CoarseBrightness,
         (receiver, area_m2): (ElementId, f64),
         (source, shows_m2): (ElementId, f64),
         (apart, x, v): (f64, &GroupExchange, f64),
@@ -184,7 +184,7 @@ impl Placed<'_> {
     }
 
     /// Area at which an end weighs 1 in the error norm, m2.
-    fn group_reference_m2(&self, brightness: &Brightness, id: ElementId) -> f64 {
+    fn group_reference_m2(&self, brightness: &CoarseBrightness, id: ElementId) -> f64 {
         match self.forest.group(id) {
             Some(group) => {
                 let first = self.forest.groups().leaves_of(group)[0].facet;
@@ -238,11 +238,11 @@ impl Placed<'_> {
             leaf.area_m2 * light_at(lamp, p, n)
         };
         // What is in the way is left out: weights need no shadows of lights.
-        carrying(Verdict::Hold, leaves.map(arrives).sum(), 1.0, Margin::Firm, 0)
+        carrying(Verdict::CoarseLink, leaves.map(arrives).sum(), 1.0, Margin::Firm, 0)
     }
 }
 
-/// What two ends exchange without occlusion.
+/// Exchange of two ends without occlusion.
 fn exchange_of(a: &Spread<'_>, b: &Spread<'_>) -> GroupExchange {
     let apart = a.centre.distance(b.centre).max(f64::MIN_POSITIVE);
     let size = (a.radius / apart, b.radius / apart);

@@ -6,8 +6,8 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::element::{ElementId, ElementKey, Forest, Kind, WorldElement, WorldView};
-use crate::event::{Foresight, Lookahead, Tick};
 use crate::geometry::{Aabb, Plane, no_smaller};
+use crate::predict::{Lookahead, MotionBounds, Tick};
 use crate::scene::{BodyId, PatchId};
 use crate::transport::{
     BlockerSizes, CELLS_MAX, CLIPPED_MAX, Clipping, Exchange, Meeting, Shaft, Simd, Visibility,
@@ -15,48 +15,48 @@ use crate::transport::{
     visibility,
 };
 
-use super::brightness::Brightness;
-use super::certificate::{EFFORT, SpaceOutlook};
+use super::certificate::{EFFORT, SpaceCertificateTests};
+use super::certificate_tests::{CertificateTests, Finding};
+use super::coarse_brightness::CoarseBrightness;
 use super::ends::{BoxShaft, LightPlace, body_of};
 use super::hash::pair_key;
 use super::margin::{Margin, SideMargin};
 use super::oracle::{End, Estimate, Oracle, estimate};
-use super::outlook::{Finding, Outlook};
-use super::side::Side;
-use super::since::Since;
 use super::tree::{Carried, CullReason, Gradients, in_steps};
 use super::update::{Hierarchy, Judge, Judgement, Stale, Verdict};
+use super::world_change::WorldChange;
+use crate::transport::Side;
 
-/// How far pairs are decided.
+/// Level down to which pairs are judged.
 #[derive(Clone, Copy, Debug)]
 pub enum Stage<'a> {
-    /// Down to pairs of coarse elements, which are held.
+    /// Down to pairs of coarse elements, which become coarse links.
     Coarse,
-    /// By the oracle, with the brightness it weighs by.
-    Fine(&'a Brightness),
+    /// Down to links by the oracle, which weighs by this brightness.
+    Fine(&'a CoarseBrightness),
 }
 
-/// The forest placed in space, with what decides.
-pub struct Placed<'a> {
+/// Judge of pairs in space: the forest at one instant, with the oracle.
+pub struct SpaceJudge<'a> {
     /// The elements.
     pub forest: &'a mut Forest,
-    /// Where they are.
+    /// Places of the elements at this instant.
     pub view: &'a WorldView,
-    /// How far to go.
+    /// Level down to which pairs are judged.
     pub stage: Stage<'a>,
-    /// What decides in the end.
+    /// Oracle that decides on links.
     pub oracle: Oracle,
     /// Vector instructions.
     pub simd: Simd,
-    /// What happened since the last update; `None` where there was none.
-    pub since: Option<&'a Since<'a>>,
-    /// What the known motion allows next; `None` where certificates are not asked for.
-    pub ahead: Option<&'a Foresight>,
-    /// How far ahead pairs are extrapolated, if they are.
+    /// Difference from the last update; `None` in a cold build.
+    pub change: Option<&'a WorldChange<'a>>,
+    /// Bounds of the known motion; `None` where certificates are not asked for.
+    pub motion_bounds: Option<&'a MotionBounds>,
+    /// Settings of extrapolation; `None` where pairs are not extrapolated.
     pub lookahead: Option<Lookahead>,
 }
 
-impl Hierarchy for Placed<'_> {
+impl Hierarchy for SpaceJudge<'_> {
     fn children(&self, id: ElementId) -> Range<u32> {
         self.forest.children(id)
     }
@@ -83,7 +83,7 @@ impl Hierarchy for Placed<'_> {
     }
 }
 
-impl Judge for Placed<'_> {
+impl Judge for SpaceJudge<'_> {
     fn judge(
         &self,
         (a, b): (ElementId, ElementId),
@@ -116,19 +116,19 @@ impl Judge for Placed<'_> {
     }
 
     fn withstands(&self, a: ElementId, b: ElementId, margin: Margin) -> Option<Margin> {
-        margin.after(&self.since?.growth(self.forest, a, b)?)
+        margin.after(&self.change?.growth(self.forest, a, b)?)
     }
 
     fn stale(&self, a: ElementId, b: ElementId, certified: bool) -> Stale {
-        let Some(since) = self.since else { return Stale::Moved };
+        let Some(change) = self.change else { return Stale::Moved };
         let brightness = match self.stage {
-            Stage::Fine(_) => since.brightness(self.forest, a, b),
+            Stage::Fine(_) => change.brightness(self.forest, a, b),
             Stage::Coarse => Stale::Nothing,
         };
         let geometry = match certified {
-            true if since.moved(self.forest, self.view, a, b) => Stale::Followed,
+            true if change.moved(self.forest, self.view, a, b) => Stale::Followed,
             true => Stale::Nothing,
-            false => since.geometry(self.forest, self.view, a, b),
+            false => change.geometry(self.forest, self.view, a, b),
         };
         if geometry == Stale::Nothing { brightness } else { geometry }
     }
@@ -170,9 +170,10 @@ impl Judge for Placed<'_> {
         true
     }
 
-    fn dimmed(&self, a: ElementId, b: ElementId) -> bool {
-        let dimmed = |since: &Since<'_>| since.brightness(self.forest, a, b) == Stale::Brightness;
-        self.since.is_some_and(dimmed)
+    fn brightness_changed(&self, a: ElementId, b: ElementId) -> bool {
+        let differs =
+            |change: &WorldChange<'_>| change.brightness(self.forest, a, b) == Stale::Brightness;
+        self.change.is_some_and(differs)
     }
 
     fn lookahead(&self) -> Option<&Lookahead> {
@@ -183,17 +184,18 @@ impl Judge for Placed<'_> {
         }
     }
 
-    fn certified(&self, due: Tick) -> bool {
-        self.ahead.is_some_and(|ahead| ahead.holds(due))
+    fn certified(&self, until: Tick) -> bool {
+        self.motion_bounds.is_some_and(|motion_bounds| motion_bounds.holds(until))
     }
 
-    fn foresee(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick {
-        let Some(ahead) = self.ahead else { return 0 };
+    fn expiry(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick {
+        let Some(motion_bounds) = self.motion_bounds else { return 0 };
         let effort = Cell::new(EFFORT);
-        SpaceOutlook { forest: self.forest, view: self.view, ahead, effort }.until(a, b, finding)
+        SpaceCertificateTests { forest: self.forest, view: self.view, motion_bounds, effort }
+            .until(a, b, finding)
     }
 
-    fn holds(&self, a: ElementId, b: ElementId) -> bool {
+    fn is_coarse_pair(&self, a: ElementId, b: ElementId) -> bool {
         let at_level = |id| self.forest.is_coarse_root(id) || self.forest.kind(id) == Kind::Light;
         at_level(a) && at_level(b)
     }
@@ -231,7 +233,7 @@ fn refined(
     Some(Judgement { margin, ..passing(Verdict::Refine(side), segments) })
 }
 
-/// A verdict to link or to hold, with what the link carries.
+/// A verdict to link, finely or coarsely, with the values of the link.
 fn carrying(
     verdict: Verdict,
     x: &Exchange,
@@ -247,7 +249,7 @@ fn carrying(
     Judgement { verdict, carried, margin: Margin::Firm, segments: v.segments }
 }
 
-impl Placed<'_> {
+impl SpaceJudge<'_> {
     fn judge_groups(
         &self,
         a: ElementId,
@@ -257,8 +259,8 @@ impl Placed<'_> {
     ) -> Judgement {
         let (fixed_a, fixed_b) = (self.forest.fixed(a), self.forest.fixed(b));
         let (box_a, box_b) = (self.view.end_box(fixed_a), self.view.end_box(fixed_b));
-        let lit = |id| self.forest.kind(id) == Kind::Light;
-        if (box_a.is_empty() && !lit(a)) || (box_b.is_empty() && !lit(b)) {
+        let is_light = |id| self.forest.kind(id) == Kind::Light;
+        if (box_a.is_empty() && !is_light(a)) || (box_b.is_empty() && !is_light(b)) {
             return culled(CullReason::Absent);
         }
         if a == b {
@@ -268,9 +270,9 @@ impl Placed<'_> {
             narrowed.extend_from_slice(candidates);
             return passing(Verdict::RefineSelf, 0);
         }
-        if lit(a) || lit(b) {
+        if is_light(a) || is_light(b) {
             narrowed.extend_from_slice(candidates);
-            let side = if lit(a) { Side::B } else { Side::A };
+            let side = if is_light(a) { Side::B } else { Side::A };
             return passing(Verdict::Refine(side), 0);
         }
         let body = self.body_of(a).filter(|&body| self.body_of(b) == Some(body));
@@ -352,7 +354,7 @@ impl Placed<'_> {
         let places = Places::new(self, (a, b), !candidates.is_empty());
         let met = meeting(&places.own.0, &places.own.1);
         let shaft = places.shaft(self);
-        if met == Meeting::Away || (met == Meeting::Coplanar && !shaft.is_contact()) {
+        if met == Meeting::BackFacing || (met == Meeting::Coplanar && !shaft.is_contact()) {
             return culled(CullReason::FacingAway);
         }
         if self.is_above_coarse(a, b) {
@@ -392,7 +394,7 @@ impl Placed<'_> {
     ) -> Judgement {
         let key = pair_key(self.forest.key(a), self.forest.key(b));
         let in_contact = met == Meeting::Coplanar;
-        let end = |brightness: &Brightness, id, area| End {
+        let end = |brightness: &CoarseBrightness, id, area| End {
             area: if self.forest.is_distant(id) { 0.0 } else { area },
             reference_area: self.reference_area(brightness, id),
             light: brightness.of(self.forest, id),
@@ -458,11 +460,14 @@ impl Placed<'_> {
         let mut way = Margin::ENDLESS;
         if let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle) {
             let ends = [(a, place_a.area), (b, place_b.area)];
-            let brings = self.brings(brightness, ends, x.area_m2);
+            let relative_contribution = self.relative_contribution(brightness, ends, x.area_m2);
             let limit = CLOSE_SHARE * threshold;
-            most = if brings > limit { CLIPPED_MAX_CLOSE } else { CLIPPED_MAX_REST };
+            most = if relative_contribution > limit { CLIPPED_MAX_CLOSE } else { CLIPPED_MAX_REST };
             if (CLIPPED_MAX_REST + 1..=CLIPPED_MAX_CLOSE).contains(&occluders) {
-                way = Margin::between(brings.max(limit), brings.min(limit));
+                way = Margin::between(
+                    relative_contribution.max(limit),
+                    relative_contribution.min(limit),
+                );
             }
         }
         let factor = x.area_m2 / place_a.area.min(place_b.area);
@@ -491,7 +496,7 @@ impl Placed<'_> {
         let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
         else {
             let verdict = match self.stage {
-                Stage::Coarse => Verdict::Hold,
+                Stage::Coarse => Verdict::CoarseLink,
                 Stage::Fine(_) if distant => self.by_unevenness((a, b), (place_a, place_b), &x, &v),
                 Stage::Fine(_) => Verdict::Link,
             };
@@ -548,9 +553,9 @@ impl Placed<'_> {
 
     /// The share of a receiver's irradiance that a pair brings without occlusion, weighed as errors
     /// are: what V errs by is multiplied with it. The larger of both directions.
-    fn brings(
+    fn relative_contribution(
         &self,
-        brightness: &Brightness,
+        brightness: &CoarseBrightness,
         [a, b]: [(ElementId, f64); 2],
         exchange_area_m2: f64,
     ) -> f64 {
@@ -567,7 +572,7 @@ impl Placed<'_> {
 
     /// Area at which an element weighs 1 in the error norm, m2: by the size of the scene, or of the connected patches that
     /// it belongs to where these are small.
-    pub(super) fn reference_area(&self, brightness: &Brightness, id: ElementId) -> f64 {
+    pub(super) fn reference_area(&self, brightness: &CoarseBrightness, id: ElementId) -> f64 {
         let of_scene = brightness.reference_area_m2();
         let of_patch = |patch| CONNECTED_SHARE * self.forest.connected_m2(patch);
         self.forest.patch(id).map_or(of_scene, |patch| of_scene.min(of_patch(patch)))
@@ -611,9 +616,9 @@ impl Placed<'_> {
         (a, b): &(End, End),
         e: &Estimate,
     ) -> Option<(Side, SideMargin)> {
-        let (better, ahead) = e.side(a, b);
+        let (better, margin) = e.side(a, b);
         let (side, firm) = self.splittable(ids, (a.area, b.area), better)?;
-        Some((side, if firm { SideMargin::ENDLESS } else { SideMargin::new(ahead) }))
+        Some((side, if firm { SideMargin::ENDLESS } else { SideMargin::new(margin) }))
     }
 
     /// The side to refine: the one wished for if it can be, else the other unless it is the smaller; and whether
@@ -666,7 +671,7 @@ impl Placed<'_> {
         let v = light_visibility(self.simd, &shaft, &blockers, (&segments, place.from(lamp, &e)));
         let mut margin = Margin::Firm;
         let verdict = match (self.stage, self.oracle) {
-            (Stage::Coarse, _) => Verdict::Hold,
+            (Stage::Coarse, _) => Verdict::CoarseLink,
             (Stage::Fine(brightness), Oracle::Error { threshold }) => {
                 let ends = (
                     End {
@@ -715,7 +720,7 @@ impl Placed<'_> {
     }
 }
 
-/// Where the two elements of a pair are.
+/// Places of the two elements of a pair.
 struct Places {
     /// In the frame that their light must not depend on: their body's if they have one in common.
     own: (WorldElement, WorldElement),
@@ -725,7 +730,7 @@ struct Places {
 }
 
 impl Places {
-    fn new(at: &Placed<'_>, (a, b): (ElementId, ElementId), world: bool) -> Places {
+    fn new(at: &SpaceJudge<'_>, (a, b): (ElementId, ElementId), world: bool) -> Places {
         let patches = (at.patch_of(a), at.patch_of(b));
         let body = at.view.patch(patches.0).body;
         let one_body = at.view.patch(patches.1).body == body;
@@ -737,7 +742,7 @@ impl Places {
         }
     }
 
-    fn shaft<'a>(&'a self, at: &'a Placed<'_>) -> Shaft<'a> {
+    fn shaft<'a>(&'a self, at: &'a SpaceJudge<'_>) -> Shaft<'a> {
         let (own_a, own_b) = (&self.own.0, &self.own.1);
         match &self.world {
             Some((body, a, b)) => at.shaft((a, b), Some((*body, own_a, own_b)), self.patches),

@@ -1,54 +1,52 @@
-//! How much brighter or darker the ends of a pair may get before its verdict can change.
+//! Margins of verdicts: the change of brightness of a pair's ends up to which its verdict cannot change.
 //!
-//! A cache, not part of the state: a pair that withstands a change of brightness is not judged
-//! again. All numbers are logarithms in steps of 1/240 of an octave, rounded to the safe side when a pair is
+//! Margins are a cache, not part of the state: a pair whose margin covers a change of brightness is not judged again. All numbers are logarithms in steps of 1/240 of an octave, rounded to the safe side when a pair is
 //! judged; changes of brightness are added to them exactly, so that what brightens and darkens again leaves
 //! them as they were.
 
-use super::light::Light;
-use super::side::Side;
+use super::brightness::Brightness;
+use crate::transport::Side;
 
 /// Steps in an octave.
 const STEPS: f64 = 240.0;
 
 /// Half an octave up from a power of two, brightness has a value 1.5 times that: log2(1.5) is 140.4 steps. All changes are
 /// multiples of [`COARSE`].
-const FIFTH: i32 = 140;
+const HALF_OCTAVE: i32 = 140;
 
 /// Steps in one that is stored.
 const COARSE: i32 = 10;
 
-/// Given away to rounding: a step, and what [`FIFTH`] is off by for source and receiver.
+/// Given away to rounding: a step, and what [`HALF_OCTAVE`] is off by for source and receiver.
 const SLACK: f64 = 2.0;
 
-/// What a verdict withstands.
+/// Margin of a verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Margin {
-    /// Whatever the brightness, it is the same.
+    /// The verdict does not depend on brightness.
     Firm,
-    /// That of a link.
+    /// Margin of a link.
     Link {
-        /// By how much the errors on both receivers are below the threshold.
+        /// Distance of the errors on both receivers below the threshold, in steps.
         on: [u16; 2],
-        /// Whether they are also how far the pair is from being looked at in another way, which a change in
-        /// either sense may bring about.
+        /// The margin also bounds the choice of the visibility method, so a change of either sign consumes it.
         both_ways: bool,
     },
-    /// That of a refined pair.
+    /// Margin of a refined pair.
     Refined {
-        /// By how much the larger error is above the threshold.
+        /// Distance of the larger error above the threshold, in steps.
         error: u16,
-        /// The receiver that it is on.
+        /// Receiver of the larger error.
         on: Side,
         /// As for links.
         both_ways: bool,
-        /// How far the side that was refined is from being the worse one.
+        /// Margin of the choice of the side to refine.
         side: SideMargin,
     },
 }
 
-/// By how much the side that was refined was ahead of the other, and how the two directions of the pair have
-/// drifted apart since, in either sense; in steps of [`COARSE`].
+/// Margin of the choice of the side to refine: lead of the refined side over the other when it was judged, and the drift of
+/// the two directions of the pair against each other since; in steps of [`COARSE`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SideMargin {
     ahead: u8,
@@ -56,7 +54,7 @@ pub struct SideMargin {
 }
 
 impl SideMargin {
-    /// There is no choice.
+    /// Margin where there is no choice of a side.
     pub const ENDLESS: SideMargin = SideMargin { ahead: u8::MAX, drift: 0 };
 
     /// From a margin in steps.
@@ -84,11 +82,10 @@ impl SideMargin {
 }
 
 impl Margin {
-    /// Nothing reaches as far.
+    /// A margin that no change consumes.
     pub const ENDLESS: u16 = u16::MAX >> 2;
 
-    /// That of a verdict that does not depend on how bright the ends are: by how much the error, of whatever kind, is away from
-    /// the threshold.
+    /// Margin of a verdict that does not depend on brightness: distance of the error, of any kind, from the threshold.
     pub fn of_error(is_link: bool, error: u16) -> Margin {
         let side = SideMargin::ENDLESS;
         match is_link {
@@ -97,7 +94,7 @@ impl Margin {
         }
     }
 
-    /// How far the error is away from the threshold.
+    /// Distance of the error from the threshold, in steps.
     pub fn error(&self) -> u16 {
         match *self {
             Margin::Firm => Margin::ENDLESS,
@@ -106,7 +103,7 @@ impl Margin {
         }
     }
 
-    /// The same without a choice of the side to refine.
+    /// This margin without a choice of the side to refine.
     pub(super) fn on_this_side(self) -> Margin {
         match self {
             Margin::Refined { error, on, both_ways, .. } => {
@@ -116,7 +113,7 @@ impl Margin {
         }
     }
 
-    /// The margin between two numbers of which the first is the larger.
+    /// Margin between two numbers of which the first is the larger.
     pub fn between(large: f64, small: f64) -> u16 {
         let octaves = libm::log2(large / small);
         // NaN becomes 0.
@@ -141,7 +138,7 @@ impl Margin {
         }
     }
 
-    /// What [`Margin::packed`] kept of a link's; never more than there was.
+    /// Margin of a link from [`Margin::packed`]; never more than was packed.
     pub(super) fn of_link(packed: u16) -> Margin {
         if packed == u16::MAX {
             return Margin::Firm;
@@ -153,7 +150,7 @@ impl Margin {
         Margin::Link { on, both_ways: packed >> 14 & 1 == 1 }
     }
 
-    /// The same of a refined pair's.
+    /// Margin of a refined pair from [`Margin::packed`]; never more than was packed.
     pub(super) fn of_refined(packed: u32) -> Margin {
         if packed == u32::MAX {
             return Margin::Firm;
@@ -166,7 +163,7 @@ impl Margin {
         }
     }
 
-    /// What is left after the errors of the pair grew, if its verdict withstands that.
+    /// Rest of the margin after the errors of the pair grew; `None` if the verdict may have changed.
     pub(super) fn after(self, growth: &Growth) -> Option<Margin> {
         match self {
             Margin::Firm => Some(self),
@@ -191,7 +188,7 @@ impl Margin {
         }
     }
 
-    /// What is left after the logarithm changed to the worse by `steps`; `None` if that is nothing.
+    /// Rest of a margin after `steps` of it were consumed; `None` if nothing is left.
     fn less(margin: u16, steps: i32) -> Option<u16> {
         if margin == Margin::ENDLESS {
             return Some(margin);
@@ -204,16 +201,16 @@ impl Margin {
 /// [`Margin::ENDLESS`] in seven bits.
 const LINK_ENDLESS: u32 = 127;
 
-/// How the light of a coarse element changed, in steps.
+/// Change of brightness of a coarse element, in steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Shift {
-    /// How its radiosity and the reflected part of it grew: at least and at most.
+    /// Growth of its radiosity and of the reflected part of it: least and most.
     radiosity: (i32, i32),
-    /// How its irradiance grew: at least and at most.
+    /// Growth of its irradiance: least and most.
     irradiance: (i32, i32),
 }
 
-/// How the errors of a pair grew on either receiver: at least and at most, in steps.
+/// Growth of the errors of a pair on either receiver: least and most, in steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Growth {
     on: [(i32, i32); 2],
@@ -223,8 +220,8 @@ pub(super) struct Growth {
 const ENDLESS: i32 = 1 << 24;
 
 impl Shift {
-    /// From one light to another; `None` if they are the same.
-    pub(super) fn between(before: &Light, after: &Light) -> Option<Shift> {
+    /// Change from one brightness to another; `None` if they are equal.
+    pub(super) fn between(before: &Brightness, after: &Brightness) -> Option<Shift> {
         if before == after {
             return None;
         }
@@ -234,14 +231,14 @@ impl Shift {
         Some(Shift { radiosity: (all.0.min(part.0), all.1.max(part.1)), irradiance })
     }
 
-    /// From one intensity of a punctual light to another; `None` if they are the same.
+    /// Change from one intensity of a punctual light to another; `None` if they are equal.
     pub(super) fn of_light(before: f64, after: f64) -> Option<Shift> {
         let radiosity = grown(before, after);
         (before != after).then_some(Shift { radiosity, irradiance: (0, 0) })
     }
 }
 
-/// At least and at most how many steps brighter something became.
+/// Growth of a brightness, in steps: least and most.
 fn grown(before: f64, after: f64) -> (i32, i32) {
     if before == after {
         (0, 0)
@@ -257,11 +254,11 @@ fn grown(before: f64, after: f64) -> (i32, i32) {
 fn steps(value: f64) -> i32 {
     let bits = value.to_bits();
     let exponent = (bits >> 52) as i32;
-    exponent * STEPS as i32 + (bits >> 51 & 1) as i32 * FIFTH
+    exponent * STEPS as i32 + (bits >> 51 & 1) as i32 * HALF_OCTAVE
 }
 
 impl Growth {
-    /// What both ends' shifts do to the errors of a pair.
+    /// Growth of a pair's errors by the changes of both ends.
     pub(super) fn of_pair(a: &Shift, b: &Shift) -> Growth {
         let one_way = |receiver: &Shift, source: &Shift| {
             let (least, most) = (source.radiosity.0, source.radiosity.1);
@@ -276,7 +273,7 @@ impl Growth {
         one.max(two)
     }
 
-    /// By how much more the first error grew than the second, if that is known.
+    /// Growth of the first error beyond that of the second; `None` if unknown.
     fn apart(&self) -> Option<i32> {
         let [one, two] = self.on;
         (one.0 == one.1 && two.0 == two.1).then_some(one.0 - two.0)
@@ -287,8 +284,8 @@ impl Growth {
 mod tests {
     use super::*;
 
-    fn light(radiosity: f64, irradiance: f64) -> Light {
-        Light { radiosity, reflected: radiosity, irradiance }
+    fn light(radiosity: f64, irradiance: f64) -> Brightness {
+        Brightness { radiosity, reflected: radiosity, irradiance }
     }
 
     fn growth(on: [(i32, i32); 2]) -> Growth {

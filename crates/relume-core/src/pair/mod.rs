@@ -1,39 +1,40 @@
 //! The pair tree: which elements exchange light with which, and at what level.
 //!
-//! A verdict is a pure function of the poses, the materials' brightness bounds and the tolerance:
-//! this room knows no history, and no radiosity beyond the [`Brightness`] it is handed.
+//! [`update`] walks the tree and has pairs judged ([`Judge`]): a verdict is a link, a refinement or a cull. A verdict is a
+//! pure function of the poses, the brightness of coarse elements ([`CoarseBrightness`]) and the tolerance. Which pairs are
+//! judged again after a motion follows from [`WorldChange`], the margins of verdicts ([`Margin`]) and certificates
+//! ([`Finding`]). Must not know radiosities beyond the [`CoarseBrightness`] it is handed.
 
 mod brightness;
 mod certificate;
+mod certificate_tests;
+mod coarse_brightness;
 mod ends;
 mod groups;
 mod hash;
 mod judge;
-mod light;
 mod margin;
 mod oracle;
-mod outlook;
-mod side;
-mod since;
 mod tree;
 mod update;
+mod world_change;
 
+pub use crate::transport::Side;
 pub use brightness::Brightness;
+pub use certificate_tests::Finding;
+pub use coarse_brightness::CoarseBrightness;
 pub use hash::{PairHash, pair_key};
-pub use judge::{Placed, Stage};
-pub use light::Light;
+pub use judge::{SpaceJudge, Stage};
 pub use margin::{Margin, Shift};
 pub use oracle::Oracle;
-pub use outlook::Finding;
-pub use side::Side;
-pub use since::Since;
 pub use tree::{
     Carried, CullReason, Gradients, Link, PairId, PairTree, State, StateCounts, in_steps,
 };
+pub use world_change::WorldChange;
 // The plane has certificates of its own.
-pub(crate) use outlook::{Moves, Outlook};
+pub(crate) use certificate_tests::{CertificateTests, Moves};
 
 pub use update::{
-    Changes, Edit, EventKind, Held, Hierarchy, Judge, Judgement, LinkEvent, OutOfMemory, Pairs,
-    Record, Scope, Stale, Verdict, Work, update,
+    Changes, CoarseLink, Edit, EventKind, Hierarchy, Judge, Judgement, LinkEvent, OutOfMemory,
+    Pairs, Record, Scope, Stale, Verdict, Work, update,
 };

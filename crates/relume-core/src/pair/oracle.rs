@@ -3,11 +3,11 @@
 use crate::geometry::no_smaller;
 use crate::transport::{BlockerSizes, Exchange, SEGMENTS, Variation, Visibility};
 
-use super::light::Light;
+use super::brightness::Brightness;
 use super::margin::Margin;
-use super::side::Side;
+use crate::transport::Side;
 
-/// What decides on a pair of elements.
+/// Oracle: criterion by which a pair of elements becomes a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Oracle {
     /// An estimate of the error of irradiance that the link causes on its receivers.
@@ -30,7 +30,7 @@ pub(super) struct End {
     pub(super) area: f64,
     /// Area at which an element of this surface weighs 1 in the error norm, m2.
     pub(super) reference_area: f64,
-    pub(super) light: Light,
+    pub(super) light: Brightness,
     /// Its area where it sends: also of what is distant, which receives nothing; m2.
     pub(super) own_area: f64,
     /// Area of the surface that it is a part of and that may send alike: of its patch, or of the sky; m2.
@@ -46,7 +46,7 @@ const SOURCE_VARIATION: f64 = 0.2;
 pub(super) struct Estimate {
     /// The errors on the two receivers.
     pub(super) on: [f64; 2],
-    /// What splitting each end would mend.
+    /// Part of the error that splitting each end would remove.
     mends: (f64, f64),
 }
 
@@ -176,7 +176,7 @@ fn length(x: f64, y: f64) -> f64 {
     (x * x + y * y).sqrt()
 }
 
-/// What both directions of a link share.
+/// Values that both directions of a link share.
 #[derive(Clone, Copy)]
 struct LinkSize {
     exchange: f64,
@@ -188,7 +188,7 @@ struct LinkSize {
     shadow: f64,
     reference_area: f64,
     threshold: f64,
-    /// How far a shadow's edge moves over the source, at most, in units of how far its point on the receiver moves.
+    /// Leverage: largest motion of a shadow's edge over the source per motion of its point on the receiver: 1.
     leverage: f64,
 }
 
@@ -211,11 +211,11 @@ impl LinkSize {
 
 /// Standard deviations over one end of what crosses a link, relative to the mean without occlusion.
 struct Uneven {
-    /// Of the kernel, beyond its gradient.
+    /// Standard deviation of the kernel, beyond its gradient.
     bend: f64,
-    /// Of the visibility.
+    /// Standard deviation of the visibility.
     edge: f64,
-    /// Of both, with the gradient: what uneven radiosity is weighed with.
+    /// Standard deviation of both with the gradient, by which uneven radiosity of the source is weighed.
     sends: f64,
     /// How many times the mean reflected radiosity may be counted wrongly because it leaves what is hidden alone: a
     /// lamp close to a wall lights just the part of it that it hides.
@@ -236,7 +236,7 @@ fn one_way(
     let finer = (receiver.reference_area / scale).sqrt();
     let weight = by_area / receiver.light.irradiance;
     let per_radiosity = link.exchange / receiver.area * weight;
-    let Light { radiosity, reflected, .. } = source.light;
+    let Brightness { radiosity, reflected, .. } = source.light;
     let varies = SOURCE_VARIATION * (source.area / link.reference_area).min(4.0);
     // What a small source does unevenly its neighbours do too, in the same sense: splitting the
     // source does not mend it, so it counts as if the source were as large as the receiver.

@@ -6,10 +6,10 @@ use std::ops::Range;
 use glam::DVec2;
 
 use crate::element::{ElementId, Renumbering};
-use crate::event::{History, Lookahead, Tick};
+use crate::predict::{History, Lookahead, Tick};
 
 use super::margin::Margin;
-use super::side::Side;
+use crate::transport::Side;
 
 /// Index of a pair in a [`PairTree`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -26,7 +26,7 @@ pub enum CullReason {
     NoReceiver,
 }
 
-/// What a pair is at this instant.
+/// State of a pair at this instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
     /// Not judged yet.
@@ -130,14 +130,14 @@ static VALUES: [f32; 256] = {
     values
 };
 
-/// What a link carries.
+/// Values of a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Carried {
     /// Exchange area X without occlusion, m2.
     pub exchange_area_m2: f32,
     /// Visibility V in 65,535ths.
     pub visibility: u16,
-    /// How what arrives varies over the ends.
+    /// Relative gradients of the arriving light over both ends.
     pub gradients: Gradients,
 }
 
@@ -162,7 +162,7 @@ pub struct Link {
     pub a: ElementId,
     /// Second end; the order is inherited from the pair of facets above.
     pub b: ElementId,
-    /// What it carries.
+    /// Its values.
     pub carried: Carried,
 }
 
@@ -183,12 +183,12 @@ impl Link {
 struct Node {
     a: u32,
     b: u32,
-    /// Of a link X, V (below its margin) and gradients; of a refined pair its first child, their number
-    /// and its margins.
+    /// For a link X, V (below its margin) and gradients; for a refined pair its first child, the number of children and its
+    /// margins.
     payload: [u32; 3],
 }
 
-/// Room is given back beyond this share of what is needed.
+/// Spare capacity that vectors keep, as one part in this many of their length.
 const SLACK: usize = 32;
 
 /// Bits of an element's id.
@@ -253,21 +253,21 @@ pub struct PairTree {
     /// First ids of vacant groups of siblings, by their number.
     vacant: Vec<Vec<u32>>,
     counts: StateCounts,
-    /// Until when each pair's certificate stands.
-    due: Beside<Tick>,
-    /// What extrapolation knows of each pair.
-    history: Beside<History>,
+    /// Expiry of each pair's certificate.
+    expiry: SideTable<Tick>,
+    /// Last evaluations of each extrapolated pair.
+    history: SideTable<History>,
     /// Pairs that are extrapolated.
     live: usize,
 }
 
-/// Something beside the nodes, by their ids: nothing at all where it is the default of all of them.
+/// Values by pair beside the nodes; takes no memory while all values are the default.
 #[derive(Clone, Debug, Default)]
-struct Beside<T> {
+struct SideTable<T> {
     values: Vec<T>,
 }
 
-impl<T: Copy + Default + PartialEq> Beside<T> {
+impl<T: Copy + Default + PartialEq> SideTable<T> {
     #[inline]
     fn get(&self, id: PairId) -> T {
         self.values.get(id.0 as usize).copied().unwrap_or_default()
@@ -286,7 +286,7 @@ impl<T: Copy + Default + PartialEq> Beside<T> {
         self.values[at] = value;
     }
 
-    /// What was at `order[k]` comes to k.
+    /// Moves the value at `order[k]` to k.
     fn reorder(&mut self, order: &[u32]) {
         if !self.values.is_empty() {
             self.values = order.iter().map(|&from| self.get(PairId(from))).collect();
@@ -334,16 +334,16 @@ impl PairTree {
     pub fn memory_bytes(&self) -> u64 {
         let lists: usize =
             self.vacant.iter().map(|l| l.capacity() * 4 + size_of::<Vec<u32>>()).sum();
-        let beside = self.due.memory_bytes() + self.history.memory_bytes();
-        (self.nodes.capacity() * size_of::<Node>() + lists) as u64 + beside
+        let side_tables = self.expiry.memory_bytes() + self.history.memory_bytes();
+        (self.nodes.capacity() * size_of::<Node>() + lists) as u64 + side_tables
     }
 
     /// Bytes in use: without the room that vectors keep to grow into, which is no memory before it is
     /// written to.
     pub fn used_bytes(&self) -> u64 {
         let lists: usize = self.vacant.iter().map(|l| l.len() * 4 + size_of::<Vec<u32>>()).sum();
-        let beside = self.due.used_bytes() + self.history.used_bytes();
-        (self.nodes.len() * size_of::<Node>() + lists) as u64 + beside
+        let side_tables = self.expiry.used_bytes() + self.history.used_bytes();
+        (self.nodes.len() * size_of::<Node>() + lists) as u64 + side_tables
     }
 
     /// Room that no pair has.
@@ -376,7 +376,7 @@ impl PairTree {
         let mut known = BTreeMap::new();
         for id in old.clone().map(PairId) {
             let node = self.nodes[id.0 as usize];
-            let same = known.insert(self.ends(id), (node, self.due(id), self.history(id)));
+            let same = known.insert(self.ends(id), (node, self.expiry(id), self.history(id)));
             // Ends that are gone cannot be told apart.
             same.iter().for_each(|(node, ..)| self.count_out(node));
             self.set_history(id, History::default());
@@ -386,9 +386,9 @@ impl PairTree {
         let first = self.refine(PairTree::ROOT, State::RefinedSelf, wanted.iter().copied()).start;
         for (id, ends) in (first..).map(PairId).zip(&wanted) {
             match known.remove(ends) {
-                Some((node, due, history)) => {
+                Some((node, expiry, history)) => {
                     self.nodes[id.0 as usize] = node;
-                    self.set_due(id, due);
+                    self.set_expiry(id, expiry);
                     self.set_history(id, history);
                 }
                 None => self.set_state(id, State::Culled(CullReason::Absent)),
@@ -421,7 +421,7 @@ impl PairTree {
             at += 1;
         }
         debug_assert_eq!(self.nodes.len(), self.len());
-        self.due.reorder(&order);
+        self.expiry.reorder(&order);
         self.history.reorder(&order);
         self.vacant = Vec::new();
     }
@@ -429,7 +429,7 @@ impl PairTree {
     /// Gives back room beyond a small reserve.
     pub fn trim(&mut self) {
         self.nodes.shrink_to(self.nodes.len() + self.nodes.len() / SLACK);
-        self.due.trim();
+        self.expiry.trim();
         self.history.trim();
         self.vacant.iter_mut().for_each(|list| list.shrink_to(2 * list.len()));
     }
@@ -441,7 +441,7 @@ impl PairTree {
         (ElementId(node.a & ID_MASK), ElementId(node.b & ID_MASK))
     }
 
-    /// What a pair is.
+    /// State of a pair.
     #[inline]
     pub fn state(&self, id: PairId) -> State {
         self.nodes[id.0 as usize].state()
@@ -487,7 +487,7 @@ impl PairTree {
         self.nodes[id.0 as usize].set_carried(carried);
     }
 
-    /// What a pair's verdict withstands.
+    /// Margin of a pair's verdict.
     #[inline]
     pub(super) fn margin(&self, id: PairId) -> Margin {
         let node = &self.nodes[id.0 as usize];
@@ -509,17 +509,17 @@ impl PairTree {
         }
     }
 
-    /// Until when a pair's certificate stands; 0 without one.
+    /// Expiry of a pair's certificate; 0 without one.
     #[inline]
-    pub(super) fn due(&self, id: PairId) -> Tick {
-        self.due.get(id)
+    pub(super) fn expiry(&self, id: PairId) -> Tick {
+        self.expiry.get(id)
     }
 
-    pub(super) fn set_due(&mut self, id: PairId, due: Tick) {
-        self.due.set(id, due, self.nodes.len());
+    pub(super) fn set_expiry(&mut self, id: PairId, expiry: Tick) {
+        self.expiry.set(id, expiry, self.nodes.len());
     }
 
-    /// What extrapolation knows of a pair; empty where it is not asked for.
+    /// Last evaluations of a pair; empty where extrapolation is not asked for.
     #[inline]
     pub(super) fn history(&self, id: PairId) -> History {
         self.history.get(id)
@@ -536,7 +536,7 @@ impl PairTree {
         self.live
     }
 
-    /// Those of them that are to be evaluated, ascending.
+    /// Extrapolated pairs that are due for evaluation, ascending.
     pub(super) fn due_pairs(&self, ahead: &Lookahead) -> Vec<PairId> {
         if self.live == 0 {
             return Vec::new();
@@ -549,12 +549,12 @@ impl PairTree {
 
     /// Takes back all certificates.
     pub fn forget_certificates(&mut self) {
-        self.due = Beside::default();
+        self.expiry = SideTable::default();
     }
 
     /// Extrapolates no pair any more.
     pub fn forget_histories(&mut self) {
-        self.history = Beside::default();
+        self.history = SideTable::default();
         self.live = 0;
     }
 
@@ -585,7 +585,7 @@ impl PairTree {
                 *node = Node::new(a, b, State::New);
             }
             for id in (first..first + count as u32).map(PairId) {
-                self.set_due(id, 0);
+                self.set_expiry(id, 0);
                 self.set_history(id, History::default());
             }
         }

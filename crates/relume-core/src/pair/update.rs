@@ -1,8 +1,8 @@
-//! Bringing a pair tree up to date: judge in parallel what may have changed, then edit in order.
+//! Update of a pair tree: pairs that may have changed are judged in parallel, then the tree is edited in order.
 //!
-//! Work goes in blocks of fixed size; every block is judged in chunks of fixed size, whose results
-//! are applied in order. The tree is the same for any number of threads. A cold build is the update
-//! of a tree that holds nothing but its root.
+//! Pairs are judged in blocks of fixed size, each in chunks of fixed size; the results of the chunks are applied in order by
+//! one writer. The resulting tree does not depend on the number of threads. A cold build is the update of a tree with
+//! nothing but its root.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -11,84 +11,84 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::element::{ElementId, ElementKey};
-use crate::event::{History, Lookahead, Sample, Tick};
+use crate::predict::{History, Lookahead, Sample, Tick};
 
+use super::certificate_tests::Finding;
 use super::hash::{PairHash, pair_key};
 use super::margin::Margin;
-use super::outlook::Finding;
-use super::side::Side;
 use super::tree::{Carried, CullReason, PairId, PairTree, State};
+use crate::transport::Side;
 
-/// What is decided on a pair.
+/// Decision on a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// It becomes a link.
+    /// The pair becomes a link.
     Link,
     /// One side is replaced by its children.
     Refine(Side),
     /// A cluster paired with itself: all pairs of its children.
     RefineSelf,
-    /// It exchanges nothing.
+    /// The pair exchanges nothing.
     Cull(CullReason),
-    /// Undecided: it is left as it is, and reported.
-    Hold,
+    /// The pair is a link of the coarse solution: it keeps its state, and is reported in [`Changes::coarse_links`].
+    CoarseLink,
 }
 
-/// A verdict with what it rests on.
+/// A verdict with the values of the pair.
 #[derive(Clone, Copy, Debug)]
 pub struct Judgement {
     /// The verdict.
     pub verdict: Verdict,
-    /// What the pair carries as a link, or while it is held.
+    /// Values of the pair as a link, or as a coarse link.
     pub carried: Carried,
-    /// What the verdict withstands.
+    /// Change of brightness up to which the verdict stands.
     pub margin: Margin,
     /// Visibility segments traced.
     pub segments: u32,
 }
 
-/// What may have changed of a pair since it was judged.
+/// Part of a pair that may have changed since it was judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stale {
-    /// Nothing, and nothing of any pair below it.
+    /// Nothing of the pair, and nothing of any pair below it.
     Nothing,
-    /// Nothing of the pair itself.
+    /// Nothing of the pair itself; perhaps something of a pair below it.
     Below,
-    /// How bright its ends are: its verdict, not what it carries.
+    /// The brightness of its ends: perhaps its verdict, not its values.
     Brightness,
-    /// What stands between its ends.
+    /// The occluders between its ends.
     Occlusion,
-    /// Where its ends are; by certificate nothing stands between them.
+    /// The places of its ends; a certificate says that nothing stands between them.
     Followed,
-    /// What was extrapolated of it is to be evaluated.
+    /// Its extrapolated values, which are due for evaluation.
     Due,
-    /// Where its ends are.
+    /// The places of its ends.
     Moved,
-    /// Everything: it has not been judged yet.
+    /// Everything: the pair has not been judged yet.
     New,
 }
 
-/// The hierarchy that the two ends of a pair come from.
+/// Hierarchy of the elements that are ends of pairs.
 pub trait Hierarchy {
     /// Ids of the children; empty for a leaf.
     fn children(&self, id: ElementId) -> Range<u32>;
-    /// The children, made where there are none yet; and whether they were. Each call is a use of
-    /// them, until [`Hierarchy::release`].
+    /// The children, and whether they were made by this call. Each call counts as a use of the children, until
+    /// [`Hierarchy::release`].
     fn split(&mut self, id: ElementId) -> (Range<u32>, bool);
     /// Takes back one use of the children.
     fn release(&mut self, id: ElementId);
-    /// The name of an element, which does not depend on history.
+    /// Name of an element; independent of history.
     fn key(&self, id: ElementId) -> ElementKey;
     /// Elements alive.
     fn element_count(&self) -> usize;
 }
 
-/// What the pair tree asks of the space it works in.
+/// Questions of the pair tree to the space that its elements are in.
 pub trait Judge: Hierarchy + Sync {
-    /// Judges a pair. `candidates` are the possible occluders of the pair above; those of this
-    /// pair are appended to `narrowed`, whose present content belongs to other pairs. A pure
-    /// function of the space: `candidates` only say where to look, and `known` is what a link carries on
-    /// which nothing but the light changed.
+    /// Verdict on a pair. `candidates` are the candidate occluders of its parent pair; the candidates of this pair are
+    /// appended to `narrowed`, whose present content belongs to other pairs. `known` are the values of a link of which only
+    /// the brightness changed. The verdict is a pure function of the space: it does not depend on which candidates were
+    /// given, as long as no occluder is missing.
     fn judge(
         &self,
         ends: (ElementId, ElementId),
@@ -97,16 +97,16 @@ pub trait Judge: Hierarchy + Sync {
         narrowed: &mut Vec<u32>,
     ) -> Judgement;
 
-    /// What is left of the margin of a pair after the changes of brightness since the last update, if
-    /// its verdict withstands them.
+    /// Rest of a pair's margin after the changes of brightness since the last update; `None` if the verdict may have
+    /// changed.
     fn withstands(&self, a: ElementId, b: ElementId, margin: Margin) -> Option<Margin>;
 
-    /// What may have changed of a pair since the last update. Of a pair that is `certified` (and not
-    /// culled) nothing stands between its ends, or what does is as it was.
+    /// Part of a pair that may have changed since the last update. `certified` says that a certificate stands: unless the
+    /// pair is culled, nothing has come or gone between its ends.
     fn stale(&self, a: ElementId, b: ElementId, certified: bool) -> Stale;
 
-    /// Does the part of [`Judge::judge`] that a change of occlusion asks for, for a refined pair with
-    /// ends at rest, if its verdict does not depend on occlusion. Whether that is so.
+    /// Refreshes the candidate occluders of a refined pair with ends at rest: appends them to `narrowed`. Returns false if
+    /// the verdict depends on visibility; the pair must then be judged.
     fn narrow(
         &self,
         a: ElementId,
@@ -115,49 +115,48 @@ pub trait Judge: Hierarchy + Sync {
         narrowed: &mut Vec<u32>,
     ) -> bool;
 
-    /// Whether the light on one of the ends changed, at a pair whose verdict depends on it.
-    fn dimmed(&self, a: ElementId, b: ElementId) -> bool;
+    /// Whether the brightness of an end changed and the verdict on the pair depends on brightness.
+    fn brightness_changed(&self, a: ElementId, b: ElementId) -> bool;
 
-    /// Whether a certificate stands at this instant.
-    fn certified(&self, due: Tick) -> bool;
+    /// Whether a certificate that expires after `until` stands at this instant.
+    fn certified(&self, until: Tick) -> bool;
 
-    /// How far ahead pairs are extrapolated, if they are.
+    /// Settings of extrapolation; `None` where pairs are not extrapolated.
     fn lookahead(&self) -> Option<&Lookahead>;
 
-    /// Whether it is worth asking how long nothing will stand between the ends of a refined pair with
-    /// these possible occluders.
+    /// Whether [`Finding::Clear`] may be certified for a refined pair with these candidate occluders.
     fn may_be_clear(&self, _a: ElementId, _b: ElementId, narrowed: &[u32]) -> bool {
         narrowed.is_empty()
     }
 
-    /// The last tick until which the known motion cannot change what was found of a pair; 0 if none.
-    fn foresee(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick;
+    /// Expiry of a certificate: the last tick until which the known motion cannot change a finding on a pair; 0 if none.
+    fn expiry(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick;
 
-    /// Whether this pair is one of those that are held when it is not culled.
-    fn holds(&self, a: ElementId, b: ElementId) -> bool;
+    /// Whether this pair is a coarse link unless it is culled.
+    fn is_coarse_pair(&self, a: ElementId, b: ElementId) -> bool;
 
-    /// Whether a link between these two is worked out further from their places once it is one, so that it must be known
-    /// where they were looked at again.
+    /// Whether a link between these two ends is evaluated facet by facet (groups), so that judged pairs must be recorded in
+    /// [`Changes::apart`].
     fn is_apart(&self, _a: ElementId, _b: ElementId) -> bool {
         false
     }
 }
 
-/// Exact counts of what was done.
+/// Exact counts of the work of an update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Pairs met on the walk, those included that turned out to be unaffected.
+    /// Pairs visited on the walk, unaffected ones included.
     pub visited: u64,
     /// Pairs judged.
     pub examined: u64,
-    /// Pairs whose exchange area alone followed the motion of their ends: by certificate nothing
-    /// stands between them.
+    /// Pairs with moved ends of which only the exchange area was evaluated: a certificate says that nothing stands between
+    /// the ends.
     pub followed: u64,
     /// Links of which X and V were extrapolated.
     pub extrapolated: u64,
-    /// Pairs passed over, with all below them, because their certificate stands.
+    /// Pairs skipped, with their subtrees, because their certificate stands.
     pub certified: u64,
-    /// Pairs judged for the coarse solution, before; each is met again.
+    /// Pairs judged for the coarse solution before; each is visited again.
     pub coarse_examined: u64,
     /// Pairs judged because an end moved, or for the first time.
     pub reevaluated: u64,
@@ -182,9 +181,8 @@ pub struct Work {
 }
 
 impl Work {
-    /// Adds an update with the oracle to one down to the coarse level. What was visited and judged is
-    /// that of the second, which comes by every pair of the first again; what was done is that of
-    /// both.
+    /// Adds the update with the oracle to the update down to the coarse level. Visits and judgements are those of the second
+    /// update, which visits every pair of the first again; edits are the sum of both.
     pub fn add_after_coarse(&mut self, other: Work) {
         self.coarse_examined = self.examined;
         self.visited = other.visited;
@@ -208,13 +206,13 @@ impl Work {
 /// One edit to the set of links.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Edit {
-    /// This pair is a link with new values.
+    /// A pair is a link with new values.
     Set(PairId),
-    /// These two are linked no more.
+    /// Two elements are no longer linked.
     Removed(ElementId, ElementId),
 }
 
-/// What happened to a link.
+/// Kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventKind {
     /// Links below a refined pair became one link.
@@ -234,17 +232,17 @@ pub enum EventKind {
 /// An event of a link, by the names of its ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkEvent {
-    /// What happened.
+    /// Kind of the event.
     pub kind: EventKind,
     /// Both ends.
     pub ends: (ElementKey, ElementKey),
-    /// What it carried; `None` where it was no link.
+    /// Values before; `None` where the pair was no link.
     pub before: Option<Carried>,
-    /// What it carries; `None` where it is no link.
+    /// Values after; `None` where the pair is no link.
     pub after: Option<Carried>,
 }
 
-/// What an update writes down.
+/// Records that an update keeps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {
     /// Edits to the links.
@@ -253,18 +251,18 @@ pub struct Record {
     pub events: bool,
 }
 
-/// A pair that was held, with what it would carry.
+/// A link of the coarse solution, with its values.
 #[derive(Clone, Copy, Debug)]
-pub struct Held {
+pub struct CoarseLink {
     /// First end.
     pub a: ElementId,
     /// Second end.
     pub b: ElementId,
-    /// What it would carry.
+    /// Values of the link.
     pub carried: Carried,
 }
 
-/// What an update did.
+/// Result of an update.
 #[derive(Clone, Debug, Default)]
 pub struct Changes {
     /// Counts.
@@ -274,18 +272,18 @@ pub struct Changes {
     /// Events of links that were there before or are there now, in order; empty where they are not
     /// recorded. What is made or removed below a refined pair is not among them.
     pub events: Vec<LinkEvent>,
-    /// Pairs that were refined anew, ascending; empty where edits are not recorded.
+    /// Newly refined pairs, ascending; empty where edits are not recorded.
     pub refined: Vec<PairId>,
-    /// Pairs held.
-    pub held: Vec<Held>,
-    /// Pairs that were held once and may be so no more; both ends may have vanished since.
-    pub dropped: Vec<(ElementId, ElementId)>,
-    /// Links that are worked out further ([`Judge::is_apart`]) of which more than the light was looked at, whatever they
-    /// carry now; empty where edits are not recorded.
+    /// Coarse links that were judged.
+    pub coarse_links: Vec<CoarseLink>,
+    /// Pairs that may have lost their coarse link; both ends may have vanished since.
+    pub dropped_coarse_links: Vec<(ElementId, ElementId)>,
+    /// Links of groups ([`Judge::is_apart`]) of which more than the brightness was evaluated; empty where edits are not
+    /// recorded.
     pub apart: Vec<(ElementId, ElementId)>,
 }
 
-/// The memory that an update may use is spent.
+/// Error: the memory limit of an update is reached, or it was called off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutOfMemory;
 
@@ -303,24 +301,23 @@ pub struct Pairs<'a> {
     pub hash: &'a mut PairHash,
 }
 
-/// What an update is about.
+/// Input of an update beside the tree and the judge.
 pub struct Scope<'a> {
-    /// What may stand between any two elements.
+    /// Candidate occluders of the root pair.
     pub candidates: &'a [u32],
-    /// What is written down.
+    /// Records to keep.
     pub record: Record,
-    /// Pairs (ascending) that an update with the same [`Judge::stale`] has refined already: all of their children are
-    /// looked at.
+    /// Pairs (ascending) that an earlier update with the same [`Judge::stale`] refined: all of their children are visited.
     pub fresh: &'a [PairId],
-    /// Asked after each block with the tree, the number of elements and the scratch memory in bytes.
+    /// Called after each block with the tree, the number of elements and the scratch memory in bytes; false ends the update.
     pub may_go_on: &'a dyn Fn(&PairTree, usize, u64) -> bool,
 }
 
 /// Brings a tree, with the hash over its links, up to date.
 ///
 /// # Errors
-/// [`OutOfMemory`] as soon as `may_go_on` says no: what was looked at until then is up to date, the rest is as it was, and
-/// pairs may be left unjudged.
+/// [`OutOfMemory`] as soon as `may_go_on` returns false: pairs applied until then are up to date, the others are unchanged,
+/// and new pairs may be left unjudged.
 pub fn update<J: Judge>(
     Pairs { tree, hash }: Pairs<'_>,
     judge: &mut J,
@@ -339,14 +336,14 @@ pub fn update<J: Judge>(
                 for chunk in &judged {
                     editor.apply_chunk(chunk, &wave);
                 }
-                let held = editor.changes.held.len() * size_of::<Held>();
-                let scratch = wave.used_bytes() + editor.next.used_bytes() + held as u64;
+                let coarse = editor.changes.coarse_links.len() * size_of::<CoarseLink>();
+                let scratch = wave.used_bytes() + editor.next.used_bytes() + coarse as u64;
                 if !may_go_on(editor.tree, editor.judge.element_count(), scratch) {
                     return Err(OutOfMemory);
                 }
             }
         }
-        // Pairs that are due though no motion led to them.
+        // Extrapolated pairs that are due, though no motion led to them.
         let due = editor.judge.lookahead().map(|ahead| editor.tree.due_pairs(ahead));
         let list = editor.next.push_candidates(root_candidates);
         editor.next.items.extend(due.into_iter().flatten().map(|pair| Item { pair, list }));
@@ -358,12 +355,12 @@ pub fn update<J: Judge>(
     Ok(editor.changes)
 }
 
-/// Pairs to be looked at, with the possible occluders of the pairs above them.
+/// Pairs to be visited, with the candidate occluders of their parents.
 #[derive(Clone, Debug, Default)]
 struct Wave {
     items: Vec<Item>,
     candidates: Vec<u32>,
-    /// Where lists of the wave before are that were handed on as they were, by their start there.
+    /// Lists handed on unchanged from the wave before, by their start there.
     handed_on: BTreeMap<u32, List>,
 }
 
@@ -374,14 +371,13 @@ struct Item {
 }
 
 impl Item {
-    /// Whether the pair is no longer what was looked at: an edit before it in the same wave removed
-    /// it. Only pairs that are due can have another of their wave above them.
+    /// Whether an earlier edit of the same wave removed the pair. Only pairs that are due can have an ancestor in their wave.
     fn is_gone(&self, tree: &PairTree, ends: (ElementId, ElementId)) -> bool {
         tree.state(self.pair) == State::Vacant || tree.ends(self.pair) != ends
     }
 }
 
-/// Some candidates of a wave.
+/// Range of the candidates of a wave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct List {
     start: u32,
@@ -421,7 +417,7 @@ impl List {
     /// No candidates, by the certificate of a pair above.
     const CLEAR: List = List { start: u32::MAX, len: 0 };
 
-    fn since(start: usize, candidates: &[u32]) -> List {
+    fn from_start(start: usize, candidates: &[u32]) -> List {
         List { start: start as u32, len: (candidates.len() - start) as u32 }
     }
 
@@ -436,15 +432,15 @@ impl List {
 /// The candidates of the children of a pair.
 #[derive(Clone, Copy, Debug)]
 enum Below {
-    /// Those of the pair above it: nearly all were left.
+    /// The candidates of the pair itself: nearly all of them are left.
     Same,
-    /// A list of its own, of its chunk.
+    /// A list of its own in the chunk.
     Own(List),
 }
 
 impl Below {
-    /// A list that leaves more than this of every 8 is not worth a copy: in a heap of slivers every shaft holds nearly
-    /// all others, and lists of their own would be most of the memory.
+    /// Eighths of the parent's candidates from which a list is shared, not copied: in a heap of slivers every shaft contains
+    /// nearly all candidates, and copies would be most of the memory.
     const MOST: usize = 7;
 
     /// The list at the end of `narrowed` if it is short against the one that it was found in.
@@ -454,32 +450,33 @@ impl Below {
             narrowed.truncate(start);
             return Below::Same;
         }
-        Below::Own(List::since(start, narrowed))
+        Below::Own(List::from_start(start, narrowed))
     }
 }
 
 struct Chunk<'a> {
     items: &'a [Item],
     ends: Vec<(ElementId, ElementId)>,
-    looks: Vec<Look>,
+    outcomes: Vec<Outcome>,
     candidates: Vec<u32>,
 }
 
-/// What a look at a pair found.
-enum Look {
-    /// Nothing can have changed here or below, by certificate.
+/// Result of evaluating one pair against the unchanging tree.
+enum Outcome {
+    /// A certificate says that nothing changed here or below.
     Certified,
-    /// Nothing has changed here or below, nor can it until then.
+    /// Nothing changed here or below, nor can it until the given tick.
     Unaffected(Tick),
-    /// Look at the children; with a certificate, unless the pair keeps the one it has, as below.
+    /// The children are to be visited. `Some` is the expiry of a new certificate; with `None` the pair keeps its own. The
+    /// same holds for the expiries below.
     Descend(Option<Tick>),
-    /// Look at the children, with these candidates.
+    /// The children are to be visited with these candidates.
     Narrowed(Below),
-    /// The light changed, the verdict did not; look at the children.
+    /// The brightness changed, the verdict did not; the children are to be visited.
     Withstands(Margin, Option<Tick>),
-    /// A link, extrapolated.
+    /// A link with extrapolated values.
     Extrapolated(Carried, Option<Margin>),
-    /// Judged, with the candidates of its children and a certificate.
+    /// A judged pair, with the candidates of its children and the expiry of its certificate.
     Judged(Judgement, Stale, Below, Option<Tick>),
 }
 
@@ -492,23 +489,23 @@ fn judge_block<'a, J: Judge>(
 ) -> Vec<Chunk<'a>> {
     let judge_chunk = |items: &'a [Item]| {
         let mut narrowed = Vec::new();
-        let looks = items
+        let outcomes = items
             .iter()
-            .map(|item| look_at(tree, judge, item, (candidates, &mut narrowed), fresh))
+            .map(|item| evaluate(tree, judge, item, (candidates, &mut narrowed), fresh))
             .collect();
         let ends = items.iter().map(|item| tree.ends(item.pair)).collect();
-        Chunk { items, ends, looks, candidates: narrowed }
+        Chunk { items, ends, outcomes, candidates: narrowed }
     };
     items.par_chunks(CHUNK).map(judge_chunk).collect()
 }
 
-fn look_at<J: Judge>(
+fn evaluate<J: Judge>(
     tree: &PairTree,
     judge: &J,
     item: &Item,
     (candidates, narrowed): (&[u32], &mut Vec<u32>),
     fresh: &[PairId],
-) -> Look {
+) -> Outcome {
     let (a, b) = tree.ends(item.pair);
     let state = tree.state(item.pair);
     let new = state == State::New || fresh.binary_search(&item.pair).is_ok();
@@ -516,13 +513,13 @@ fn look_at<J: Judge>(
     let mut due = false;
     if let Some(ahead) = judge.lookahead().filter(|_| !new && history.is_live()) {
         due = history.is_due(ahead);
-        if !due && let Some(look) = extrapolate(tree, judge, item.pair, &history, ahead) {
-            return look;
+        if !due && let Some(outcome) = extrapolate(tree, judge, item.pair, &history, ahead) {
+            return outcome;
         }
     }
-    let certified = !new && judge.certified(tree.due(item.pair));
+    let certified = !new && judge.certified(tree.expiry(item.pair));
     if certified && matches!(state, State::Culled(_)) {
-        return Look::Certified;
+        return Outcome::Certified;
     }
     let stale = match new {
         true => Stale::New,
@@ -530,20 +527,20 @@ fn look_at<J: Judge>(
         false => judge.stale(a, b, certified || item.list == List::CLEAR),
     };
     // Of a pair whose ends are at rest with nothing new between them.
-    let unaffected = || (!certified).then(|| judge.foresee(a, b, Finding::Unaffected));
+    let unaffected = || (!certified).then(|| judge.expiry(a, b, Finding::Unaffected));
     if stale == Stale::Brightness
         && let Some(left) = judge.withstands(a, b, tree.margin(item.pair))
     {
-        return Look::Withstands(left, unaffected());
+        return Outcome::Withstands(left, unaffected());
     }
     let start = narrowed.len();
     match stale {
-        Stale::Nothing => return unaffected().map_or(Look::Certified, Look::Unaffected),
-        Stale::Below => return Look::Descend(unaffected()),
+        Stale::Nothing => return unaffected().map_or(Outcome::Certified, Outcome::Unaffected),
+        Stale::Below => return Outcome::Descend(unaffected()),
         Stale::Occlusion
             if state.is_refined() && judge.narrow(a, b, item.list.of(candidates), narrowed) =>
         {
-            return Look::Narrowed(Below::of(item.list, start, narrowed));
+            return Outcome::Narrowed(Below::of(item.list, start, narrowed));
         }
         _ => {}
     }
@@ -558,7 +555,7 @@ fn judge_again<J: Judge>(
     stale: Stale,
     (candidates, narrowed): (&[u32], &mut Vec<u32>),
     unaffected: &dyn Fn() -> Option<Tick>,
-) -> Look {
+) -> Outcome {
     let ((a, b), state) = (tree.ends(item.pair), tree.state(item.pair));
     let start = narrowed.len();
     let candidates = if stale == Stale::Followed { &[] } else { item.list.of(candidates) };
@@ -583,18 +580,18 @@ fn judge_again<J: Judge>(
     if !refined {
         narrowed.truncate(start);
     }
-    let due = match stale == Stale::Brightness {
-        true if !matches!(found.verdict, Verdict::Cull(_) | Verdict::Hold) => unaffected(),
+    let expiry = match stale == Stale::Brightness {
+        true if !matches!(found.verdict, Verdict::Cull(_) | Verdict::CoarseLink) => unaffected(),
         _ => certificate(judge, (a, b), (found.verdict, stale), may_be_clear),
     };
     let list = match stale {
         Stale::Followed => Below::Own(List::CLEAR),
         _ => Below::of(item.list, start, narrowed),
     };
-    Look::Judged(found, stale, list, due)
+    Outcome::Judged(found, stale, list, expiry)
 }
 
-/// Until when what was found of a pair cannot change; `None` where the pair keeps the certificate that it has.
+/// Expiry of the certificate of a judged pair; `None` where the pair keeps the certificate that it has.
 fn certificate<J: Judge>(
     judge: &J,
     (a, b): (ElementId, ElementId),
@@ -602,26 +599,25 @@ fn certificate<J: Judge>(
     may_be_clear: bool,
 ) -> Option<Tick> {
     match found {
-        (Verdict::Cull(_), _) => Some(judge.foresee(a, b, Finding::Culled)),
+        (Verdict::Cull(_), _) => Some(judge.expiry(a, b, Finding::Culled)),
         (_, Stale::Followed) => None,
         // It is met again, perhaps still in the state that it had.
-        (Verdict::Hold, _) => Some(0),
-        (_, Stale::Moved) if may_be_clear => Some(judge.foresee(a, b, Finding::Clear)),
+        (Verdict::CoarseLink, _) => Some(0),
+        (_, Stale::Moved) if may_be_clear => Some(judge.expiry(a, b, Finding::Clear)),
         _ => Some(0),
     }
 }
 
-/// What becomes of a dynamic pair that is not due; `None` if the light on it changed so much that it is
-/// judged all the same.
+/// Outcome for a dynamic pair that is not due; `None` if its brightness changed so much that it must be judged.
 fn extrapolate<J: Judge>(
     tree: &PairTree,
     judge: &J,
     pair: PairId,
     history: &History,
     ahead: &Lookahead,
-) -> Option<Look> {
+) -> Option<Outcome> {
     let (a, b) = tree.ends(pair);
-    let margin = match judge.dimmed(a, b) {
+    let margin = match judge.brightness_changed(a, b) {
         true => Some(judge.withstands(a, b, tree.margin(pair))?),
         false => None,
     };
@@ -629,11 +625,11 @@ fn extrapolate<J: Judge>(
         Some(link) => {
             let (exchange_area_m2, visibility) = history.extrapolated(ahead);
             let carried = Carried { exchange_area_m2, visibility, ..link.carried };
-            Some(Look::Extrapolated(carried, margin))
+            Some(Outcome::Extrapolated(carried, margin))
         }
         None => Some(match margin {
-            Some(margin) => Look::Withstands(margin, None),
-            None => Look::Descend(None),
+            Some(margin) => Outcome::Withstands(margin, None),
+            None => Outcome::Descend(None),
         }),
     }
 }
@@ -650,30 +646,30 @@ struct Editor<'a, J> {
 
 impl<J: Judge> Editor<'_, J> {
     fn apply_chunk(&mut self, chunk: &Chunk<'_>, wave: &Wave) {
-        for ((item, look), &ends) in chunk.items.iter().zip(&chunk.looks).zip(&chunk.ends) {
+        for ((item, outcome), &ends) in chunk.items.iter().zip(&chunk.outcomes).zip(&chunk.ends) {
             if item.is_gone(self.tree, ends) {
                 continue;
             }
             self.changes.work.visited += 1;
-            match look {
-                Look::Certified => self.changes.work.certified += 1,
-                Look::Unaffected(due) => self.tree.set_due(item.pair, *due),
-                Look::Descend(due) => {
-                    self.certify(item.pair, *due);
+            match outcome {
+                Outcome::Certified => self.changes.work.certified += 1,
+                Outcome::Unaffected(expiry) => self.tree.set_expiry(item.pair, *expiry),
+                Outcome::Descend(expiry) => {
+                    self.certify(item.pair, *expiry);
                     let children = self.tree.children(item.pair);
-                    self.look_at(children, Below::Same, item, (chunk, wave));
+                    self.enqueue(children, Below::Same, item, (chunk, wave));
                 }
-                Look::Narrowed(list) => {
+                Outcome::Narrowed(list) => {
                     let children = self.tree.children(item.pair);
-                    self.look_at(children, *list, item, (chunk, wave));
+                    self.enqueue(children, *list, item, (chunk, wave));
                 }
-                Look::Withstands(margin, due) => {
-                    self.certify(item.pair, *due);
+                Outcome::Withstands(margin, expiry) => {
+                    self.certify(item.pair, *expiry);
                     self.tree.set_margin(item.pair, *margin);
                     let children = self.tree.children(item.pair);
-                    self.look_at(children, Below::Same, item, (chunk, wave));
+                    self.enqueue(children, Below::Same, item, (chunk, wave));
                 }
-                Look::Extrapolated(carried, margin) => {
+                Outcome::Extrapolated(carried, margin) => {
                     self.changes.work.extrapolated += 1;
                     self.changes.work.dynamic_links += 1;
                     self.carry(item.pair, carried);
@@ -682,15 +678,15 @@ impl<J: Judge> Editor<'_, J> {
                         self.tree.set_margin(item.pair, *margin);
                     }
                 }
-                Look::Judged(found, stale, list, due) => {
+                Outcome::Judged(found, stale, list, expiry) => {
                     self.count(found, *stale);
                     self.remember(item.pair, found, *stale);
                     let children = self.apply(item.pair, found, *stale);
                     if found.verdict == Verdict::Link && *stale != Stale::Brightness {
                         self.note_apart(item.pair);
                     }
-                    self.certify(item.pair, *due);
-                    self.look_at(children, *list, item, (chunk, wave));
+                    self.certify(item.pair, *expiry);
+                    self.enqueue(children, *list, item, (chunk, wave));
                 }
             }
         }
@@ -703,9 +699,9 @@ impl<J: Judge> Editor<'_, J> {
         }
     }
 
-    fn certify(&mut self, pair: PairId, due: Option<Tick>) {
-        if let Some(due) = due {
-            self.tree.set_due(pair, due);
+    fn certify(&mut self, pair: PairId, expiry: Option<Tick>) {
+        if let Some(expiry) = expiry {
+            self.tree.set_expiry(pair, expiry);
         }
     }
 
@@ -724,7 +720,7 @@ impl<J: Judge> Editor<'_, J> {
         }
     }
 
-    /// Takes an evaluation into the history of a pair, before it is applied.
+    /// Adds an evaluation to the history of a pair, before it is applied.
     fn remember(&mut self, pair: PairId, found: &Judgement, stale: Stale) {
         let Some(ahead) = self.judge.lookahead() else { return };
         let (a, b) = self.tree.ends(pair);
@@ -762,7 +758,7 @@ impl<J: Judge> Editor<'_, J> {
         self.tree.set_history(pair, history);
     }
 
-    fn look_at(
+    fn enqueue(
         &mut self,
         pairs: Range<u32>,
         list: Below,
@@ -779,13 +775,13 @@ impl<J: Judge> Editor<'_, J> {
         }
     }
 
-    /// Carries out a verdict; returns the children to be looked at.
+    /// Carries out a verdict; returns the children to be visited.
     fn apply(&mut self, pair: PairId, found: &Judgement, stale: Stale) -> Range<u32> {
         let before = self.tree.state(pair);
         let (a, b) = self.tree.ends(pair);
         let wanted = match found.verdict {
-            Verdict::Hold => {
-                self.changes.held.push(Held { a, b, carried: found.carried });
+            Verdict::CoarseLink => {
+                self.changes.coarse_links.push(CoarseLink { a, b, carried: found.carried });
                 return 0..0;
             }
             Verdict::Link => State::Active,
@@ -821,7 +817,7 @@ impl<J: Judge> Editor<'_, J> {
         0..0
     }
 
-    /// A link stays one; it may carry something else.
+    /// Sets the values of a link that stays one.
     fn carry(&mut self, pair: PairId, carried: &Carried) {
         let before = self.tree.link(pair).expect("a link").carried;
         if before != *carried {
@@ -870,7 +866,7 @@ impl<J: Judge> Editor<'_, J> {
         }
     }
 
-    /// Undoes what a pair was: it is as good as new then.
+    /// Removes the links and children of a pair, so that it is like a new one.
     fn leave(&mut self, pair: PairId, before: State) {
         match before {
             State::Active => self.unlink(pair),
@@ -910,7 +906,7 @@ impl<J: Judge> Editor<'_, J> {
             }
             State::Culled(_) | State::New | State::Vacant => {
                 self.tree.set_state(pair, wanted);
-                self.drop_held(pair);
+                self.drop_coarse_link(pair);
                 0..0
             }
         }
@@ -927,7 +923,7 @@ impl<J: Judge> Editor<'_, J> {
         for child in self.tree.children(pair).map(PairId) {
             let state = self.tree.state(child);
             self.leave(child, state);
-            self.drop_held(child);
+            self.drop_coarse_link(child);
         }
         if let State::Refined(side) = self.tree.state(pair) {
             let (a, b) = self.tree.ends(pair);
@@ -936,10 +932,10 @@ impl<J: Judge> Editor<'_, J> {
         self.tree.remove_children(pair);
     }
 
-    fn drop_held(&mut self, pair: PairId) {
+    fn drop_coarse_link(&mut self, pair: PairId) {
         let (a, b) = self.tree.ends(pair);
-        if self.judge.holds(a, b) {
-            self.changes.dropped.push((a, b));
+        if self.judge.is_coarse_pair(a, b) {
+            self.changes.dropped_coarse_links.push((a, b));
         }
     }
 

@@ -9,8 +9,8 @@ use crate::element::{ElementId, Forest, Shape, WorldElement, WorldPatch, WorldVi
 use crate::pair::Link;
 use crate::scene::{BodyId, PatchId};
 use crate::transport::{
-    Exchange, Looker, Meeting, Shaft, Simd, contact_exchange, exchange, exchange_of_points,
-    lookout, meeting, overlap_m2,
+    Exchange, Meeting, Shaft, Side, Simd, contact_exchange, exchange, exchange_of_points, meeting,
+    overlap_m2, prepare_view,
 };
 
 use crate::space::{Solved, SpaceState};
@@ -154,14 +154,14 @@ impl<'a> Sharing<'a> {
 
     /// Visibility of one end of a link from the whole of the other, looked at as closely as pieces are;
     /// `None` past too many occluders to clip by.
-    pub(super) fn visibility_from(&self, link: &Link, looker: Looker) -> Option<f64> {
+    pub(super) fn visibility_from(&self, link: &Link, observer: Side) -> Option<f64> {
         let whole = [link.a, link.b].map(|id| [self.forest.shape(id)]);
         let cut = self.cut(link, (&whole[0], &whole[1]));
         let blockers = self.blockers(&cut);
         let ends = (&cut.ends.0.whole, &cut.ends.1.whole);
-        let from = if looker == Looker::B { ends.1 } else { ends.0 };
+        let from = if observer == Side::B { ends.1 } else { ends.0 };
         let all = |_| f64::from(link.carried.exchange_area_m2);
-        let see = || self.seen_from(&cut, looker, std::slice::from_ref(from), &blockers, &all)[0];
+        let see = || self.seen_from(&cut, observer, std::slice::from_ref(from), &blockers, &all)[0];
         (self.shaft(&cut, ends).occluders(&blockers) <= CLIPPED_MAX).then(see)
     }
 
@@ -203,9 +203,9 @@ impl<'a> Sharing<'a> {
         }
         // An end in one piece sees what the pieces of the other see together.
         let a_sees = (one.pieces.len() > 1)
-            .then(|| self.seen_from(cut, Looker::A, &one.pieces, blockers, &of_row));
+            .then(|| self.seen_from(cut, Side::A, &one.pieces, blockers, &of_row));
         let b_sees = (other.pieces.len() > 1)
-            .then(|| self.seen_from(cut, Looker::B, &other.pieces, blockers, &of_column));
+            .then(|| self.seen_from(cut, Side::B, &other.pieces, blockers, &of_column));
         let wanted = |sees: &Vec<f64>, of: &dyn Fn(usize) -> f64| -> Vec<f64> {
             sees.iter().enumerate().map(|(k, v)| v * of(k)).collect()
         };
@@ -268,19 +268,19 @@ impl<'a> Sharing<'a> {
     fn seen_from(
         &self,
         cut: &Cut,
-        looker: Looker,
+        observer: Side,
         pieces: &[Place],
         blockers: &[PatchId],
         exchange_area_m2: &dyn Fn(usize) -> f64,
     ) -> Vec<f64> {
         let whole = (&cut.ends.0.whole, &cut.ends.1.whole);
-        let mut from = lookout(self.simd, &self.shaft(cut, whole), blockers, looker);
+        let mut from = prepare_view(self.simd, &self.shaft(cut, whole), blockers, observer);
         let values = from.from_middles(pieces.iter().map(|place| &place.own));
         let looks: Vec<Look> = pieces
             .iter()
             .zip(values)
             .map(|(place, value)| {
-                let ends = if looker == Looker::B { (whole.0, place) } else { (place, whole.1) };
+                let ends = if observer == Side::B { (whole.0, place) } else { (place, whole.1) };
                 let blockers = self.shaft(cut, ends).those_that_block(blockers);
                 // Within one body as it is in that body's frame.
                 let distance = |&patch: &PatchId| {
@@ -335,7 +335,7 @@ impl<'a> Sharing<'a> {
             return exchange_of_points(a, b);
         }
         match meeting(a, b) {
-            Meeting::Away => Exchange::default(),
+            Meeting::BackFacing => Exchange::default(),
             Meeting::Coplanar => contact_exchange(a, b, overlap_m2(a, b, std::iter::empty())),
             met => exchange(self.simd, a, b, met),
         }

@@ -12,14 +12,14 @@ use crate::follow::directions;
 use crate::pair::{self, Carried, Gradients};
 use crate::solver::{Dirty, Link, Links, LinksBuilder, Radiosity, Stop};
 use crate::space::Solved;
-use crate::transport::{Looker, Meeting, meeting};
+use crate::transport::{Meeting, Side, meeting};
 
 use super::compare::mean_radiosity;
 use super::pieces::Sharing;
 
 /// Links whose line is off by less than this share of the tolerance times the mean radiosity are
 /// left as they are.
-const DIM: f64 = 0.001;
+const NEGLIGIBLE_SHARE: f64 = 0.001;
 
 /// Links that one task looks at.
 const LINKS_AT_ONCE: usize = 512;
@@ -35,7 +35,7 @@ pub(super) fn solve(solved: &Solved) -> (Links, Radiosity) {
         solved,
         sharing: Sharing::new(solved),
         leaves: Leaves::of(forest),
-        dim_w_m2: DIM * solved.space.tuning.tolerance * mean_radiosity(solved),
+        negligible_w_m2: NEGLIGIBLE_SHARE * solved.space.tuning.tolerance * mean_radiosity(solved),
     };
     let links: Vec<pair::Link> = solved.tree.links().collect();
     let of_links = |links: &[pair::Link]| {
@@ -90,7 +90,7 @@ struct Reconstruction<'a> {
     solved: &'a Solved,
     sharing: Sharing<'a>,
     leaves: Leaves,
-    dim_w_m2: f64,
+    negligible_w_m2: f64,
 }
 
 impl Reconstruction<'_> {
@@ -119,7 +119,7 @@ impl Reconstruction<'_> {
         }
         let sends = self.solved.radiosity.radiosity(source.0);
         let brightest = f64::from(sends.iter().fold(0.0_f32, |m, b| m.max(*b)));
-        if brightest * self.line_error(link, receiver) <= self.dim_w_m2 {
+        if brightest * self.line_error(link, receiver) <= self.negligible_w_m2 {
             return false;
         }
         let (ids, shapes) = self.leaves.below(receiver);
@@ -155,11 +155,11 @@ impl Reconstruction<'_> {
         if visibility == u16::MAX {
             return None;
         }
-        let (looker, over_receiver, over_source) = match leaf == link.a {
-            true => (Looker::A, gradients.over_a, gradients.over_b),
-            false => (Looker::B, gradients.over_b, gradients.over_a),
+        let (observer, over_receiver, over_source) = match leaf == link.a {
+            true => (Side::A, gradients.over_a, gradients.over_b),
+            false => (Side::B, gradients.over_b, gradients.over_a),
         };
-        let v = self.sharing.visibility_from(link, looker)?;
+        let v = self.sharing.visibility_from(link, observer)?;
         let area_m2 = self.solved.space.forest.receiving_m2(leaf);
         let coupling = (v * f64::from(exchange_area_m2) / area_m2) as f32;
         Some(Link { source: source.0, coupling, over_receiver, over_source })

@@ -111,7 +111,7 @@ pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Sna
     let surfaces = solved.space.surfaces();
     let bends = Bends { solved, links, radiosity };
     let of_facet = |facet: ElementId, out: &mut Vec<Leaf>| {
-        let lit = surfaces.lit(facet.0);
+        let material = surfaces.material(facet.0);
         let mut bent = bends.of_leaves(facet.0).into_iter();
         radiosity.irradiances(&surfaces, facet.0, &mut |id, h| {
             // Of what is exposed; a leaf is read about its own centroid.
@@ -124,7 +124,7 @@ pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Sna
                 irradiance,
                 irradiance_gradient: h.gradient,
                 radiosity: std::array::from_fn(|c| {
-                    lit.exitance[c] + lit.reflectance[c] * irradiance[c]
+                    material.exitance[c] + material.reflectance[c] * irradiance[c]
                 }),
             });
         });

@@ -26,7 +26,7 @@ const SLIVER: f64 = 1e-9;
 const CUTS_MAX: usize = 2_000_000;
 
 /// Polygons of a surface, and covered parts of a patch, that are looked at.
-const MANY: usize = 4_096;
+const POLYGONS_MAX: usize = 4_096;
 
 /// What of a patch is covered.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -268,7 +268,7 @@ impl Group {
             let [p, q] = if along.dot(q - p) < 0.0 { [q, p] } else { [p, q] };
             outline.push([p, q].map(|c| in_frame(scene, patch.id, c)));
         }
-        if outline.is_empty() || outline.len() > MANY {
+        if outline.is_empty() || outline.len() > POLYGONS_MAX {
             return;
         }
         *left = left.saturating_sub(outline.len());
@@ -321,7 +321,7 @@ fn add(
         fresh = rest;
     }
     fresh.retain(|p| wide(p));
-    if *left == 0 || covered.parts.len() + fresh.len() > MANY {
+    if *left == 0 || covered.parts.len() + fresh.len() > POLYGONS_MAX {
         // Without the cuts parts would count twice.
         covered.parts.clear();
     } else {
@@ -395,7 +395,7 @@ fn hulls_of(scene: &Scene, (placed, first): (&[Placed], usize), out: &mut Vec<Hu
         }
     }
     hulls.iter_mut().for_each(|hull| hull.twins.sort_unstable());
-    out.extend(hulls.into_iter().filter(|hull| (3..=MANY).contains(&hull.polygons.len())));
+    out.extend(hulls.into_iter().filter(|hull| (3..=POLYGONS_MAX).contains(&hull.polygons.len())));
 }
 
 #[cfg(test)]

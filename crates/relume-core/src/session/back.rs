@@ -10,7 +10,7 @@ use crate::space::{Solved, SpaceState};
 use super::replant::Edited;
 use super::{FrameReport, Session};
 
-/// What it takes to find a solution anew.
+/// State needed to compute an earlier solution again.
 pub(super) struct Back {
     scene: Arc<Scene>,
     world: World,

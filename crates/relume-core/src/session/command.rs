@@ -1,6 +1,6 @@
-//! Commands: what a hand changes in a running session, each with its inverse.
+//! Commands: changes of the world of a running session, each with its inverse.
 //!
-//! A command changes what the next solve solves, and nothing that was solved. Must not know links or elements.
+//! A command changes the world of the next solve, not the last solution. Must not know links or elements.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use super::replant::Edit;
 
 /// A change of the world: [`Session::apply`] returns its inverse.
 ///
-/// Where a value is `None`, the clip of the scene has its say again.
+/// Where a value is `None`, the value follows the clip of the scene again.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Command {
@@ -38,7 +38,7 @@ pub enum Command {
     PutBack(Arc<Removed>),
 }
 
-/// A body that was taken out, with what was held of it.
+/// A removed body, with the values that commands had set of it.
 #[derive(Clone, Debug)]
 pub struct Removed {
     id: BodyId,
@@ -91,17 +91,17 @@ pub enum CommandError {
         what: &'static str,
         /// Its index.
         index: u32,
-        /// How many there are.
+        /// Number of such things in the scene.
         count: usize,
     },
     /// A value is outside of what can be computed with.
     #[error("{subject}: {what}; {remedy}")]
     Value {
-        /// What it is of, with its name.
+        /// Kind and name of the thing.
         subject: String,
-        /// What is wrong.
+        /// The flaw.
         what: String,
-        /// What to do.
+        /// The remedy.
         remedy: String,
     },
     /// The new body is none.
@@ -113,7 +113,7 @@ pub enum CommandError {
 const ORTHONORMAL: f64 = 1e-6;
 
 impl Session {
-    /// Changes the world that the next solve is of; returns the command that takes the change back.
+    /// Changes the world of the next solve; returns the inverse command.
     ///
     /// The law: any commands followed by their inverses in reverse order lead to the state of the start, and the state
     /// after any commands equals that of a session that was given the same world at once, links bit for bit.
@@ -257,7 +257,7 @@ fn check_emission(subject: String, to: &Option<[f64; 3]>) -> Result<(), CommandE
     }
 }
 
-/// What is wrong with a pose.
+/// Flaw of a pose, if it has one.
 fn flaw_of(pose: &Pose) -> Option<String> {
     if !is_place(&pose.translation.to_array()) {
         let at = pose.translation;

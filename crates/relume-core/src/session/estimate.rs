@@ -1,6 +1,6 @@
-//! How much there is to solve, said beforehand.
+//! Estimate of pairs, memory and time of a frame before it is solved.
 //!
-//! What decides is how many pairs of patches face each other that are in no group: all of them are judged, whatever the
+//! The estimate follows from the number of pairs of patches face each other that are in no group: all of them are judged, whatever the
 //! tolerance, and most of them become links. What refinement adds is small for many patches, and large for few. Patches of groups
 //! cost a number of pairs each. The numbers were fitted to scenes measured (docs/performance.md). Nothing that is solved depends on an
 //! estimate.
@@ -17,8 +17,7 @@ use super::{Options, Oracle};
 /// Pairs of patches that are tried at most: of more, an even share.
 const TRIED: u64 = 4_000_000;
 
-/// How much there is to solve in one frame from scratch: rough ranges from low to high, which do not hold every
-/// scene.
+/// Estimated work of one frame from scratch: rough ranges from low to high, which do not bound every scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// Patches that are present.
@@ -81,7 +80,7 @@ fn count_facing(placed: &[Placed], slack_m: f64, tried: u64) -> u64 {
 }
 
 impl Estimate {
-    /// Of a scene at `time_s`, solved from scratch with these options.
+    /// Estimate for a scene at `time_s`, solved from scratch with these options.
     ///
     /// Cost: some million tests of two polygons at most.
     pub fn of(scene: &Scene, time_s: f64, options: &Options) -> Estimate {

@@ -62,12 +62,12 @@ pub enum SessionError {
     Unsettled {
         /// The frame being computed.
         frame: u32,
-        /// What the last sweep left, relative to the mean radiosity.
+        /// Residual of the last sweep, relative to the mean radiosity.
         residual: f64,
         /// Names of the surfaces whose rows exceed 1 by most.
         surfaces: Vec<String>,
     },
-    /// What is absorbed and escapes is not what is emitted.
+    /// Absorbed and escaped flux differ from the emitted flux.
     #[error(
         "frame {frame}: {:.0} % of the light that is emitted is unaccounted for; most of it between {}: they pierce each other, or lie so close that form factors between them sum to more than 1; move them apart, make their materials reflect less, or use a finer tolerance", 100.0 * share, names(surfaces)
     )]
@@ -95,8 +95,8 @@ fn names(surfaces: &[String]) -> String {
 
 /// One scene being solved, frame by frame.
 pub struct Session {
-    /// The scene as commands have made it, and what builds start from: where bodies came or left since the last step, that
-    /// of the scene before.
+    /// The scene as commands have made it, and the initial forest of builds: where bodies came or left since the last step,
+    /// the forest of the scene before.
     bed: Bed,
     /// Whether they belong together.
     is_planted: bool,
@@ -108,11 +108,11 @@ pub struct Session {
     edited: Option<Edited>,
     /// Whether the next step may not start from the last solution.
     starts_anew: bool,
-    /// What others may see of a step under way.
+    /// Progress of a step for other threads.
     watch: Arc<Watch>,
     /// Time that `moved` compares with, where it is not that of the last step.
-    came_from: Option<f64>,
-    /// What is held by hand.
+    count_motion_from: Option<f64>,
+    /// Values set by commands in place of the clip's.
     held: Held,
     /// Bodies that are not where the scene has them at rest, as the seed knows them.
     displaced: BTreeSet<BodyId>,
@@ -144,7 +144,7 @@ impl Session {
             edited: None,
             starts_anew: false,
             watch: Arc::default(),
-            came_from: None,
+            count_motion_from: None,
             held: Held::default(),
             displaced,
             time_s: 0.0,
@@ -157,7 +157,7 @@ impl Session {
         &self.bed.scene
     }
 
-    /// What can be seen of a step while it is under way, from any thread.
+    /// Progress of the step under way, for any thread.
     pub fn watch(&self) -> Arc<Watch> {
         Arc::clone(&self.watch)
     }
@@ -188,10 +188,10 @@ impl Session {
         let back = self.solved.as_ref().map(|solved| self.way_back(solved));
         let Start { last, remains } = self.follow_hands();
         let world = self.world();
-        let came_from =
-            self.came_from.take().map(|from_s| self.bed.scene.at_but(from_s, &self.held));
+        let count_motion_from =
+            self.count_motion_from.take().map(|from_s| self.bed.scene.at_but(from_s, &self.held));
         let last_world = last.as_ref().map(|last| last.space.world.clone());
-        let from = came_from.as_ref().or(last_world.as_ref());
+        let from = count_motion_from.as_ref().or(last_world.as_ref());
         let goal = self.goal(&world, &self.held, from);
         let moved = from.map_or(Vec::new(), |from| self.moved(from, &world));
         let order = self.order(FrameReport { frame, time_s, moved, ..FrameReport::default() });
@@ -219,8 +219,8 @@ impl Session {
     /// [`FrameReport::moved`] and [`FrameReport::dynamic_links`] count from there. Nothing else
     /// depends on it.
     #[doc(hidden)]
-    pub fn came_from(&mut self, time_s: Option<f64>) {
-        self.came_from = time_s;
+    pub fn count_motion_from(&mut self, time_s: Option<f64>) {
+        self.count_motion_from = time_s;
     }
 
     /// Solves the world as the commands so far have made it; the first time that is a cold build.
@@ -264,7 +264,7 @@ impl Session {
         self.time_s
     }
 
-    /// What commands hold in place of what the clip says.
+    /// Values set by commands in place of the clip's.
     pub fn held(&self) -> &Held {
         &self.held
     }
@@ -289,7 +289,7 @@ impl Session {
         Order { label, update, events, balance, max_memory_bytes, watch: Some(&self.watch) }
     }
 
-    /// Why a step came to nothing.
+    /// The error of a step that failed.
     fn error_of(&self, failed: &Failed<SpaceState>, frame: u32) -> SessionError {
         match failed.why.clone() {
             Why::Cancelled => SessionError::Cancelled { frame },

@@ -1,15 +1,15 @@
-//! What a user may choose about a solution.
+//! Options of a session.
 
 use crate::follow::Update;
 
-/// How a scene is solved.
+/// Options of a solution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Relative error of irradiance aimed at (RMS), in (0, 1). Default 0.02.
     pub tolerance: f64,
-    /// What decides whether a pair becomes a link.
+    /// Criterion by which a pair becomes a link.
     pub oracle: Oracle,
-    /// How the pair tree follows the motion.
+    /// Strategy by which the pair tree follows motion.
     pub update: Update,
     /// Whether groups of small patches of one rigid body may be ends of links, where there are many such patches: with the
     /// error oracle alone. Default true. Tables of form factors go without.
@@ -36,7 +36,7 @@ impl Default for Options {
     }
 }
 
-/// What decides on a pair.
+/// Oracle: the criterion by which a pair becomes a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Oracle {
     /// The default: an estimate of the irradiance error that the link causes on its receivers.

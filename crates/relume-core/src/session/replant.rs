@@ -1,4 +1,4 @@
-//! Bodies come into the scene of a running session, leave it, or are taken from where they rest.
+//! Carrying a solved state over to an edited scene: inserted, removed and displaced bodies.
 //!
 //! The state is first carried over to the new scene, in which the bodies that came are absent and those that left still are
 //! there, as bodies that are about to vanish; the step that follows is one like any other; then what has left is forgotten.
@@ -14,7 +14,7 @@ use crate::space::{Bed, Before, Solved, group_links};
 
 use super::{Session, Update};
 
-/// What has come and gone since a scene was solved.
+/// Bodies inserted and removed since a scene was solved.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Edited {
     /// Bodies of that scene that left it.
@@ -23,7 +23,7 @@ pub(super) struct Edited {
     pub(super) fresh: BTreeSet<BodyId>,
 }
 
-/// What edits a scene.
+/// Edit of a scene.
 #[derive(Clone, Copy)]
 pub(super) enum Edit {
     /// A body comes in.
@@ -32,7 +32,7 @@ pub(super) enum Edit {
     Out(BodyId),
 }
 
-/// Where a step starts.
+/// Start of a step.
 pub(super) struct Start {
     /// The state to start from, in the session's scene.
     pub(super) last: Option<Solved>,

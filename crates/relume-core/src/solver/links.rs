@@ -38,13 +38,13 @@ struct Span {
 }
 
 /// Links are kept in blocks with room for a multiple of so many.
-const ROOM: u32 = 4;
+const CAPACITY: u32 = 4;
 
 /// Vectors are given room for this share more than they need.
 const SLACK: usize = 32;
 
 fn room(len: u32) -> u32 {
-    len.next_multiple_of(ROOM)
+    len.next_multiple_of(CAPACITY)
 }
 
 /// The links of all receivers, in one pool; each pair of a receiver and a source at most once.

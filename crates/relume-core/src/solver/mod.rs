@@ -2,6 +2,7 @@
 //!
 //! The solver knows no time, no shafts and no geometry: links come as numbers.
 
+mod dirty_path;
 mod field;
 mod gather;
 mod groups;
@@ -13,7 +14,6 @@ mod radiosity;
 mod settle;
 mod surfaces;
 mod trend;
-mod way;
 mod work;
 
 pub use field::Linear;
@@ -22,5 +22,5 @@ pub use links::{Link, Links, LinksBuilder};
 pub use place::Place;
 pub use push::row_sums;
 pub use radiosity::{Radiosity, Stop};
-pub use surfaces::{Lit, SQUARE_MOMENT, Surfaces};
+pub use surfaces::{FacetMaterial, SQUARE_MOMENT, Surfaces};
 pub use work::Dirty;

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::element::Renumbering;
 use crate::transport;
 
+use super::dirty_path::{Batch, DirtyPath};
 use super::field::{Field, Linear, SLACK, grow};
 use super::gather::gather_some;
 use super::groups::Arriving;
@@ -15,10 +16,9 @@ use super::jump::Jump;
 use super::links::Links;
 use super::place::Place;
 use super::push::{push, row_sums};
-use super::settle::{Below, News, Settled};
+use super::settle::{Below, IrradianceChange, Settled};
 use super::surfaces::{Surfaces, for_each_below};
 use super::trend::Trend;
-use super::way::{Batch, Way};
 use super::work::{Dirty, PENDING_SHARE, Work};
 
 /// When to stop.
@@ -93,17 +93,16 @@ impl OverGroups {
 pub struct Radiosity {
     /// With first moments ([`Place::first_moments`]).
     radiosity: Field,
-    /// What an element's own links bring, without those of its ancestors. Gradients are per metre.
+    /// Irradiance over an element's own links, without those of its ancestors. Gradients are per metre.
     gathered: Field,
-    /// What of that came over links of groups.
+    /// Part of `gathered` that came over links of groups.
     over_groups: OverGroups,
-    /// By how much the irradiance of an element may have changed since it was gathered, W/m2.
+    /// Bound of the change of an element's irradiance since it was gathered, W/m2.
     pending: Vec<f32>,
-    /// By how much the radiosities at and below an element may be off, at most, for what was not pushed down
-    /// to them, W/m2: what is owed to itself, and the most that is owed below any of its children. Not kept where
-    /// the next solve will begin with everything.
-    owed: Vec<f32>,
-    /// Kept instead.
+    /// Deferred error: bound of the error of radiosities at and below an element by irradiance not pushed down yet, W/m2.
+    /// Empty where the next solve will gather everything.
+    deferred: Vec<f32>,
+    /// Last change of each mean radiosity; replaces `deferred` while the next solve will gather everything.
     trend: Trend,
     /// Elements are taken to be constant, as the solution would grow without end if lines were handed down.
     constant: bool,
@@ -114,14 +113,13 @@ pub struct Radiosity {
     pub sweeps: u32,
     /// Receivers gathered by the last solve, each time counted.
     pub gathers: u64,
-    /// By how much a radiosity may be off what its links and the other radiosities say, relative to the mean one: it
-    /// stays, something is owed to it, and what it gathers may have changed a little. An estimate: all three at once, but not at
-    /// every level.
+    /// Estimate of the largest residual of a radiosity, relative to the mean radiosity: skipped changes, deferred changes and
+    /// pending changes of its sources, added up, but not over all levels.
     pub residual: f64,
-    /// The same of the last sweep over everything alone, W/m2.
-    passed_over: f32,
-    /// Largest change that may have been left undone since, W/m2.
-    held: f32,
+    /// Largest change that the last sweep over all elements skipped, W/m2.
+    skipped_in_full_sweep: f32,
+    /// Largest change that may have been skipped since, W/m2.
+    skipped: f32,
 }
 
 /// Links of elements, and what comes to an element over groups, if there are any.
@@ -134,7 +132,7 @@ const SWEEPS_MAX: u32 = 2_000;
 const CHUNK: usize = 256;
 
 /// What may be left undone, relative to what may be left undone now.
-const HELD_MAX: f32 = 2.0;
+const SKIPPED_MAX: f32 = 2.0;
 
 impl Radiosity {
     /// A solution to begin with: the exitance of surfaces. Sources other than surfaces are given by
@@ -143,7 +141,7 @@ impl Radiosity {
         let mut out = Radiosity::default();
         out.extend(surfaces.len());
         for &facet in surfaces.facets() {
-            let exitance = surfaces.lit(facet.0).exitance;
+            let exitance = surfaces.material(facet.0).exitance;
             for_each_below(surfaces, facet.0, &mut |id| out.set(id, exitance));
         }
         out
@@ -156,7 +154,7 @@ impl Radiosity {
         if len > self.pending.len() {
             grow(&mut self.pending, len);
             if !self.trend.is_wide {
-                grow(&mut self.owed, len);
+                grow(&mut self.deferred, len);
             }
         }
         self.trend.extend(len);
@@ -168,7 +166,7 @@ impl Radiosity {
         self.gathered.renumber(to);
         self.over_groups.renumber(to);
         self.trend.renumber(to);
-        let numbers = [&mut self.pending, &mut self.owed, &mut self.limits];
+        let numbers = [&mut self.pending, &mut self.deferred, &mut self.limits];
         let kept = numbers.into_iter().filter(|v| !v.is_empty());
         for values in kept {
             *values = to.old_of().iter().map(|&old| values[old as usize]).collect();
@@ -177,8 +175,8 @@ impl Radiosity {
 
     /// Gives back room beyond a small reserve.
     pub fn trim(&mut self) {
-        let Radiosity { radiosity, gathered, pending, owed, .. } = self;
-        for values in [&mut radiosity.0, &mut gathered.0, pending, owed] {
+        let Radiosity { radiosity, gathered, pending, deferred, .. } = self;
+        for values in [&mut radiosity.0, &mut gathered.0, pending, deferred] {
             values.shrink_to(values.len() + values.len() / SLACK);
         }
         self.trend.trim();
@@ -207,8 +205,8 @@ impl Radiosity {
             self.radiosity.set(child, &own);
             self.gathered.set(child, &Linear::default());
             self.over_groups.set(child, &Linear::default());
-            if let Some(owed) = self.owed.get_mut(child as usize) {
-                *owed = 0.0;
+            if let Some(deferred) = self.deferred.get_mut(child as usize) {
+                *deferred = 0.0;
             }
             self.trend.inherit(parent, child);
         }
@@ -267,7 +265,7 @@ impl Radiosity {
     /// Exitances alone; punctual lights stay as they are.
     fn start_anew(&mut self, surfaces: &impl Surfaces) {
         for facet in surfaces.facets() {
-            let mean = surfaces.lit(facet.0).exitance;
+            let mean = surfaces.material(facet.0).exitance;
             for_each_below(surfaces, facet.0, &mut |id| {
                 self.radiosity.set(id, &Linear { mean, ..Linear::default() });
                 self.gathered.set(id, &Linear::default());
@@ -276,10 +274,10 @@ impl Radiosity {
         self.pending.fill(0.0);
         self.over_groups = OverGroups::default();
         // A solve that changed most of the scene has given it back.
-        self.owed.clear();
-        self.owed.resize(self.pending.len(), 0.0);
+        self.deferred.clear();
+        self.deferred.resize(self.pending.len(), 0.0);
         self.trend = Trend::default();
-        (self.held, self.passed_over, self.sweeps) = (0.0, 0.0, 0);
+        (self.skipped, self.skipped_in_full_sweep, self.sweeps) = (0.0, 0.0, 0);
     }
 
     /// Gathers, pushes and pulls until the solution is settled, beginning with what is dirty.
@@ -303,9 +301,9 @@ impl Radiosity {
         let mut last_mean = self.mean_w_m2(surfaces);
         let mut limit = stop.limit_w_m2(last_mean);
         if self.trend.is_wide {
-            // Nothing is known of what is owed.
+            // Nothing is known of what is deferred.
             work.start_all(surfaces);
-            grow(&mut self.owed, self.pending.len());
+            grow(&mut self.deferred, self.pending.len());
         }
         let start = (stop.is_by_residual() && self.trend.is_wide)
             .then(|| self.trend.follow(surfaces, &mut self.radiosity));
@@ -315,7 +313,7 @@ impl Radiosity {
             false => self.mark_over_groups(surfaces, &mut work, limit),
         };
         loop {
-            if self.held > HELD_MAX * limit && !work.all && stop.is_by_residual() {
+            if self.skipped > SKIPPED_MAX * limit && !work.all && stop.is_by_residual() {
                 // What was little beside a brighter scene is too much beside this one.
                 work.start_all(surfaces);
             }
@@ -327,9 +325,9 @@ impl Radiosity {
             let over_groups = arriving.take().or_else(|| self.arriving(surfaces));
             let small = self.sweep((surfaces, links, over_groups.as_ref()), &mut work, limit);
             self.sweeps += 1;
-            (self.passed_over, self.held) = match all {
+            (self.skipped_in_full_sweep, self.skipped) = match all {
                 true => (small, 0.0),
-                false => (self.passed_over, self.held.max(limit)),
+                false => (self.skipped_in_full_sweep, self.skipped.max(limit)),
             };
             let (mean, before) = (self.mean_w_m2(surfaces), limit);
             limit = stop.limit_w_m2(mean);
@@ -354,7 +352,7 @@ impl Radiosity {
             None => self.trend.is_wide = is_wide,
         }
         if self.trend.is_wide {
-            self.owed = Vec::new();
+            self.deferred = Vec::new();
         }
     }
 
@@ -368,9 +366,10 @@ impl Radiosity {
         (mean, (before, limit)): (f64, (f32, f32)),
         arriving: &mut Option<Arriving>,
     ) -> bool {
-        // A radiosity stays, what its ancestors gathered is owed to it, and they may gather other values.
+        // A radiosity stays, what its ancestors gathered is deferred for it, and they may gather other values.
         let gathered = if surfaces.groups().is_some() { 2.0 } else { 1.0 };
-        let left = self.passed_over + self.held * (1.0 + 1.0 + gathered * PENDING_SHARE);
+        let left =
+            self.skipped_in_full_sweep + self.skipped * (1.0 + 1.0 + gathered * PENDING_SHARE);
         self.residual = if mean > 0.0 { f64::from(left) / mean } else { 0.0 };
         match stop {
             Stop::Sweeps(count) => self.sweeps >= count,
@@ -379,7 +378,7 @@ impl Radiosity {
                 true
             }
             // Where the sweep itself made the scene much darker, what it left is no longer little.
-            _ if before > HELD_MAX * limit => {
+            _ if before > SKIPPED_MAX * limit => {
                 work.start_all(surfaces);
                 false
             }
@@ -405,16 +404,16 @@ impl Radiosity {
         let mut scratch = std::mem::take(&mut work.scratch);
         for batch in 0..work.batches.len() {
             let mut now = work.take(surfaces, batch);
-            let most_owed = if work.all { None } else { Some(limit) };
+            let most_deferred = if work.all { None } else { Some(limit) };
             let over_groups = |id: u32| Some(surfaces.groups()?.at(arriving?, id));
             let sources = (links, &over_groups as &dyn Fn(u32) -> Option<Linear>);
-            self.gather((surfaces, sources), &mut now, most_owed, &mut scratch.gathered);
-            let way = if work.all { None } else { Some(work.way.mark(surfaces, &mut now)) };
-            self.settle(surfaces, &now.facets, (limit, way), &mut scratch.settled);
+            self.gather((surfaces, sources), &mut now, most_deferred, &mut scratch.gathered);
+            let path = if work.all { None } else { Some(work.path.mark(surfaces, &mut now)) };
+            self.settle(surfaces, &now.facets, (limit, path), &mut scratch.settled);
             for settled in &scratch.settled[..now.facets.len()] {
                 small = small.max(settled.small);
-                for &(id, owed) in &settled.owed {
-                    self.owed[id as usize] = owed;
+                for &(id, deferred) in &settled.deferred {
+                    self.deferred[id as usize] = deferred;
                 }
                 for (id, value, difference) in &settled.changed {
                     self.radiosity.set(*id, value);
@@ -430,7 +429,7 @@ impl Radiosity {
             if work.all {
                 std::mem::swap(&mut work.batches[batch], &mut now);
             } else {
-                work.way.clear(surfaces, &now);
+                work.path.clear(surfaces, &now);
             }
         }
         work.scratch = scratch;
@@ -484,18 +483,18 @@ impl Radiosity {
     }
 
     /// Gathers the receivers of a batch anew: over links, and what comes over groups. Those below which no more than
-    /// `most_owed` is owed after that are left out of it.
+    /// `most_deferred` is deferred after that are left out of it.
     fn gather(
         &mut self,
         (surfaces, (links, over_groups)): (&impl Surfaces, Sources<'_>),
         batch: &mut Batch,
-        most_owed: Option<f32>,
+        most_deferred: Option<f32>,
         found: &mut Vec<Linear>,
     ) {
         let receivers = &mut batch.receivers;
         self.gathers += receivers.len() as u64;
         receivers.iter().for_each(|&id| self.pending[id as usize] = 0.0);
-        let Radiosity { radiosity, gathered, over_groups: kept, owed, constant, .. } = self;
+        let Radiosity { radiosity, gathered, over_groups: kept, deferred, constant, .. } = self;
         let linear = !*constant;
         found.resize(found.len().max(receivers.len()), Linear::default());
         let level = transport::Simd::detect().level();
@@ -521,20 +520,20 @@ impl Radiosity {
                     *own
                 }
             };
-            let Some(most) = most_owed else {
+            let Some(most) = most_deferred else {
                 gathered.set(id, h);
-                owed[id as usize] = 0.0;
+                deferred[id as usize] = 0.0;
                 return true;
             };
             let change = h.minus(&gathered.get(id));
-            let lit = surfaces.lit(surfaces.facet_of(id));
-            let news = lit.most(&change, surfaces.place(id).radius);
+            let material = surfaces.material(surfaces.facet_of(id));
+            let news = material.most(&change, surfaces.place(id).radius);
             gathered.set(id, h);
-            let waits = owed[id as usize] + news <= most;
+            let waits = deferred[id as usize] + news <= most;
             if waits {
-                owe(owed, surfaces, id, news);
+                defer(deferred, surfaces, id, news);
             } else {
-                batch.news.push(change);
+                batch.changes.push(change);
             }
             !waits
         });
@@ -545,27 +544,27 @@ impl Radiosity {
         &self,
         surfaces: &impl Surfaces,
         facets: &[u32],
-        (limit, way): (f32, Option<&Way>),
+        (limit, path): (f32, Option<&DirtyPath>),
         settled: &mut Vec<Settled>,
     ) {
         settled.resize_with(settled.len().max(facets.len()), Settled::default);
         let facet = |(&facet, out): (&u32, &mut Settled)| {
             out.changed.clear();
-            out.owed.clear();
+            out.deferred.clear();
             out.small = 0.0;
-            let lit = surfaces.lit(facet);
+            let material = surfaces.material(facet);
             let place = surfaces.place(facet);
             let below = Below {
                 radiosity: &self.radiosity,
                 gathered: &self.gathered,
-                owed: &self.owed,
+                deferred: &self.deferred,
                 limits: &self.limits,
                 surfaces,
-                lit,
+                material,
                 limit,
-                way,
+                path,
             };
-            below.settle(facet, &place, &Linear::default(), &News::default(), out);
+            below.settle(facet, &place, &Linear::default(), &IrradianceChange::default(), out);
         };
         if facets.len() == 1 {
             facet((&facets[0], &mut settled[0]));
@@ -609,7 +608,7 @@ impl Radiosity {
 
     /// Bytes held, without [`Radiosity::group_bytes`].
     pub fn memory_bytes(&self) -> u64 {
-        let single = self.pending.capacity() + self.owed.capacity() + self.limits.capacity();
+        let single = self.pending.capacity() + self.deferred.capacity() + self.limits.capacity();
         let single = (single * size_of::<f32>()) as u64;
         self.radiosity.bytes() + self.gathered.bytes() + single + self.trend.bytes()
     }
@@ -621,16 +620,16 @@ impl Radiosity {
 }
 
 /// Owes `news` to an element and all that is below it.
-fn owe(owed: &mut [f32], surfaces: &impl Surfaces, id: u32, news: f32) {
-    let mut at = Some((id, owed[id as usize] + news));
+fn defer(deferred: &mut [f32], surfaces: &impl Surfaces, id: u32, news: f32) {
+    let mut at = Some((id, deferred[id as usize] + news));
     while let Some((id, wanted)) = at {
-        let before = std::mem::replace(&mut owed[id as usize], wanted);
+        let before = std::mem::replace(&mut deferred[id as usize], wanted);
         at = surfaces.parent(id).and_then(|parent| {
             let siblings = surfaces.children(parent).filter(|&child| child != id);
-            let others = siblings.map(|child| owed[child as usize]).fold(0.0, f32::max);
-            let own = (owed[parent as usize] - others.max(before)).max(0.0);
+            let others = siblings.map(|child| deferred[child as usize]).fold(0.0, f32::max);
+            let own = (deferred[parent as usize] - others.max(before)).max(0.0);
             let wanted = own + others.max(wanted);
-            (wanted > owed[parent as usize]).then_some((parent, wanted))
+            (wanted > deferred[parent as usize]).then_some((parent, wanted))
         });
     }
 }
@@ -644,13 +643,13 @@ mod tests {
     use super::super::groups::{GroupEnd, GroupLink, GroupLinks, PlacedLinks};
 
     use crate::element::ElementId;
-    use crate::solver::{Link, Lit, Place};
+    use crate::solver::{FacetMaterial, Link, Place};
 
     use super::*;
 
     /// Two facets, the second of which is split in two, and perhaps the first half of it again.
     struct Toy {
-        lit: [Lit; 2],
+        lit: [FacetMaterial; 2],
         facets: [ElementId; 2],
         /// Where elements lie along the first axis, and their areas; a lamp without area is no surface.
         at: Vec<(f32, f64)>,
@@ -687,7 +686,7 @@ mod tests {
             let radius = 0.5 * area as f32;
             Place { centroid: [x, 0.0], radius, moment: [radius * radius / 3.0, 0.0, 0.05] }
         }
-        fn lit(&self, facet: u32) -> &Lit {
+        fn material(&self, facet: u32) -> &FacetMaterial {
             &self.lit[facet as usize]
         }
     }
@@ -709,7 +708,7 @@ mod tests {
 
     /// Two plates, the second split in two, and a lamp; with given couplings.
     fn plates() -> (Toy, Links) {
-        let lit = [Lit { reflectance: [0.5, 0.8, 0.0], exitance: [1.0, 2.0, 3.0] }; 2];
+        let lit = [FacetMaterial { reflectance: [0.5, 0.8, 0.0], exitance: [1.0, 2.0, 3.0] }; 2];
         let mut links = Links::default();
         links.extend(64);
         for (receiver, source, coupling) in [(0, 2, 0.5), (0, 3, 0.5), (2, 0, 1.0), (3, 0, 1.0)] {
@@ -758,8 +757,8 @@ mod tests {
         fn little_changes_do_not_add_up(
             steps in prop::collection::vec((0..4_usize, -5e-4..1e-3_f32, -9..10_i8), 1..200)
         ) {
-            let lamp = Lit { reflectance: [0.3; 3], exitance: [1.0, 1.0, 1.0] };
-            let plate = Lit { reflectance: [0.5, 0.9, 0.1], exitance: [0.0; 3] };
+            let lamp = FacetMaterial { reflectance: [0.3; 3], exitance: [1.0, 1.0, 1.0] };
+            let plate = FacetMaterial { reflectance: [0.5, 0.9, 0.1], exitance: [0.0; 3] };
             let at = [(0.0, 1.0), (0.0, 1.0), (-0.25, 0.5), (0.25, 0.5), (-0.375, 0.25), (-0.125, 0.25)];
             let (lit, facets) = ([lamp, plate], [ElementId(0), ElementId(1)]);
             let tree = Toy { lit, facets, at: at.to_vec(), quarters: true };
@@ -840,8 +839,8 @@ mod tests {
         fn place(&self, id: u32) -> Place {
             self.0.place(id)
         }
-        fn lit(&self, facet: u32) -> &Lit {
-            self.0.lit(facet)
+        fn material(&self, facet: u32) -> &FacetMaterial {
+            self.0.material(facet)
         }
         fn groups(&self) -> Option<&GroupLinks> {
             self.1.as_ref()

@@ -1,37 +1,37 @@
 //! One facet: irradiance pushed down, reflected at the leaves, radiosity pulled up.
 //!
-//! What changes a little is not pushed down to every leaf each time: it is *owed* to what lies below, and delivered once what is
-//! owed may add up to more than the limit, or something else leads there. What changes now is known as a function of place: what one
-//! level gains and another loses cancels, and where a change is small it waits though it may be large elsewhere.
+//! Small changes of irradiance are not pushed down to every leaf each time: they are *deferred*, and delivered once the deferred
+//! error of a subtree may exceed the limit, or another change leads there. Changes of the present sweep are known as linear
+//! functions of place, so that gains and losses of different levels cancel, and a change waits wherever it is small.
 
+use super::dirty_path::{DirtyPath, bit};
 use super::field::{Field, Linear};
 use super::place::Place;
-use super::surfaces::{Lit, Surfaces};
-use super::way::{Way, bit};
+use super::surfaces::{FacetMaterial, Surfaces};
 
-/// What pushing and pulling through one facet found.
+/// Result of pushing and pulling through one facet.
 #[derive(Default)]
 pub(super) struct Settled {
     /// Elements with their new radiosities, and by how much those differ.
     pub(super) changed: Vec<(u32, Linear, f32)>,
     /// Largest difference within the limit.
     pub(super) small: f32,
-    /// What is now owed to elements; nothing where everything was settled.
-    pub(super) owed: Vec<(u32, f32)>,
+    /// Deferred error of elements, W/m2; empty where everything was settled.
+    pub(super) deferred: Vec<(u32, f32)>,
 }
 
-/// What changed above an element.
+/// Change of the irradiance that an element inherits.
 #[derive(Clone, Copy, Default)]
-pub(super) struct News {
-    /// By how much the irradiance that is pushed down changed, W/m2 and per metre.
+pub(super) struct IrradianceChange {
+    /// Change in this sweep, W/m2 and per metre.
     change: Linear,
-    /// By how much radiosities may change for earlier changes, of which no more is known, W/m2.
-    owed: f32,
+    /// Bound of the change of radiosity by changes deferred before, W/m2.
+    deferred: f32,
 }
 
-impl News {
-    fn about(&self, own: &Place, other: &Place) -> News {
-        News { change: self.change.about(own, other), ..*self }
+impl IrradianceChange {
+    fn about(&self, own: &Place, other: &Place) -> IrradianceChange {
+        IrradianceChange { change: self.change.about(own, other), ..*self }
     }
 }
 
@@ -39,96 +39,103 @@ impl News {
 pub(super) struct Below<'a, S> {
     pub(super) radiosity: &'a Field,
     pub(super) gathered: &'a Field,
-    /// By how much the radiosities at and below an element may be off, at most, for what was not pushed
-    /// down to them, W/m2.
-    pub(super) owed: &'a [f32],
-    /// What the irradiance of each leaf is divided by; empty where by nothing.
+    /// Deferred error: bound of the error of radiosities at and below each element by irradiance not pushed down yet, W/m2.
+    pub(super) deferred: &'a [f32],
+    /// Divisor of the irradiance of each leaf; empty where there is none.
     pub(super) limits: &'a [f32],
     pub(super) surfaces: &'a S,
-    pub(super) lit: &'a Lit,
+    pub(super) material: &'a FacetMaterial,
     pub(super) limit: f32,
-    /// The ways to what is concerned; `None` where everything is, small differences too.
-    pub(super) way: Option<&'a Way>,
+    /// Paths to the changed elements; `None` where everything is settled, small changes too.
+    pub(super) path: Option<&'a DirtyPath>,
 }
 
 impl<S: Surfaces> Below<'_, S> {
-    /// Pushes irradiance down and pulls radiosity up; returns the new radiosity of `id`, and what is owed at
-    /// and below it. `news` is what changed above.
+    /// Pushes irradiance down and pulls radiosity up; returns the new radiosity of `id`, and the deferred error at and below
+    /// it. `change` is the change of the inherited irradiance.
     pub(super) fn settle(
         &self,
         id: u32,
         place: &Place,
         inherited: &Linear,
-        news: &News,
+        change: &IrradianceChange,
         out: &mut Settled,
     ) -> (Linear, f32) {
         let h = self.gathered.get(id).plus(inherited);
         let children = self.surfaces.children(id);
-        let mut owed = 0.0_f32;
+        let mut deferred = 0.0_f32;
         let b = if children.is_empty() {
             match self.limits.get(id as usize) {
                 Some(&limit) => self.reflect(&h.divided(limit), place),
                 None => self.reflect(&h, place),
             }
         } else {
-            let news = match self.way {
-                Some(way) => self.add_own(news, way, id),
-                None => News::default(),
+            let change = match self.path {
+                Some(path) => self.add_own(change, path, id),
+                None => IrradianceChange::default(),
             };
             let mut fit = Fit::default();
             let moment = self.surfaces.source_moment();
             for child in children {
                 let at = self.surfaces.place(child);
-                let news = news.about(place, &at);
+                let change = change.about(place, &at);
                 let (b, below) =
-                    match self.way.and_then(|way| self.may_wait(way, child, &at, &news)) {
-                        Some(owed) => {
-                            if owed > self.owed[child as usize] {
-                                out.owed.push((child, owed));
+                    match self.path.and_then(|path| self.may_wait(path, child, &at, &change)) {
+                        Some(deferred) => {
+                            if deferred > self.deferred[child as usize] {
+                                out.deferred.push((child, deferred));
                             }
-                            (self.radiosity.get(child), owed)
+                            (self.radiosity.get(child), deferred)
                         }
-                        None => self.settle(child, &at, &h.about(place, &at), &news, out),
+                        None => self.settle(child, &at, &h.about(place, &at), &change, out),
                     };
-                owed = owed.max(below);
+                deferred = deferred.max(below);
                 fit.add(self.surfaces.area_m2(child), (place, &at), moment, &b);
             }
             fit.linear(place, moment)
         };
         let difference = b.difference(&self.radiosity.get(id));
-        if difference > self.limit || self.way.is_none() {
+        if difference > self.limit || self.path.is_none() {
             out.changed.push((id, b, difference));
         }
         if difference <= self.limit {
             out.small = out.small.max(difference);
         }
-        if self.way.is_some() {
-            out.owed.push((id, owed));
+        if self.path.is_some() {
+            out.deferred.push((id, deferred));
         }
-        (b, owed)
+        (b, deferred)
     }
 
-    /// What is owed to an element with what changed above, if it can wait.
-    fn may_wait(&self, way: &Way, id: u32, place: &Place, news: &News) -> Option<f32> {
-        let owed = self.owed[id as usize] + news.owed + self.lit.most(&news.change, place.radius);
-        (!bit(&way.on, id) && owed <= self.limit).then_some(owed)
+    /// Deferred error of an element with the inherited change, if the change can wait.
+    fn may_wait(
+        &self,
+        path: &DirtyPath,
+        id: u32,
+        place: &Place,
+        change: &IrradianceChange,
+    ) -> Option<f32> {
+        let deferred = self.deferred[id as usize]
+            + change.deferred
+            + self.material.most(&change.change, place.radius);
+        (!bit(&path.on, id) && deferred <= self.limit).then_some(deferred)
     }
 
-    /// News from above with those of an element itself.
-    fn add_own(&self, above: &News, way: &Way, id: u32) -> News {
-        let owed = above.owed + self.owed_from(id);
-        match way.news(id) {
-            Some(Some(own)) => News { change: above.change.plus(own), owed },
-            // Whose children came or went, concerns all that is below.
-            Some(None) => News { owed: f32::INFINITY, ..*above },
-            None => News { owed, ..*above },
+    /// Inherited change with the change of an element itself.
+    fn add_own(&self, above: &IrradianceChange, path: &DirtyPath, id: u32) -> IrradianceChange {
+        let deferred = above.deferred + self.deferred_from(id);
+        match path.changes(id) {
+            Some(Some(own)) => IrradianceChange { change: above.change.plus(own), deferred },
+            // Children came or went: everything below is affected.
+            Some(None) => IrradianceChange { deferred: f32::INFINITY, ..*above },
+            None => IrradianceChange { deferred, ..*above },
         }
     }
 
-    /// What of that which is owed at and below an element has not come further than to itself.
-    fn owed_from(&self, id: u32) -> f32 {
-        let below = self.surfaces.children(id).map(|child| self.owed[child as usize]);
-        (self.owed[id as usize] - below.fold(0.0, f32::max)).max(0.0)
+    /// Part of the deferred error that no child has inherited yet, W/m2.
+    fn deferred_from(&self, id: u32) -> f32 {
+        let below = self.surfaces.children(id).map(|child| self.deferred[child as usize]);
+        (self.deferred[id as usize] - below.fold(0.0, f32::max)).max(0.0)
     }
 
     /// Radiosity of a leaf, with first moments, from its irradiance, with a gradient per metre.
@@ -136,9 +143,9 @@ impl<S: Surfaces> Below<'_, S> {
         let moment = self.surfaces.source_moment();
         let mut b = Linear::default();
         for c in 0..3 {
-            let rho = self.lit.reflectance[c];
+            let rho = self.material.reflectance[c];
             // A gradient pushed down a long way may reach below zero; light does not.
-            b.mean[c] = self.lit.exitance[c] + rho * h.mean[c].max(0.0);
+            b.mean[c] = self.material.exitance[c] + rho * h.mean[c].max(0.0);
             let slope = [0, 1].map(|axis| rho * h.gradient[axis][c] * place.radius);
             let moments = place.first_moments(slope, moment);
             (b.gradient[0][c], b.gradient[1][c]) = (moments[0], moments[1]);

@@ -10,14 +10,14 @@ use super::place::Place;
 
 /// Reflectance and exitance of one material, linear RGB.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lit {
+pub struct FacetMaterial {
     /// Reflectance rho.
     pub reflectance: [f32; 3],
     /// Exitance M, W/m2.
     pub exitance: [f32; 3],
 }
 
-impl Lit {
+impl FacetMaterial {
     /// By how much a change of irradiance (gradients per metre) changes radiosities at most, up to a distance from
     /// where it has its mean, in each of their numbers; W/m2.
     pub(super) fn most(&self, change: &Linear, radius_m: f32) -> f32 {
@@ -69,7 +69,7 @@ pub trait Surfaces: Sync {
     /// Where an element lies.
     fn place(&self, id: u32) -> Place;
     /// What a facet is made of.
-    fn lit(&self, facet: u32) -> &Lit;
+    fn material(&self, facet: u32) -> &FacetMaterial;
     /// Links that end on groups of facets, if there are any.
     fn groups(&self) -> Option<&GroupLinks> {
         None

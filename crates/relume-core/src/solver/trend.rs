@@ -17,7 +17,7 @@ pub(super) struct Trend {
 }
 
 /// One in so many elements that change is most of the scene: for as many all sources are gathered anew.
-const WIDE: usize = 4;
+const WIDE_SHARE: usize = 4;
 
 /// Three changes in steps of a power of two.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -66,7 +66,7 @@ impl Trend {
             self.steps[id] = Step::of(change);
         });
         self.share = if last > 0.0 { (along / last).clamp(0.0, 1.0) as f32 } else { 1.0 };
-        if wide * WIDE < all {
+        if wide * WIDE_SHARE < all {
             *self = Trend::default();
         }
     }
@@ -141,7 +141,7 @@ mod tests {
     use proptest::prelude::*;
 
     use crate::element::ElementId;
-    use crate::solver::{Lit, Place};
+    use crate::solver::{FacetMaterial, Place};
 
     use super::*;
 
@@ -165,7 +165,7 @@ mod tests {
     }
 
     /// One element; another is vacant.
-    struct One([ElementId; 1], Lit);
+    struct One([ElementId; 1], FacetMaterial);
 
     impl Surfaces for One {
         fn len(&self) -> usize {
@@ -189,14 +189,14 @@ mod tests {
         fn place(&self, _: u32) -> Place {
             Place { centroid: [0.0; 2], radius: 1.0, moment: [1.0, 0.0, 1.0] }
         }
-        fn lit(&self, _: u32) -> &Lit {
+        fn material(&self, _: u32) -> &FacetMaterial {
             &self.1
         }
     }
 
     #[test]
     fn what_goes_on_is_expected_and_what_turns_back_is_not() {
-        let one = One([ElementId(0)], Lit { reflectance: [0.5; 3], exitance: [0.0; 3] });
+        let one = One([ElementId(0)], FacetMaterial { reflectance: [0.5; 3], exitance: [0.0; 3] });
         let field = |value: f32| {
             let mut field = Field::default();
             field.extend(2);

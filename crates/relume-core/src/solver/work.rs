@@ -1,10 +1,10 @@
 //! What a solve has left to do, batch by batch: which receivers to gather, and the ways to them.
 
+use super::dirty_path::{Batch, DirtyPath, clear_bit, set_bit};
 use super::field::Linear;
 use super::links::Links;
 use super::settle::Settled;
 use super::surfaces::{Surfaces, for_each_below};
-use super::way::{Batch, Way, clear_bit, set_bit};
 
 /// Which receivers to gather anew to begin with.
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ pub(super) struct Work {
     pub(super) all: bool,
     /// Elements that the last sweep changed by more than the limit, and by how much.
     pub(super) changed: Vec<(u32, f32)>,
-    pub(super) way: Way,
+    pub(super) path: DirtyPath,
     pub(super) scratch: Scratch,
 }
 
@@ -46,10 +46,10 @@ pub(super) struct Scratch {
 const BATCHES: usize = 16;
 
 /// Share of the receivers above which all are gathered: to find out which is dearer then.
-const MANY: usize = 4;
+const SOME_SHARE: usize = 4;
 
 /// Share of the elements that must change in a sweep over all for the next to be over all.
-const FEW: usize = 16;
+const ALL_SHARE: usize = 16;
 
 /// Share of the residual to which changes of sources may add up before a receiver gathers anew.
 pub(super) const PENDING_SHARE: f32 = 0.5;
@@ -73,11 +73,13 @@ impl Work {
             marks,
             all: false,
             changed: Vec::new(),
-            way: Way::new(surfaces.len()),
+            path: DirtyPath::new(surfaces.len()),
             scratch: Scratch::default(),
         };
         match dirty {
-            Dirty::Some { receivers, parents } if receivers.len() <= surfaces.len() / MANY => {
+            Dirty::Some { receivers, parents }
+                if receivers.len() <= surfaces.len() / SOME_SHARE =>
+            {
                 for parent in parents {
                     let batch = work.batch_of(surfaces, parent);
                     work.batches[batch].parents.push(parent);
@@ -149,7 +151,7 @@ impl Work {
         let mut facets: Vec<u32> = concerned.map(|&id| surfaces.facet_of(id)).collect();
         facets.sort_unstable();
         facets.dedup();
-        Batch { receivers, news: Vec::new(), facets, parents }
+        Batch { receivers, changes: Vec::new(), facets, parents }
     }
 
     /// Whether another sweep is needed.
@@ -160,7 +162,8 @@ impl Work {
         limit: f32,
         pending: &mut [f32],
     ) -> bool {
-        let many = self.changed.len() > surfaces.len() / if self.all { FEW } else { MANY };
+        let many =
+            self.changed.len() > surfaces.len() / if self.all { ALL_SHARE } else { SOME_SHARE };
         if self.all && !many {
             // From now on only what depends on a change.
             self.all = false;

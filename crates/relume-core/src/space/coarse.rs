@@ -3,7 +3,7 @@
 //! instant: links are summed in the order of the coarse elements, whatever their history.
 
 use crate::element::{ElementId, Forest, Kind, Renumbering};
-use crate::pair::{self, Brightness, Carried, Changes, Held, Light};
+use crate::pair::{self, Brightness, Carried, Changes, CoarseBrightness, CoarseLink};
 use crate::scene::{LightId, PatchId, Scene, World};
 use crate::solver::{Dirty, Link, Links, Radiosity, Stop, Surfaces};
 
@@ -68,24 +68,24 @@ pub(crate) struct Coarse {
     /// The same with nothing in the way.
     open: Links,
     radiosity: Radiosity,
-    pub(super) brightness: Brightness,
+    pub(super) brightness: CoarseBrightness,
 }
 
 impl Coarse {
     /// Takes over what an update found on the coarse pairs. Whether any of them changed.
     pub(super) fn follow(&mut self, seed: &Forest, changes: &Changes) -> bool {
-        let held = changes.held.iter();
-        let held = held.map(|&Held { a, b, carried }| pair::Link { a, b, carried });
+        let held = changes.coarse_links.iter();
+        let held = held.map(|&CoarseLink { a, b, carried }| pair::Link { a, b, carried });
         let open = held.clone().map(|link| {
             let carried = Carried { visibility: u16::MAX, ..link.carried };
             pair::Link { carried, ..link }
         });
         let seed = &CoarseReceivers(seed);
-        set_pairs(&mut self.links, seed, changes.dropped.iter().copied(), held);
-        set_pairs(&mut self.open, seed, changes.dropped.iter().copied(), open);
+        set_pairs(&mut self.links, seed, changes.dropped_coarse_links.iter().copied(), held);
+        set_pairs(&mut self.open, seed, changes.dropped_coarse_links.iter().copied(), open);
         self.links.tidy();
         self.open.tidy();
-        !changes.dropped.is_empty() || !changes.held.is_empty()
+        !changes.dropped_coarse_links.is_empty() || !changes.coarse_links.is_empty()
     }
 
     /// Solves over the coarse links as the scene shines in a world; `coarse` are the coarse elements of `seed` by number.
@@ -98,7 +98,7 @@ impl Coarse {
         self.radiosity = start(now, seed, &lit);
         let surfaces = CoarseSurfaces::new(lit);
         for &group in seed.groups().roots() {
-            self.radiosity.set(group.0, surfaces.lit(group.0).exitance);
+            self.radiosity.set(group.0, surfaces.material(group.0).exitance);
         }
         self.radiosity.solve(&surfaces, &self.links, Dirty::All, Stop::Sweeps(SWEEPS));
         self.brightness = self.measure((scene, now), seed, coarse, &surfaces);
@@ -110,7 +110,7 @@ impl Coarse {
         seed: &Forest,
         coarse: &[u32],
         surfaces: &CoarseSurfaces<'_>,
-    ) -> Brightness {
+    ) -> CoarseBrightness {
         let total_area = seed.made_m2();
         let mean = |v: [f32; 3]| v.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
         let mut irradiance = vec![0.0; coarse.len()];
@@ -128,16 +128,16 @@ impl Coarse {
         let light_of = |(&id, irradiance): (&u32, &f64)| {
             if seed.is_distant(ElementId(id)) {
                 let radiosity = mean(self.radiosity.radiosity(id));
-                return Light { radiosity, ..Light::DISTANT };
+                return Brightness { radiosity, ..Brightness::DISTANT };
             }
-            let emitted = mean(surfaces.lit(surfaces.facet_of(id)).exitance);
+            let emitted = mean(surfaces.material(surfaces.facet_of(id)).exitance);
             let radiosity = mean(self.radiosity.radiosity(id));
             let reflected = (radiosity - emitted).max(0.0);
-            Light { radiosity, reflected, irradiance: irradiance + floor }
+            Brightness { radiosity, reflected, irradiance: irradiance + floor }
         };
         let emits = |source: u32| match seed.light(ElementId(source)) {
             Some(light) => lights[light],
-            None => mean(surfaces.lit(surfaces.facet_of(source)).exitance),
+            None => mean(surfaces.material(surfaces.facet_of(source)).exitance),
         };
         let brings = |link: &Link| f64::from(link.coupling) * emits(link.source);
         let open =
@@ -148,13 +148,13 @@ impl Coarse {
             // Nothing emits, or all is hidden: every surface and light weighs the same, and errors are relative to row sums.
             lights.iter_mut().for_each(|i| *i = f64::from(u8::from(*i > 0.0)));
             let uniform = |&id: &u32| match seed.is_distant(ElementId(id)) {
-                true if self.radiosity.radiosity(id) == [0.0; 3] => Light::DISTANT,
-                true => Light { radiosity: 1.0, ..Light::DISTANT },
-                false => Light::UNIFORM,
+                true if self.radiosity.radiosity(id) == [0.0; 3] => Brightness::DISTANT,
+                true => Brightness { radiosity: 1.0, ..Brightness::DISTANT },
+                false => Brightness::UNIFORM,
             };
             coarse.iter().map(uniform).collect()
         };
-        Brightness::new(known, lights, total_area * REFERENCE_SHARE)
+        CoarseBrightness::new(known, lights, total_area * REFERENCE_SHARE)
     }
 
     /// Follows elements to their new ids, and coarse elements to other numbers.
@@ -193,7 +193,7 @@ pub(super) fn set_sources(
     radiosity: &mut Radiosity,
 ) {
     for facet in forest.distant_facets() {
-        radiosity.set(facet.0, surfaces.lit(facet.0).exitance);
+        radiosity.set(facet.0, surfaces.material(facet.0).exitance);
     }
     for id in 0..forest.fixed_len() {
         if let Some(light) = forest.light(ElementId(id)) {

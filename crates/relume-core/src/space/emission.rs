@@ -6,7 +6,7 @@ use crate::scene::{LightId, LightKind, Patch, Scene, World};
 
 /// A bound on the mean radiosity in a world and at any time of the clip, W/m2: all that can be emitted, over what is
 /// absorbed at least.
-pub(super) fn most_mean_w_m2(scene: &Scene, now: &World) -> f64 {
+pub(super) fn mean_radiosity_bound_w_m2(scene: &Scene, now: &World) -> f64 {
     let rho = scene.patches.iter().flat_map(|p| now.reflectance(scene, p)).fold(0.0, f64::max);
     let most = |one: [f64; 3], other: [f64; 3]| [0, 1, 2].map(|c| one[c].max(other[c]));
     let emitted_w = emitted_w(
@@ -18,9 +18,9 @@ pub(super) fn most_mean_w_m2(scene: &Scene, now: &World) -> f64 {
 }
 
 /// How many times as much a scene emits in a world as in another, present or not.
-pub(super) fn brightened(scene: &Scene, since: &World, now: &World) -> f64 {
+pub(super) fn brightened(scene: &Scene, change: &World, now: &World) -> f64 {
     let emitted_w = |w: &World| emitted_w(scene, |p| w.exitance(scene, p), |k| w.intensity(k));
-    if now.any_relit(since) { emitted_w(now) / emitted_w(since) } else { 1.0 }
+    if now.any_relit(change) { emitted_w(now) / emitted_w(change) } else { 1.0 }
 }
 
 /// What all surfaces and lights emit, W, with given exitances and intensities.

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use crate::element::{ElementId, Forest, Renumbering, WorldView};
 use crate::follow::{
-    Ahead, Balance, Clocked, Follower, FrameReport, Level, Motion, Space, Update, Void, Why,
+    Balance, Clocked, Follower, FrameReport, Level, Motion, Prediction, Space, Update, Void, Why,
 };
-use crate::pair::{self, Changes, Oracle, PairId, PairTree, Placed, Since, Stage};
+use crate::pair::{self, Changes, Oracle, PairId, PairTree, SpaceJudge, Stage, WorldChange};
 use crate::scene::{BodyId, Held, LightId, World};
 use crate::solver::{Dirty, GroupLinks, Radiosity};
 
@@ -56,14 +56,14 @@ pub(crate) struct Was {
 impl Space for SpaceState {
     type Goal<'g> = Goal<'g>;
     type Was = Was;
-    type Since<'m> = Since<'m>;
-    type Judge<'j> = Placed<'j>;
+    type Change<'m> = WorldChange<'m>;
+    type Judge<'j> = SpaceJudge<'j>;
     type Forest = Forest;
-    type Lit<'l> = LitForest<'l>;
+    type LitSurfaces<'l> = LitForest<'l>;
 
     const ROOT: ElementId = Forest::ROOT;
 
-    fn blank(goal: &Goal<'_>) -> SpaceState {
+    fn unsolved(goal: &Goal<'_>) -> SpaceState {
         let &Goal { bed, world, held, tuning, .. } = goal;
         SpaceState {
             scene: Arc::clone(&bed.scene),
@@ -108,18 +108,24 @@ impl Space for SpaceState {
         }
     }
 
-    fn since<'m>(&self, _: &Goal<'_>, was: &'m Was) -> Since<'m> {
-        let since = Since::new(&self.scene, &self.forest, &was.view, &self.view);
-        if self.is_stopped { since.after_a_stop() } else { since }
+    fn change<'m>(&self, _: &Goal<'_>, was: &'m Was) -> WorldChange<'m> {
+        let change = WorldChange::new(&self.scene, &self.forest, &was.view, &self.view);
+        if self.is_stopped { change.after_a_stop() } else { change }
     }
 
-    fn ahead(&self, goal: &Goal<'_>, was: &Was, update: Update, clocked: Clocked<'_>) -> Ahead {
+    fn prediction(
+        &self,
+        goal: &Goal<'_>,
+        was: &Was,
+        update: Update,
+        clocked: Clocked<'_>,
+    ) -> Prediction {
         let promise = Promise { scene: &self.scene, held: goal.held };
         let no_longer = Void {
             rounding: self.is_rounded_otherwise(was),
             promise: !was.held.promises_as(goal.held),
         };
-        Ahead::new(update, &promise, clocked, no_longer)
+        Prediction::new(update, &promise, clocked, no_longer)
     }
 
     fn candidates(_: &Goal<'_>) -> Vec<u32> {
@@ -130,9 +136,9 @@ impl Space for SpaceState {
         &'j mut self,
         goal: &'j Goal<'_>,
         level: Level,
-        motion: &Motion<'j, Since<'_>>,
-    ) -> Placed<'j> {
-        Placed {
+        motion: &Motion<'j, WorldChange<'_>>,
+    ) -> SpaceJudge<'j> {
+        SpaceJudge {
             forest: &mut self.forest,
             view: &self.view,
             stage: match level {
@@ -141,9 +147,9 @@ impl Space for SpaceState {
             },
             oracle: goal.tuning.oracle,
             simd: goal.tuning.simd,
-            since: motion.since,
-            ahead: motion.ahead.foresight.as_ref(),
-            lookahead: motion.ahead.lookahead,
+            change: motion.change,
+            motion_bounds: motion.prediction.motion_bounds.as_ref(),
+            lookahead: motion.prediction.lookahead,
         }
     }
 
@@ -156,19 +162,19 @@ impl Space for SpaceState {
         goal: &Goal<'_>,
         was: &Was,
         changes: &Changes,
-        since: Option<&mut Since<'_>>,
+        change: Option<&mut WorldChange<'_>>,
     ) {
         let Bed { scene, seed, coarse_ids } = goal.bed;
         let changed = self.coarse.follow(seed, changes);
-        let relit = since.is_none() || self.world.any_relit(&was.world);
+        let relit = change.is_none() || self.world.any_relit(&was.world);
         if !changed && !relit && self.touched.is_empty() {
             return;
         }
         let before = std::mem::take(&mut self.coarse.brightness);
         self.coarse.solve((scene, &self.world), seed, coarse_ids);
-        if let Some(since) = since {
+        if let Some(change) = change {
             let (shifts, of_lights) = self.coarse.brightness.shifts(&before);
-            since.dim(seed, coarse_ids, (shifts, of_lights));
+            change.set_brightness_shifts(seed, coarse_ids, (shifts, of_lights));
         }
     }
 
@@ -238,7 +244,7 @@ impl Space for SpaceState {
         sources_differ
     }
 
-    fn lit(&self, _: &Goal<'_>, everywhere: bool) -> LitForest<'_> {
+    fn surfaces(&self, _: &Goal<'_>, everywhere: bool) -> LitForest<'_> {
         let lit = LitForest::new(&self.scene, &self.forest, &self.world);
         let lit = lit.with_groups(&self.groups).present_in(&self.view);
         if everywhere { lit.with_places() } else { lit }
@@ -261,8 +267,8 @@ impl Space for SpaceState {
         goal.tuning.tolerance * if is_cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE }
     }
 
-    fn most_mean_w_m2(goal: &Goal<'_>) -> f64 {
-        emission::most_mean_w_m2(&goal.bed.scene, goal.world)
+    fn mean_radiosity_bound_w_m2(goal: &Goal<'_>) -> f64 {
+        emission::mean_radiosity_bound_w_m2(&goal.bed.scene, goal.world)
     }
 
     fn brightened(&self, _: &Goal<'_>) -> f64 {

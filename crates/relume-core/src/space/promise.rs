@@ -1,6 +1,6 @@
 //! What is known beforehand of how bodies move: the clip's tracks, but for what is held by hand.
 
-use crate::event::KnownMotion;
+use crate::predict::KnownMotion;
 use crate::scene::{BodyId, Drift, Held, LightId, Scene};
 
 /// The motion of a clip in which some bodies are held where they are.

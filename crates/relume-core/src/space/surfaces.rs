@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::element::{ElementId, Forest, Kind, WorldView};
 use crate::follow::Receivers;
 use crate::scene::{PatchId, Scene, World};
-use crate::solver::{GroupLinks, Lit, Place, Surfaces};
+use crate::solver::{FacetMaterial, GroupLinks, Place, Surfaces};
 
 /// Elements of which a smaller share is exposed are covered.
 const COVERED: f64 = 1e-4;
@@ -15,7 +15,7 @@ const COVERED: f64 = 1e-4;
 /// A forest with its materials at one instant.
 pub(crate) struct LitForest<'a> {
     forest: &'a Forest,
-    patch_lit: Vec<Lit>,
+    patch_materials: Vec<FacetMaterial>,
     /// Places of all elements, where they were worth computing ahead.
     places: Vec<Place>,
     groups: Option<&'a GroupLinks>,
@@ -26,10 +26,10 @@ impl<'a> LitForest<'a> {
         let single = |v: [f64; 3]| v.map(|x| x as f32);
         let of_patch = |patch: &crate::scene::Patch| {
             let exitance = single(now.exitance(scene, patch));
-            Lit { reflectance: single(now.reflectance(scene, patch)), exitance }
+            FacetMaterial { reflectance: single(now.reflectance(scene, patch)), exitance }
         };
-        let patch_lit = scene.patches.iter().map(of_patch).collect();
-        LitForest { forest, patch_lit, places: Vec::new(), groups: None }
+        let patch_materials = scene.patches.iter().map(of_patch).collect();
+        LitForest { forest, patch_materials, places: Vec::new(), groups: None }
     }
 
     /// With links that end on groups.
@@ -40,7 +40,7 @@ impl<'a> LitForest<'a> {
 
     /// Absent bodies emit nothing: they do not count in the mean that residuals are relative to.
     pub(super) fn present_in(mut self, view: &WorldView) -> LitForest<'a> {
-        for (patch, lit) in self.patch_lit.iter_mut().enumerate() {
+        for (patch, lit) in self.patch_materials.iter_mut().enumerate() {
             if !view.is_present(view.patch(PatchId(patch as u32)).body) {
                 lit.exitance = [0.0; 3];
             }
@@ -50,7 +50,7 @@ impl<'a> LitForest<'a> {
 
     /// Whether no surface emits anything.
     pub(super) fn is_dark(&self) -> bool {
-        self.patch_lit.iter().all(|lit| lit.exitance == [0.0; 3])
+        self.patch_materials.iter().all(|lit| lit.exitance == [0.0; 3])
     }
 
     /// With all places computed ahead: for several sweeps over all of the forest.
@@ -119,9 +119,9 @@ impl Surfaces for LitForest<'_> {
         }
     }
 
-    fn lit(&self, facet: u32) -> &Lit {
+    fn material(&self, facet: u32) -> &FacetMaterial {
         let patch = self.forest.patch(ElementId(facet)).expect("elements have patches");
-        &self.patch_lit[patch.0 as usize]
+        &self.patch_materials[patch.0 as usize]
     }
 
     fn groups(&self) -> Option<&GroupLinks> {
@@ -135,7 +135,7 @@ pub(super) struct CoarseSurfaces<'a> {
     /// Facets that are in no group, and groups that are in no other; ascending.
     facets: Vec<ElementId>,
     /// By place in [`Forest::groups`]' roots.
-    means: Vec<Lit>,
+    means: Vec<FacetMaterial>,
 }
 
 impl<'a> CoarseSurfaces<'a> {
@@ -149,11 +149,11 @@ impl<'a> CoarseSurfaces<'a> {
         facets.sort_unstable();
         let mean_of = |root: &ElementId| {
             let group = forest.group(*root).expect("a root is a group");
-            let mut sum = Lit { reflectance: [0.0; 3], exitance: [0.0; 3] };
+            let mut sum = FacetMaterial { reflectance: [0.0; 3], exitance: [0.0; 3] };
             let leaves = groups.leaves_of(group);
             let area: f64 = leaves.iter().map(|leaf| leaf.area_m2).sum();
             for leaf in leaves {
-                let (own, share) = (lit.lit(leaf.facet.0), (leaf.area_m2 / area) as f32);
+                let (own, share) = (lit.material(leaf.facet.0), (leaf.area_m2 / area) as f32);
                 for c in 0..3 {
                     sum.reflectance[c] += share * own.reflectance[c];
                     sum.exitance[c] += share * own.exitance[c];
@@ -206,10 +206,10 @@ impl Surfaces for CoarseSurfaces<'_> {
         self.lit.place(id)
     }
 
-    fn lit(&self, facet: u32) -> &Lit {
+    fn material(&self, facet: u32) -> &FacetMaterial {
         match self.lit.forest.groups().root_number(ElementId(facet)) {
             Some(number) => &self.means[number],
-            None => self.lit.lit(facet),
+            None => self.lit.material(facet),
         }
     }
 }

@@ -28,8 +28,8 @@ fn flux(solved: &Solved) -> (RowSumError, Energy) {
     };
     let facets = forest.near_facets().iter().copied().filter(present);
     let is_surface = |id: u32| forest.receives(ElementId(id));
-    let lit = (&solved.links, &solved.radiosity);
-    let (rows, mut energy) = balance_of(&surfaces, lit, facets, &is_surface);
+    let solution = (&solved.links, &solved.radiosity);
+    let (rows, mut energy) = balance_of(&surfaces, solution, facets, &is_surface);
     let lights = lights_w(solved);
     energy.emitted_w += lights.0 + from_outside_w(&surfaces, solved);
     energy.escaped_w += lights.0 - lights.1;
@@ -43,7 +43,7 @@ fn from_outside_w(surfaces: &LitForest<'_>, solved: &Solved) -> f64 {
     for link in solved.tree.links() {
         let exchange = f64::from(link.carried.exchange_area_past_occluders_m2());
         for end in [link.a, link.b].into_iter().filter(|&end| forest.is_distant(end)) {
-            let exitance = surfaces.lit(surfaces.facet_of(end.0)).exitance;
+            let exitance = surfaces.material(surfaces.facet_of(end.0)).exitance;
             sum += exchange * exitance.iter().copied().map(f64::from).sum::<f64>();
         }
     }

@@ -1,4 +1,4 @@
-//! How what arrives over a link bends over its receiver: the second order, beyond the link's line.
+//! Second-order variation (bend) of the arriving light over a receiver, beyond the gradient that a link stores.
 
 use fearless_simd::dispatch;
 use glam::{DMat3, DVec2, DVec3};
@@ -9,8 +9,8 @@ use super::point::{LANES, PointBundle, form_factors_from_points};
 use crate::element::{WorldElement, WorldLight, bilinear_area};
 use crate::geometry::ConvexPolygon;
 
-/// How much of each of three parabolas is in what arrives over an element, relative to its mean, with lengths in
-/// radii of the element: see [`Receiver::polynomial`].
+/// Coefficients of three parabolas in the arriving light over an element, relative to its mean, with lengths in radii of the
+/// element: see [`Receiver::polynomial`].
 pub type Bend = [f64; 3];
 
 /// (Sum of the radii / distance)^2 from which what arrives is known in closed form only.
@@ -29,14 +29,14 @@ const G3: [(f64, f64); 3] = [
 /// Points of a receiver.
 const POINTS: usize = 9;
 
-/// An element made ready to be asked how what it receives bends.
+/// An element prepared for computing the bend of the light that it receives.
 pub struct Receiver<'a> {
     element: &'a WorldElement,
     /// Nine Gauss points; the other lanes are at the centre.
     points: PointBundle,
     /// Shares of the area.
     shares: [f64; POINTS],
-    /// What of a function's values at the points is in each parabola.
+    /// Weights by which values at the points give the coefficient of each parabola.
     fit: [[f64; POINTS]; 3],
     /// The mean of x x, x y and y y, and the line that fits each of them best; lengths in radii.
     lines: [[f64; 3]; 3],
@@ -48,7 +48,7 @@ fn squares(p: DVec2) -> [f64; 3] {
 }
 
 impl<'a> Receiver<'a> {
-    /// Of any quadrilateral or triangle.
+    /// Receiver from any quadrilateral or triangle.
     pub fn new(element: &'a WorldElement) -> Receiver<'a> {
         let WorldElement { corners, plane, centre, radius, .. } = element;
         let mut points = PointBundle::default();
@@ -91,7 +91,7 @@ impl<'a> Receiver<'a> {
         Receiver { element, points, shares, fit, lines }
     }
 
-    /// The bend of what a source sends, without occlusion.
+    /// Bend of the light from a source, without occlusion.
     ///
     /// Error: that of nine Gauss points, which find the parabola that fits best beside a line in anything up to third
     /// order. About 40 ns, near the source 0.2 microseconds.
@@ -113,7 +113,7 @@ impl<'a> Receiver<'a> {
         self.fitted(&values)
     }
 
-    /// The bend of what a punctual light sends.
+    /// Bend of the light from a punctual light.
     pub fn light_bend(&self, light: &WorldLight) -> Bend {
         let sent = |k: usize| light_at(light, self.points.point(k), self.element.plane.normal);
         self.fitted(&std::array::from_fn(sent))
@@ -133,7 +133,7 @@ impl<'a> Receiver<'a> {
         reach * reach / (centre - self.element.centre).length_squared().max(f64::MIN_POSITIVE)
     }
 
-    /// What arrives at the points from some others with a normal and weights.
+    /// Kernel sums at the points over source points with a normal and weights.
     #[inline(always)]
     fn receive(&self, from: &[(DVec3, f64)], m: DVec3, values: &mut [f64; LANES]) {
         let (n, at) = (self.element.plane.normal, &self.points);
@@ -166,7 +166,7 @@ impl<'a> Receiver<'a> {
         values
     }
 
-    /// What of the values at the points is in each parabola, relative to their mean.
+    /// Coefficients of the parabolas in values at the points, relative to their mean.
     fn fitted(&self, values: &[f64; LANES]) -> Bend {
         let over = |weights: &[f64; POINTS]| {
             weights.iter().zip(values).map(|(weight, value)| weight * value).sum::<f64>()

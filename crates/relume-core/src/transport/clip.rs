@@ -61,7 +61,7 @@ impl Occluders {
         self.list.push(Occluder { kind: Kind::Solid(solid), size });
     }
 
-    /// Those that hide most come first: they leave less to cut for those behind them.
+    /// Sorts the occluders by the solid angle that they hide, largest first: they leave less to cut for the others.
     pub(super) fn largest_first(&mut self) {
         self.list.sort_by(|one, other| other.size.total_cmp(&one.size));
     }
@@ -186,7 +186,7 @@ impl Target<'_> {
 /// Cuts shadows out of a polygon; its buffers serve many points.
 #[derive(Default)]
 pub(super) struct Cutter {
-    /// What is left by all shadows but the last.
+    /// Fragments left by all shadows but the last.
     pub(super) left: Pieces,
     /// It is the whole polygon.
     pub(super) is_whole: bool,
@@ -196,7 +196,7 @@ pub(super) struct Cutter {
     next: Pieces,
     /// The edges of shadows that cross the target.
     lines: Vec<Line>,
-    /// Where each shadow's end in them.
+    /// End of each shadow's lines in `lines`.
     shadows: Vec<usize>,
     rest: Vec<DVec2>,
     inside: Vec<DVec2>,
@@ -315,7 +315,7 @@ impl Cutter {
         true
     }
 
-    /// The same of a convex solid.
+    /// Finds the edges of a convex solid's shadow that cross the target; false where it falls beside it.
     fn cast_solid(&mut self, point: DVec3, solid: &Silhouette, target: &Target<'_>) -> bool {
         let Cutter { lines, seen, .. } = self;
         solid.cast(point, seen, |n| target.add_side(point, n, lines))

@@ -1,11 +1,11 @@
-//! What lies in one plane: which of two coincident surfaces hides the other ([`Sheet::lies_to`] has the rule), and what
-//! surfaces in contact exchange: all that leaves the overlap.
+//! Coplanar surfaces: which of two coincident surfaces hides the other ([`Sheet::lies_to`] has the rule), and the exchange of
+//! surfaces in contact, which is everything that leaves their overlap.
 
 use crate::element::{Forest, OccluderPolygon, WorldElement, WorldView};
 use crate::geometry::{ConvexPolygon, Plane};
 use crate::scene::{InPlane, PatchId, Sheet};
 
-/// How a patch that lies in the plane of an end of patch `end` lies to it; `opposed` if it faces the other way.
+/// Relation of a patch in the plane of an end of patch `end` to that end; `opposed` if it faces the other way.
 pub fn in_plane(
     forest: &Forest,
     view: &WorldView,

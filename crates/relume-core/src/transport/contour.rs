@@ -63,10 +63,10 @@ const PERPENDICULAR: f64 = 1e-12;
 fn over_edge(e: &Edge, b: &[DVec3], unit: f64, error_max: f64) -> f64 {
     let length2 = e.along.length_squared();
     let mut sum = 0.0;
-    let mut corners = [DVec3::ZERO; ConvexPolygon::ROOM];
+    let mut corners = [DVec3::ZERO; ConvexPolygon::CAPACITY];
     corners.iter_mut().zip(b).for_each(|(to, &from)| *to = from / unit);
     // Corners where edges begin that are at an angle to `e`.
-    let mut tilted = [false; ConvexPolygon::ROOM];
+    let mut tilted = [false; ConvexPolygon::CAPACITY];
     let mut any = false;
     for k in 0..b.len() {
         let from = corners[k];

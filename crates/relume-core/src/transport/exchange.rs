@@ -16,11 +16,11 @@ use crate::element::{WorldElement, WorldLight, bilinear, bilinear_area};
 use crate::geometry::{ConvexPolygon, no_smaller};
 use crate::scene::LightKind;
 
-/// How two elements face each other.
+/// Relation of two elements' planes: how they face each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Meeting {
     /// At least one is wholly behind the other's plane: they exchange nothing.
-    Away,
+    BackFacing,
     /// Each is wholly in front of the other's plane.
     Facing,
     /// At least one is cut by the other's plane.
@@ -30,7 +30,7 @@ pub enum Meeting {
     Coplanar,
 }
 
-/// How what arrives on one end varies over it, relative to its mean.
+/// Variation of the arriving light over one end, relative to its mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Variation {
     /// Relative gradient in the patch's frame, 1/m.
@@ -41,20 +41,20 @@ pub struct Variation {
     pub bend: f64,
 }
 
-/// The exchange of a pair with how unevenly it falls on both ends.
+/// Exchange area of a pair, with the variation of the arriving light over both ends.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Exchange {
     /// Exchange area without occlusion, m2.
     pub area_m2: f64,
-    /// How it varies over the first end.
+    /// Variation over the first end.
     pub over_a: Variation,
-    /// How it varies over the second end.
+    /// Variation over the second end.
     pub over_b: Variation,
-    /// It varies more than a few points of either end can tell.
+    /// Whether the kernel varies more than a few points of either end can resolve.
     pub is_steep: bool,
 }
 
-/// How two elements face each other; corners within rounding of a plane count as on it.
+/// Relation of two elements' planes; corners within rounding of a plane count as on it.
 #[inline]
 pub fn meeting(a: &WorldElement, b: &WorldElement) -> Meeting {
     let slack = a.rounding_m + b.rounding_m;
@@ -63,10 +63,10 @@ pub fn meeting(a: &WorldElement, b: &WorldElement) -> Meeting {
     if b_hi <= slack {
         let is_flat = b_lo >= -slack && a_lo >= -slack && a_hi <= slack;
         let opposed = is_flat && a.plane.normal.dot(b.plane.normal) < -0.5;
-        return if opposed { Meeting::Coplanar } else { Meeting::Away };
+        return if opposed { Meeting::Coplanar } else { Meeting::BackFacing };
     }
     if a_hi <= slack {
-        return Meeting::Away;
+        return Meeting::BackFacing;
     }
     if a_lo < -slack || b_lo < -slack { Meeting::Cut } else { Meeting::Facing }
 }
@@ -90,7 +90,7 @@ pub fn contact_exchange(a: &WorldElement, b: &WorldElement, overlap_m2: f64) -> 
 /// Relative standard deviation that contact over a part of an end counts for at most.
 const UNEVEN: f64 = 4.0;
 
-/// Exchange area of two elements that meet as `meeting` says, not [`Meeting::Away`].
+/// Exchange area of two elements that meet as `meeting` says, not [`Meeting::BackFacing`].
 ///
 /// Error: below 0.25 % of the exchange area at worst, 0.05 % typically (see the tests, which sweep
 /// decades of distance and size). Symmetric: both directions of a pair use this one number.
@@ -134,7 +134,7 @@ pub fn exchange_by_points(
     }
 }
 
-/// The same as if each element were a point, with the gradients that follow; no bends.
+/// Exchange as if each element were a point, with the gradients that follow; no bends.
 ///
 /// Error: the square of (sum of the radii / distance), relative.
 pub fn exchange_of_points(a: &WorldElement, b: &WorldElement) -> Exchange {
@@ -165,7 +165,7 @@ struct Fit {
     xx: f64,
     xy: f64,
     yy: f64,
-    /// Of some points beside each other the values differ too much for a line.
+    /// Whether values at neighbouring points differ too much for a linear fit.
     is_steep: bool,
 }
 
@@ -378,14 +378,14 @@ fn integrate_polygon(
     seen: &[DVec3],
 ) -> (f64, Variation, bool) {
     let c = part.corners();
-    let looker = Looker { simd, e, seen };
+    let viewer = Viewer { simd, e, seen };
     let mut fit = Fit::default();
     let mut sum = 0.0;
     if c.len() == 4 {
-        sum = looker.integrate(&[c[0], c[1], c[2], c[3]], DEPTH, &mut fit);
+        sum = viewer.integrate(&[c[0], c[1], c[2], c[3]], DEPTH, &mut fit);
     } else {
         for k in 1..c.len() - 1 {
-            sum += looker.integrate(&[c[0], c[k], c[k + 1], c[k + 1]], DEPTH, &mut fit);
+            sum += viewer.integrate(&[c[0], c[k], c[k + 1], c[k + 1]], DEPTH, &mut fit);
         }
     }
     let variation = fit.variation();
@@ -398,14 +398,14 @@ fn integrate_polygon(
 /// Range of form factors over a quadrilateral above which it is integrated in four parts.
 const STEEP: f64 = 0.5;
 
-/// A side of a near pair: an element whose points look at a polygon.
-struct Looker<'a> {
+/// The end of a near pair from whose points the other is seen.
+struct Viewer<'a> {
     simd: Simd,
     e: &'a WorldElement,
     seen: &'a [DVec3],
 }
 
-impl Looker<'_> {
+impl Viewer<'_> {
     /// Integral over a quadrilateral of the form factor from its points, m2; in four parts
     /// where the two nearly touch. The values go into `fit`.
     fn integrate(&self, quad: &[DVec3; 4], depth: u32, fit: &mut Fit) -> f64 {
@@ -541,14 +541,14 @@ mod tests {
             for j in 0..N {
                 let at = |u: usize, v: usize| a.point(u as f64 / N as f64, v as f64 / N as f64);
                 let piece = quad([at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
-                if meeting(&piece, b) != Meeting::Away {
+                if meeting(&piece, b) != Meeting::BackFacing {
                     let seen = ConvexPolygon::new(&b.corners).clipped(&a.plane, 0.0);
                     let face = ConvexPolygon::new(&piece.corners).clipped(&b.plane, 0.0);
                     let c = face.corners();
                     for k in 1..c.len() - 1 {
                         let tri = [c[0], c[k], c[k + 1], c[k + 1]];
-                        let looker = Looker { simd: Simd::detect(), e: a, seen: seen.corners() };
-                        sum += looker.integrate(&tri, 0, &mut Fit::default());
+                        let viewer = Viewer { simd: Simd::detect(), e: a, seen: seen.corners() };
+                        sum += viewer.integrate(&tri, 0, &mut Fit::default());
                     }
                 }
             }
@@ -568,7 +568,7 @@ mod tests {
                     let o = DVec3::new(0.9, 0.1, gap + size * tilt.sin());
                     let b = rectangle(o, turn * DVec3::X * size, turn * DVec3::Y * size);
                     let m = meeting(&a, &b);
-                    if m == Meeting::Away {
+                    if m == Meeting::BackFacing {
                         continue;
                     }
                     let exact = reference(&a, &b);
@@ -612,7 +612,7 @@ mod tests {
             let other = rectangle(DVec3::new(0.5, -0.2, gap), turn * DVec3::X, turn * DVec3::Y);
             let both = form_factor(&square, &turned) - form_factor(&turned, &square);
             assert!(both.abs() < 4e-3, "{gap} {both}");
-            assert_eq!(meeting(&square, &other), Meeting::Away);
+            assert_eq!(meeting(&square, &other), Meeting::BackFacing);
         }
     }
 

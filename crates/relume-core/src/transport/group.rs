@@ -42,7 +42,7 @@ enum Points<'a> {
     Element(WorldElement),
 }
 
-/// What an element exchanges with the other end, by its place.
+/// Mean and gradient of f over an element.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slope {
     /// Mean of f over it.
@@ -57,7 +57,7 @@ const GAUSS: f64 = 0.577_350_269_189_625_8;
 /// Segments that a pair with a group is sampled by.
 pub const GROUP_SEGMENTS: u32 = 16;
 
-/// The body in whose frame a pair is looked at, if both ends are of that one.
+/// Body in whose frame a pair is evaluated, if both ends belong to it.
 pub fn common_body(
     forest: &Forest,
     view: &WorldView,
@@ -224,7 +224,7 @@ impl<'a> Spread<'a> {
     }
 }
 
-/// Where the middle of the other end is in the frame of a group, and the square of its distance.
+/// Middle of the other end in the frame of a group, and the square of its distance.
 fn seen_from(pose: &Pose, own: &Spread<'_>, other: &Spread<'_>) -> (DVec3, f64) {
     (pose.inverse_point(other.centre), own.centre.distance_squared(other.centre))
 }
@@ -301,7 +301,7 @@ fn scrambled(key: u64, k: u64) -> u32 {
     (x >> 32) as u32
 }
 
-/// Where within its sixteenth a sample is taken, in (0, 1).
+/// Place of a sample within its sixteenth, in (0, 1).
 fn jitter(key: u64, k: usize) -> f64 {
     (f64::from(scrambled(key, k as u64 + 32)) + 0.5) / 4_294_967_296.0
 }

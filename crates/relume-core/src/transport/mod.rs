@@ -1,6 +1,8 @@
-//! Exchange area and visibility of two elements: pure queries.
+//! Exchange area X and visibility V of two elements: pure queries.
 //!
-//! Nothing here knows radiosity, time or the pair tree.
+//! [`exchange`](exchange()) computes X, [`visibility`](visibility()) computes V over fixed segments and [`clipping`] in closed form past
+//! occluders, [`Shaft`] finds the occluders between two elements, [`GroupSight`] answers for groups of patches. Must not know
+//! radiosity, time or the pair tree.
 
 mod bend;
 mod clip;
@@ -9,9 +11,10 @@ mod contour;
 mod exchange;
 mod group;
 mod kernel;
-mod lookout;
 mod point;
+mod prepared_view;
 mod segments;
+mod side;
 mod silhouette;
 mod visibility;
 
@@ -24,10 +27,11 @@ pub use exchange::{
 };
 pub use group::{GROUP_SEGMENTS, GroupSight, Slope, Spread, common_body};
 pub use kernel::Simd;
-pub use lookout::{CELLS_MAX, Clipping, FactorPast, Looker, Lookout, form_factor_past};
 pub use point::form_factor_from_point;
+pub use prepared_view::{CELLS_MAX, Clipping, FactorPast, PreparedView, form_factor_past};
 pub use segments::{SEGMENTS, SegmentBundle};
+pub use side::Side;
 pub use visibility::{
-    BlockerSizes, CLIPPED_MAX, Candidates, Shaft, Visibility, clipping, light_visibility, lookout,
-    segment_is_clear, visibility,
+    BlockerSizes, CLIPPED_MAX, Candidates, Shaft, Visibility, clipping, light_visibility,
+    prepare_view, segment_is_clear, visibility,
 };

@@ -5,14 +5,14 @@ use glam::DVec3;
 
 use crate::scene::{Solid, SolidEdge, SolidFace};
 
-/// A solid in some frame, made ready to be looked at from points of one polygon, the looker.
+/// A solid in some frame, prepared for views from points of one polygon, the observer.
 pub(super) struct Silhouette {
     corners: Vec<DVec3>,
-    /// Faces that some points of the looker see and others do not.
+    /// Faces that some points of the observer see and others do not.
     faces: Vec<Face>,
-    /// Those that bound the shadow seen from every point.
+    /// Edges that bound the shadow from every point.
     always: Vec<[usize; 2]>,
-    /// Those of which it depends on the point.
+    /// Edges that bound the shadow from some points only.
     sometimes: Vec<Edge>,
 }
 
@@ -28,7 +28,7 @@ struct Edge {
     faces: [Sight; 2],
 }
 
-/// Whether the looker sees a face.
+/// Whether the observer sees a face.
 #[derive(Clone, Copy, PartialEq)]
 enum Sight {
     All,
@@ -38,17 +38,17 @@ enum Sight {
 }
 
 impl Silhouette {
-    /// Corners and normals by `place` and `turn` to the frame, in which the looker's corners are; `is_low`
-    /// says of a corner in the frame whether it is in the looker's plane or behind it.
+    /// Corners and normals by `place` and `turn` to the frame, in which the observer's corners are; `is_low`
+    /// says of a corner in the frame whether it is in the observer's plane or behind it.
     pub(super) fn new(
         solid: &Solid,
         (place, turn): (impl Fn(DVec3) -> DVec3, impl Fn(DVec3) -> DVec3),
-        looker: &[DVec3],
+        observer: &[DVec3],
         is_low: impl Fn(DVec3) -> bool,
     ) -> Silhouette {
         let corners: Vec<DVec3> = solid.corners.iter().map(|&c| place(c)).collect();
         let low: Vec<bool> = corners.iter().map(|&c| is_low(c)).collect();
-        // An edge in the looker's plane, or behind it, bounds nothing in front; and a face of such edges
+        // An edge in the observer's plane, or behind it, bounds nothing in front; and a face of such edges
         // nobody sees.
         let is_high = |edge: &&SolidEdge| !edge.ends.iter().all(|&c| low[c as usize]);
         let mut is_low = vec![true; solid.faces.len()];
@@ -59,11 +59,11 @@ impl Silhouette {
         let sight = |(face, &is_low): (&SolidFace, &bool)| {
             let (normal, corner) = (turn(face.normal), face.corner as usize);
             let above = |p: &DVec3| normal.dot(*p - corners[corner]) > 0.0;
-            let count = looker.iter().filter(|p| above(p)).count();
+            let count = observer.iter().filter(|p| above(p)).count();
             match count {
                 _ if is_low => Sight::None,
                 0 => Sight::None,
-                n if n == looker.len() => Sight::All,
+                n if n == observer.len() => Sight::All,
                 _ => {
                     faces.push(Face { normal, corner });
                     Sight::Some(faces.len() - 1)
@@ -167,14 +167,14 @@ mod tests {
         /// A ray is within all sides of the shadow if and only if it meets the solid.
         #[test]
         fn a_shadow_is_where_rays_meet_the_solid(
-            looker in prop::array::uniform3(point()),
+            observer in prop::array::uniform3(point()),
             share in prop::array::uniform3(0.01..1.0),
             to in point(),
         ) {
             let sum: f64 = share.iter().sum();
-            let from: DVec3 = looker.iter().zip(share).map(|(p, s)| *p * (s / sum)).sum();
+            let from: DVec3 = observer.iter().zip(share).map(|(p, s)| *p * (s / sum)).sum();
             let identity = |p: DVec3| p;
-            let solid = Silhouette::new(&cuboid(), (identity, identity), &looker, |_| false);
+            let solid = Silhouette::new(&cuboid(), (identity, identity), &observer, |_| false);
             let is_in = solid.cast(from, &mut Vec::new(), |n| n.dot(to - from) >= 0.0);
             prop_assert_eq!(is_in, meets(from, to - from));
         }
@@ -182,11 +182,11 @@ mod tests {
 
     #[test]
     fn under_a_box_everything_is_dark_and_beside_it_only_what_is_behind() {
-        let looker =
+        let observer =
             [DVec3::new(-2.0, -1.0, 0.0), DVec3::new(2.0, -1.0, 0.5), DVec3::new(0.0, -1.0, -0.5)];
         let on_floor = |p: DVec3| p.y <= -1.0 + 1e-9;
         let identity = |p: DVec3| p;
-        let solid = Silhouette::new(&cuboid(), (identity, identity), &looker, on_floor);
+        let solid = Silhouette::new(&cuboid(), (identity, identity), &observer, on_floor);
         let sides = |from: DVec3, to: DVec3| {
             let mut count = 0;
             let is_in = solid.cast(from, &mut Vec::new(), |n| {

@@ -1,5 +1,5 @@
-//! Partial visibility of a pair: which bodies stand in its shaft, and which of its fixed
-//! segments they block.
+//! Visibility V of a pair: the occluders in its shaft ([`Shaft`]), and V past them, over fixed segments ([`visibility`]) or by
+//! clipping ([`clipping`]).
 
 use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldView};
 use crate::geometry::{Aabb, Plane, Pose, ShaftOfBoxes, shaft_meets_box};
@@ -9,12 +9,13 @@ use super::clip::keep_in_front;
 use super::contact::{in_plane, lies_in, overlap_m2};
 use super::exchange::{Meeting, meeting};
 use super::kernel::Simd;
-use super::lookout::{Between, Clipping, Looker, Lookout, PlacedSolid, is_hidden};
+use super::prepared_view::{Between, Clipping, PlacedSolid, PreparedView, is_hidden};
 use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
+use super::side::Side;
 use glam::{DVec2, DVec3};
 
-/// Nodes of the forest's fixed part that may stand between the two ends of a pair: clusters and
-/// patch roots. Conservative: what is not below one of them blocks nothing.
+/// Candidate occluders of a pair: nodes of the forest's fixed part (clusters and patch roots) that may stand between its ends.
+/// Conservative: a patch below none of them blocks nothing.
 pub type Candidates = [u32];
 
 /// The visibility of a pair, kernel-weighted over its segments.
@@ -22,9 +23,9 @@ pub type Candidates = [u32];
 pub struct Visibility {
     /// Unoccluded share, in [0, 1].
     pub value: f64,
-    /// What occlusion adds to the relative gradient of what arrives over the first end, 1/m.
+    /// Contribution of occlusion to the relative gradient of the arriving light over the first end, 1/m.
     pub gradient_a: DVec2,
-    /// The same over the second end.
+    /// Contribution of occlusion to the relative gradient over the second end, 1/m.
     pub gradient_b: DVec2,
     /// Standard deviation between the quadrants of the first end, absolute.
     pub spread_a: f64,
@@ -35,7 +36,7 @@ pub struct Visibility {
 }
 
 impl Visibility {
-    /// Nothing in the way.
+    /// Visibility of a pair without occluders.
     pub const CLEAR: Visibility = Visibility {
         value: 1.0,
         gradient_a: DVec2::ZERO,
@@ -70,7 +71,7 @@ const COVER: f64 = 0.5;
 /// disregarded because it is close to an end.
 const LIFT: f64 = 8.0;
 
-/// Sizes of what stands between two ends; infinite where nothing does.
+/// Sizes of the blockers between two ends; infinite where there are none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BlockerSizes {
     /// For each end the width (area over length, m) of the narrowest blocker that emits light at any time and shines
@@ -95,7 +96,7 @@ impl BlockerSizes {
     };
 }
 
-/// How a patch stands to a shaft.
+/// Relation of a patch to a shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Standing {
     /// It blocks neither this pair nor any below it.
@@ -106,7 +107,7 @@ enum Standing {
     Between,
 }
 
-/// The two ends in the frame in which a body is looked at, and their boxes' shaft.
+/// The two ends in the frame in which a body is tested against their shaft, and their boxes' shaft.
 #[derive(Clone, Copy)]
 struct SeenEnds<'a> {
     own: bool,
@@ -151,7 +152,7 @@ fn span(polygon: &OccluderPolygon<'_>, plane: &Plane) -> (f64, f64) {
     polygon.corners.iter().fold((f64::INFINITY, f64::NEG_INFINITY), with)
 }
 
-/// How far two elements reach to either side of a plane, the smaller of both, metres; negative where they
+/// Reach of two elements to either side of a plane, the smaller of both, metres; negative where they
 /// stay away from it.
 #[inline]
 fn reach(plane: &Plane, a: &WorldElement, b: &WorldElement) -> f64 {
@@ -164,7 +165,7 @@ impl<'a> Shaft<'a> {
         self.a.rounding_m + self.b.rounding_m
     }
 
-    /// The two ends in the frame in which a body is looked at: its own for the body that both ends
+    /// The two ends in the frame in which a body is tested against their shaft: its own for the body that both ends
     /// ride on, so that the answer does not depend on where that is.
     fn seen_by(&self, body: Option<BodyId>) -> (bool, &'a WorldElement, &'a WorldElement) {
         match self.own {
@@ -186,7 +187,7 @@ impl<'a> Shaft<'a> {
         SeenEnds { own, a, b, shaft }
     }
 
-    /// How a patch stands to the shaft.
+    /// Relation of a patch to the shaft.
     fn standing(&self, shafts: &ShaftsOfBoxes, patch: PatchId) -> Standing {
         if patch == self.patches.0 || patch == self.patches.1 || self.view.is_hidden_twin(patch) {
             return Standing::Out;
@@ -415,14 +416,14 @@ impl<'a> Shaft<'a> {
         blockers
     }
 
-    /// Those of the blockers of a pair above that may block segments of this one.
+    /// Blockers of this pair among those of a pair above.
     pub fn those_that_block(&self, blockers: &[PatchId]) -> Vec<PatchId> {
         let shafts = self.shafts();
         let blocks = |patch: &PatchId| self.standing(&shafts, *patch) == Standing::Between;
         blockers.iter().copied().filter(blocks).collect()
     }
 
-    /// How many occluders blockers make up: solids that hide with their silhouettes count as one for every
+    /// Number of occluders that blockers make up: solids that hide with their silhouettes count as one for every
     /// eight of their faces, which may have to be clipped one by one after all.
     pub fn occluders(&self, blockers: &[PatchId]) -> usize {
         let whole = self.whole_solids(blockers);
@@ -611,12 +612,17 @@ pub fn clipping<'a>(simd: Simd, shaft: &Shaft<'a>, blockers: &[PatchId]) -> Clip
     Clipping::new(simd, ends, &shaft.between(blockers))
 }
 
-/// One end of a pair made ready to look at the other past blockers; in the frame of the body that both
+/// View from one end of a pair to the other past blockers, prepared for many points; in the frame of the body that both
 /// ride on, if they do.
-pub fn lookout(simd: Simd, shaft: &Shaft<'_>, blockers: &[PatchId], looker: Looker) -> Lookout {
+pub fn prepare_view(
+    simd: Simd,
+    shaft: &Shaft<'_>,
+    blockers: &[PatchId],
+    observer: Side,
+) -> PreparedView {
     let (a, b) = shaft.own.map_or((shaft.a, shaft.b), |(_, a, b)| (a, b));
-    let (looker, other) = if looker == Looker::B { (b, a) } else { (a, b) };
-    Lookout::new(simd, looker, other, &shaft.between(blockers))
+    let (observer, other) = if observer == Side::B { (b, a) } else { (a, b) };
+    PreparedView::new(simd, observer, other, &shaft.between(blockers))
 }
 
 /// Visibility of a punctual light (the second end of the shaft) from an element; `segments` come
@@ -665,7 +671,7 @@ impl SideTally {
         self.clear_moment += at * clear;
     }
 
-    /// What occlusion adds to the relative gradient: the shift of the centre of what arrives,
+    /// Contribution of occlusion to the relative gradient: the shift of the centre of what arrives,
     /// against the element's own second moment.
     fn gradient(&self, e: &WorldElement) -> DVec2 {
         let (total, clear): (f64, f64) = (self.total.iter().sum(), self.clear.iter().sum());
@@ -763,7 +769,7 @@ mod tests {
     /// Floor and ceiling, both double-sided if wanted, and what `fill` adds: V of their inner sides.
     fn floor_to_ceiling(double_sided: bool, fill: impl Fn(&mut SceneBuilder)) -> f64 {
         let mut b = SceneBuilder::new("floor and ceiling");
-        let node = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+        let node = b.node("scratch", None, DVec3::ZERO, DQuat::IDENTITY);
         let grey = match double_sided {
             true => b.double_sided_material("grey", [0.5; 3], [0.0; 3]),
             false => b.material("grey", [0.5; 3], [0.0; 3]),

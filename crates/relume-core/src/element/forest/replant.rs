@@ -3,7 +3,7 @@
 //! What the old and the new scene have in common has the same nodes below its root in both fixed parts. Their ids are those
 //! of a forest that is made anew; what is above the kept part keeps its order.
 
-use super::{BodyId, ElementId, Fan, Forest, NONE, Node, Renumbering, Twins, exposed_m2};
+use super::{BodyId, ChildRange, ElementId, Forest, NONE, Node, Renumbering, Siblings, exposed_m2};
 use crate::scene::FIRST_NAME;
 
 impl Forest {
@@ -82,29 +82,30 @@ impl Forest {
     ) -> (Forest, Vec<ElementId>) {
         let mut out = new.clone();
         let numbers = coarse_numbers((old, new), to);
-        let fan = |fan: Fan| match fan.range() {
-            _ if fan.is_other() => fan,
-            below if below.is_empty() => fan,
-            below => Fan::new(to.new_of(below.start), below.len()),
+        let children = |children: ChildRange| match children.range() {
+            _ if children.is_other() => children,
+            below if below.is_empty() => children,
+            below => ChildRange::new(to.new_of(below.start), below.len()),
         };
         for id in (0..old.kept_len).filter(|&id| to.new_of(id) != NONE) {
             let at = to.new_of(id) as usize;
-            if !self.nodes[id as usize].fan.is_other() {
-                out.nodes[at].fan = fan(self.nodes[id as usize].fan);
+            if !self.nodes[id as usize].children.is_other() {
+                out.nodes[at].children = children(self.nodes[id as usize].children);
             }
-            let twins = out.twins_of(at as u32);
-            out.twins[twins].users = self.twins[self.twins_of(id)].users;
+            let siblings = out.siblings_of(at as u32);
+            out.siblings[siblings].users = self.siblings[self.siblings_of(id)].users;
         }
         let beyond = &self.nodes[old.kept_len as usize..];
-        out.nodes.extend(beyond.iter().map(|node| Node { fan: fan(node.fan), ..*node }));
+        out.nodes
+            .extend(beyond.iter().map(|node| Node { children: children(node.children), ..*node }));
         let id = |old: u32| if old == NONE { NONE } else { to.new_of(old) };
         let number = |old: u32| numbers.get(old as usize).copied().unwrap_or(old);
-        let beyond = &self.twins[self.twins_of(old.kept_len)..];
-        out.twins.extend(beyond.iter().map(|twins| Twins {
-            parent: id(twins.parent),
-            facet: id(twins.facet),
-            coarse: number(twins.coarse),
-            ..*twins
+        let beyond = &self.siblings[self.siblings_of(old.kept_len)..];
+        out.siblings.extend(beyond.iter().map(|siblings| Siblings {
+            parent: id(siblings.parent),
+            facet: id(siblings.facet),
+            coarse: number(siblings.coarse),
+            ..*siblings
         }));
         for (vacant, own) in out.vacant.iter_mut().zip(&self.vacant) {
             *vacant = own.iter().map(|&first| id(first)).collect();

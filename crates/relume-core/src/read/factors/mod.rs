@@ -15,7 +15,7 @@ pub use grouping::Grouping;
 pub use parts::PartFactors;
 
 use fragments::{Fragments, Spread};
-use sum::{Fixed, Room, Sign, mirrored, plus};
+use sum::{Buffers, Fixed, Sign, mirrored, plus};
 
 /// What is done to form factors so that rows sum to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -225,7 +225,7 @@ impl Factors {
         let spread = Spread { sharing: Sharing::new(solved), fragments: &fragments };
         let none = vec![Vec::new(); grouping.names.len()];
         let upper = plus(&none, &links, &spread, (&fixed, Sign::Plus));
-        mirrored(areas(solved, scene, grouping), &upper, &fixed, Room::default())
+        mirrored(areas(solved, scene, grouping), &upper, &fixed, Buffers::default())
     }
 }
 
@@ -253,7 +253,7 @@ mod tests {
         let upper: Vec<Vec<(u32, u64)>> = (0..3)
             .map(|r| (r..3).map(|c| (c as u32, whole(rows[r][c]))).filter(|e| e.1 > 0).collect())
             .collect();
-        mirrored(vec![1.0, 2.0, 4.0], &upper, &fixed, Room::default())
+        mirrored(vec![1.0, 2.0, 4.0], &upper, &fixed, Buffers::default())
     }
 
     /// Rows sum to 1.02, 0.97 and 0.995.

@@ -15,7 +15,7 @@ use crate::read::pieces::Sharing;
 use crate::space::{Solved, SpaceState};
 
 use super::fragments::{Fragments, Spread};
-use super::sum::{Fixed, Room, Sign, Upper, add, mirrored, plus};
+use super::sum::{Buffers, Fixed, Sign, Upper, add, mirrored, plus};
 use super::{Factors, Grouping, areas};
 
 /// Form factors between groups of the patches of a scene, from solutions of the scene of
@@ -30,7 +30,7 @@ pub struct PartFactors {
     parts: Vec<Vec<Part>>,
     grouping: Grouping,
     resting: Option<Resting>,
-    room: Room,
+    room: Buffers,
 }
 
 /// Sums over links that nothing moving has to do with.
@@ -57,7 +57,7 @@ impl PartFactors {
     pub fn new(scene: &Arc<Scene>, joined: &Joined, grouping: Grouping) -> PartFactors {
         assert_eq!(grouping.of_patch.len(), scene.patches.len());
         let (scene, parts) = (Arc::clone(scene), joined.parts.clone());
-        PartFactors { scene, parts, grouping, resting: None, room: Room::default() }
+        PartFactors { scene, parts, grouping, resting: None, room: Buffers::default() }
     }
 
     /// Form factors of a solution; the same, bit for bit, whatever came before.

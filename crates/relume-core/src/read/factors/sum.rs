@@ -191,14 +191,14 @@ impl Merger {
 
 /// Room that a table had: pages that are there already are half the price of filling one.
 #[derive(Default)]
-pub(super) struct Room {
+pub(super) struct Buffers {
     columns: Vec<u32>,
     exchange_m2: Vec<f64>,
 }
 
-impl From<Factors> for Room {
-    fn from(factors: Factors) -> Room {
-        Room { columns: factors.columns, exchange_m2: factors.exchange_m2 }
+impl From<Factors> for Buffers {
+    fn from(factors: Factors) -> Buffers {
+        Buffers { columns: factors.columns, exchange_m2: factors.exchange_m2 }
     }
 }
 
@@ -207,12 +207,12 @@ pub(super) fn mirrored(
     area_m2: Vec<f64>,
     upper: &[Vec<(u32, u64)>],
     fixed: &Fixed,
-    room: Room,
+    room: Buffers,
 ) -> Factors {
     let groups = area_m2.len();
     let offsets = row_offsets(groups, upper);
     // Every entry is written below.
-    let Room { mut columns, mut exchange_m2 } = room;
+    let Buffers { mut columns, mut exchange_m2 } = room;
     columns.resize(offsets[groups], 0);
     exchange_m2.resize(offsets[groups], 0.0);
     let (mut columns_left, mut values_left) = (&mut columns[..], &mut exchange_m2[..]);

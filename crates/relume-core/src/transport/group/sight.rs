@@ -1,4 +1,4 @@
-//! What stands between two ends of which one is a group: over fixed segments.
+//! Visibility of pairs with a group as an end, over fixed segments and rays.
 
 use crate::element::{ElementId, Forest, WorldView, bilinear_area};
 use crate::geometry::{Aabb, Pose, ShaftOfBoxes};
@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::{GROUP_SEGMENTS, Points, Spread, factor, point_of, scrambled, seen_from};
 
-/// What may stand between two ends.
+/// Query for the occluders between two ends of which one is a group.
 pub struct GroupSight<'a> {
     /// The forest.
     pub forest: &'a Forest,
@@ -16,7 +16,7 @@ pub struct GroupSight<'a> {
     pub view: &'a WorldView,
     /// The body in whose frame both ends are, if that is not the world.
     pub common: Option<BodyId>,
-    /// Nodes that hold all that may block.
+    /// Candidate occluders.
     pub candidates: &'a [u32],
 }
 
@@ -109,7 +109,7 @@ impl GroupSight<'_> {
     }
 }
 
-/// What the facets of two ends see of each other.
+/// Visibilities between the facets of two ends.
 #[derive(Clone, Debug, Default)]
 pub struct FacetSight {
     /// Visibility of the pair: the mean over all rays, by what they carry.
@@ -173,7 +173,7 @@ struct Aim {
     weight: f64,
 }
 
-/// How often the facets of an end were seen, by weight.
+/// Weighted counts of rays that reached each facet of an end.
 struct Tally {
     clear: Vec<f64>,
     all: Vec<f64>,
@@ -252,7 +252,7 @@ impl<'a> Rays<'a> {
 }
 
 impl GroupSight<'_> {
-    /// What each facet sees of the other end: rays from each facet of the end that has more of them, to points of the other by
+    /// Visibility of each facet to the other end, by rays from each facet of the end that has more of them, to points of the other by
     /// what they weigh. A pure function of the places and of `key`.
     pub fn by_facets(&self, a: &Spread<'_>, b: &Spread<'_>, key: u64) -> FacetSight {
         let Some(rays) = Rays::new(a, b, key) else { return FacetSight::default() };

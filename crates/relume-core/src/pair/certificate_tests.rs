@@ -1,26 +1,26 @@
-//! What can be said of a pair until coming ticks, whatever space it is in.
+//! Tests behind certificates: until which tick a finding on a pair stands, in space or in the plane.
 
 use crate::element::ElementId;
-use crate::event::{Foresight, Tick};
 use crate::geometry::Aabb;
+use crate::predict::{MotionBounds, Tick};
 use crate::scene::Drift;
 
-/// What was found of a pair.
+/// Finding on a pair that a certificate may extend into the future.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Finding {
-    /// Nothing that moved concerns it: it stays as it is, with all pairs below it, while its ends
-    /// rest against each other and no body that moves comes between them.
+    /// No motion affects the pair: it and all pairs below it stay unchanged while the ends rest against each other and no
+    /// moving body comes between them.
     Unaffected,
-    /// Nothing stands between its ends: V is 1, of all pairs below it too.
+    /// Nothing stands between the ends: V is 1, for all pairs below it too.
     Clear,
-    /// It is culled.
+    /// The pair is culled.
     Culled,
 }
 
-/// What can be said of pairs of a space until each of the coming ticks.
-pub(crate) trait Outlook {
-    /// How far bodies can get until then.
-    fn ahead(&self) -> &Foresight;
+/// Conservative tests of a pair up to each of the coming ticks (horizons).
+pub(crate) trait CertificateTests {
+    /// Bounds of the bodies' motion.
+    fn motion_bounds(&self) -> &MotionBounds;
     /// Whether two ends rest against each other up to a horizon.
     fn rest(&self, horizon: usize, a: ElementId, b: ElementId) -> bool;
     /// Whether a body that moves against the ends, which rest against each other, may enter their shaft.
@@ -30,15 +30,15 @@ pub(crate) trait Outlook {
     /// Whether one end stays behind the other, as it is now, or absent.
     fn stays_away(&self, horizon: usize, a: ElementId, b: ElementId) -> bool;
 
-    /// The last of the coming ticks until which a finding stands; 0 if that is none.
+    /// Last of the coming ticks until which a finding stands; 0 if none.
     fn until(&self, a: ElementId, b: ElementId, finding: Finding) -> Tick {
         let stands = |&h: &usize| match finding {
             Finding::Unaffected => self.rest(h, a, b) && !self.is_entered(h, a, b),
             Finding::Clear => self.stays_clear(h, a, b),
             Finding::Culled => self.rest(h, a, b) || self.stays_away(h, a, b),
         };
-        let last = self.ahead().horizons().take_while(stands).last();
-        last.map_or(0, |h| self.ahead().until(h))
+        let last = self.motion_bounds().horizons().take_while(stands).last();
+        last.map_or(0, |h| self.motion_bounds().until(h))
     }
 }
 

@@ -1,4 +1,4 @@
-//! What points of an end see of the other: exact from each of a few points, past occluders.
+//! View from points of one end of a pair to the other end, past occluders: exact from each point.
 //!
 //! The part of a polygon that a point sees is a set of convex fragments ([`super::clip`]), whose form factors
 //! are known in closed form. What does not depend on the point is made ready once for many.
@@ -22,7 +22,7 @@ const NOTHING: f64 = 1e-12;
 /// Edges whose form factors are evaluated together.
 const EDGES_AT_ONCE: usize = 512;
 
-/// What stands between two ends, all in one frame: convex polygons, and solids that some of them are faces of.
+/// Blockers between two ends, in one frame: convex polygons, and solids that some of them are faces of.
 #[derive(Default)]
 pub(super) struct Between<'a> {
     corners: Vec<DVec3>,
@@ -52,7 +52,7 @@ impl<'a> Between<'a> {
         self.faces.push((normal, solid));
     }
 
-    /// Adds a solid, two or more of whose faces were or will be pushed: it may be looked at in their place.
+    /// Adds a solid, two or more of whose faces were or will be pushed: its silhouette may replace them.
     pub(super) fn push_solid(&mut self, solid: PlacedSolid<'a>) {
         self.solids.push(solid);
     }
@@ -61,12 +61,12 @@ impl<'a> Between<'a> {
     /// outside, and faces that it is wholly behind hide nothing that others do not. `without` the faces of some solids.
     fn facing<'b>(
         &'b self,
-        looker: &'b WorldElement,
+        observer: &'b WorldElement,
         slack: f64,
         without: &'b [u32],
     ) -> impl Iterator<Item = &'b [DVec3]> + 'b {
         let span = move |(corners, (normal, _)): (&[DVec3], &(DVec3, Option<u32>))| {
-            looker.span(&Plane::through(corners[0], *normal))
+            observer.span(&Plane::through(corners[0], *normal))
         };
         let all = || self.iter().zip(&self.faces);
         let is_outside = move |solid: u32| {
@@ -87,24 +87,24 @@ impl<'a> Between<'a> {
         })
     }
 
-    /// As they are seen from points of the looker's plane: parts in front of both ends' planes, in the
+    /// As they are seen from points of the observer's plane: parts in front of both ends' planes, in the
     /// other's frame.
     fn seen(
         &self,
-        looker: &WorldElement,
+        observer: &WorldElement,
         other: &WorldElement,
         frame: &TargetFrame,
         slack: f64,
     ) -> Occluders {
-        let from = frame.place(looker.centre);
+        let from = frame.place(observer.centre);
         let raised = |p: &Plane| Plane { normal: p.normal, offset: p.offset + slack };
-        let planes = [raised(&looker.plane), raised(&other.plane)];
+        let planes = [raised(&observer.plane), raised(&other.plane)];
         let mut out = Occluders::default();
         let mut whole = Vec::new();
         // The near plane in the frame.
-        let up = frame.direction(looker.plane.normal);
+        let up = frame.direction(observer.plane.normal);
         let is_low = |c: DVec3| up.dot(c - from) <= slack;
-        let corners = looker.corners.map(|c| frame.place(c));
+        let corners = observer.corners.map(|c| frame.place(c));
         for PlacedSolid { number, solid, pose } in &self.solids {
             // What reaches behind the other's plane hides less than its silhouette.
             if solid.corners.iter().all(|&c| other.plane.distance(pose.point(c)) >= -slack) {
@@ -116,7 +116,7 @@ impl<'a> Between<'a> {
             }
         }
         let (mut part, mut rest) = (Vec::new(), Vec::new());
-        for corners in self.facing(looker, slack, &whole) {
+        for corners in self.facing(observer, slack, &whole) {
             part.clear();
             part.extend_from_slice(corners);
             for plane in &planes {
@@ -131,69 +131,61 @@ impl<'a> Between<'a> {
     }
 }
 
-/// The end of a pair that the other is looked at from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Looker {
-    /// The first.
-    A,
-    /// The second.
-    B,
-}
-
-/// One end of a pair made ready to look at the other.
-pub struct Lookout {
+/// View from one end of a pair, the observer, to the other end: data that does not depend on the point.
+pub struct PreparedView {
     simd: Simd,
     frame: TargetFrame,
     /// The other's plane.
     other: Plane,
-    /// The part of the other that faces the looker's plane.
+    /// The part of the other that faces the observer's plane.
     target: Vec<DVec2>,
     between: Occluders,
-    /// The looker's, in the frame.
+    /// The observer's, in the frame.
     normal: DVec3,
-    room: Room,
+    scratch: Scratch,
 }
 
-/// What looking fills and empties: made once a thread, since most lookouts look only a few times.
+/// Buffers of a view: made once a thread, since most views are used for a few points only.
 #[derive(Default)]
-struct Room {
+struct Scratch {
     cutter: Cutter,
-    looks: Looks,
+    views: PointViews,
 }
 
 thread_local! {
-    static ROOM: Cell<Room> = Cell::default();
+    static SCRATCH: Cell<Scratch> = Cell::default();
 }
 
-impl Drop for Lookout {
+impl Drop for PreparedView {
     fn drop(&mut self) {
-        ROOM.set(std::mem::take(&mut self.room));
+        SCRATCH.set(std::mem::take(&mut self.scratch));
     }
 }
 
-impl Lookout {
+impl PreparedView {
     pub(super) fn new(
         simd: Simd,
-        looker: &WorldElement,
+        observer: &WorldElement,
         other: &WorldElement,
         between: &Between<'_>,
-    ) -> Lookout {
-        let slack = looker.rounding_m + other.rounding_m;
+    ) -> PreparedView {
+        let slack = observer.rounding_m + other.rounding_m;
         let frame = TargetFrame::of(other);
-        let facing = ConvexPolygon::new(&other.corners[..other.len]).clipped(&looker.plane, slack);
-        let room = ROOM.take();
-        Lookout {
+        let facing =
+            ConvexPolygon::new(&other.corners[..other.len]).clipped(&observer.plane, slack);
+        let scratch = SCRATCH.take();
+        PreparedView {
             simd,
             other: other.plane,
             target: frame.flat(facing.corners()),
-            between: between.seen(looker, other, &frame, slack),
-            normal: frame.direction(looker.plane.normal),
+            between: between.seen(observer, other, &frame, slack),
+            normal: frame.direction(observer.plane.normal),
             frame,
-            room: Room { looks: Looks { moments: None, ..room.looks }, ..room },
+            scratch: Scratch { views: PointViews { moments: None, ..scratch.views }, ..scratch },
         }
     }
 
-    /// Visibility of the other from a part of the looker, in [0, 1]: from 2 x 2 Gauss points in each of
+    /// Visibility of the other from a part of the observer, in [0, 1]: from 2 x 2 Gauss points in each of
     /// `cells` x `cells` parts of that.
     ///
     /// Error: exact from each point; over the part it falls with the square of `cells`, as V has kinks.
@@ -201,20 +193,21 @@ impl Lookout {
         self.look(part, cells).visibility()
     }
 
-    /// Visibility of the other from the middle of each of some parts of the looker, in [0, 1]; 0 where a
+    /// Visibility of the other from the middle of each of some parts of the observer, in [0, 1]; 0 where a
     /// middle does not face the other.
     pub fn from_middles<'a>(&mut self, parts: impl Iterator<Item = &'a WorldElement>) -> Vec<f64> {
-        self.room.looks.start();
+        self.scratch.views.start();
         parts.for_each(|part| self.look_from(part, part.point(0.5, 0.5)));
-        self.room.looks.evaluate(self.simd, self.normal);
+        self.scratch.views.evaluate(self.simd, self.normal);
         let share = |&(all, clear): &(f64, f64)| if all > 0.0 { clear / all } else { 0.0 };
-        self.room.looks.points.iter().map(|point| share(point).clamp(0.0, 1.0)).collect()
+        self.scratch.views.points.iter().map(|point| share(point).clamp(0.0, 1.0)).collect()
     }
 
-    /// Whether the other end, in parts of each of which one occluder hides all, is hidden from all of the looker, its
+    /// Whether the other end, in parts of each of which one occluder hides all, is hidden from all of the observer, its
     /// rim aside.
-    fn is_hidden(&mut self, looker: &WorldElement) -> bool {
-        let corners = ConvexPolygon::new(&looker.corners[..looker.len]).clipped(&self.other, 0.0);
+    fn is_hidden(&mut self, observer: &WorldElement) -> bool {
+        let corners =
+            ConvexPolygon::new(&observer.corners[..observer.len]).clipped(&self.other, 0.0);
         let corners = corners.corners();
         if corners.len() < 3 || self.target.len() < 3 {
             return false;
@@ -222,31 +215,31 @@ impl Lookout {
         let middle = corners.iter().sum::<DVec3>() / corners.len() as f64;
         let drawn_in = |&c: &DVec3| self.frame.place(c.lerp(middle, DRAWN_IN));
         let points: Vec<DVec3> = corners.iter().map(drawn_in).collect();
-        self.room.cutter.hides_from_all(&points, &self.target, &self.between, HALVINGS)
+        self.scratch.cutter.hides_from_all(&points, &self.target, &self.between, HALVINGS)
     }
 
     fn look(&mut self, part: &WorldElement, cells: u32) -> &Sums {
-        self.room.looks.start();
+        self.scratch.views.start();
         let at = |k: u32| (f64::from(k / 2) + G[k as usize & 1]) / f64::from(cells);
         for k in 0..4 * cells * cells {
             self.look_from(part, part.point(at(k % (2 * cells)), at(k / (2 * cells))));
         }
-        self.room.looks.evaluate(self.simd, self.normal);
-        &self.room.looks.sums
+        self.scratch.views.evaluate(self.simd, self.normal);
+        &self.scratch.views.sums
     }
 
     fn look_from(&mut self, part: &WorldElement, point: DVec3) {
         if self.other.distance(point) > 0.0 && self.target.len() >= 3 {
             let from = self.frame.place(point);
-            self.room.cutter.cut(from, &self.target, &self.between);
+            self.scratch.cutter.cut(from, &self.target, &self.between);
             let at =
-                if self.room.looks.moments.is_some() { part.offset(point) } else { DVec2::ZERO };
-            self.room.looks.push(from, at, &self.target, &self.room.cutter);
+                if self.scratch.views.moments.is_some() { part.offset(point) } else { DVec2::ZERO };
+            self.scratch.views.push(from, at, &self.target, &self.scratch.cutter);
         } else {
-            self.room.looks.push_nothing();
+            self.scratch.views.push_nothing();
         }
-        if self.room.looks.edges.len() >= EDGES_AT_ONCE {
-            self.room.looks.evaluate(self.simd, self.normal);
+        if self.scratch.views.edges.len() >= EDGES_AT_ONCE {
+            self.scratch.views.evaluate(self.simd, self.normal);
         }
     }
 }
@@ -254,40 +247,40 @@ impl Lookout {
 /// A pair that is partly hidden, made ready to be clipped as seen from one of its ends: the smaller, unless
 /// what blocks is very near it or more of the other is in front.
 pub struct Clipping<'a> {
-    looker: &'a WorldElement,
+    observer: &'a WorldElement,
     other: &'a WorldElement,
     a_looks: bool,
-    lookout: Lookout,
+    prepare_view: PreparedView,
 }
 
 impl<'a> Clipping<'a> {
-    /// Of two elements past convex occluders, all in one frame.
+    /// Clipping of two elements past convex occluders, all in one frame.
     pub(super) fn new(
         simd: Simd,
         (a, b): (&'a WorldElement, &'a WorldElement),
         between: &Between<'_>,
     ) -> Clipping<'a> {
         let a_looks = looks_best(a, b, between);
-        let (looker, other) = if a_looks { (a, b) } else { (b, a) };
-        let mut lookout = Lookout::new(simd, looker, other, between);
-        lookout.room.looks.moments = Some(lookout.normal);
-        Clipping { looker, other, a_looks, lookout }
+        let (observer, other) = if a_looks { (a, b) } else { (b, a) };
+        let mut prepare_view = PreparedView::new(simd, observer, other, between);
+        prepare_view.scratch.views.moments = Some(prepare_view.normal);
+        Clipping { observer, other, a_looks, prepare_view }
     }
 
-    /// Visibility, exact from 2 x 2 Gauss points in each of `cells` x `cells` parts of the looker. Each point
+    /// Visibility, exact from 2 x 2 Gauss points in each of `cells` x `cells` parts of the observer. Each point
     /// counts as a segment.
     pub fn visibility(&mut self, cells: u32) -> Visibility {
-        let Clipping { looker, other, a_looks, ref mut lookout } = *self;
-        let sums = lookout.look(looker, cells);
+        let Clipping { observer, other, a_looks, ref mut prepare_view } = *self;
+        let sums = prepare_view.look(observer, cells);
         let value = sums.visibility();
-        let over_looker =
-            gradient(looker, sums.at_looker, sums.at_looker_clear, sums.all, sums.clear);
+        let over_observer =
+            gradient(observer, sums.at_observer, sums.at_observer_clear, sums.all, sums.clear);
         let over_other = gradient(other, sums.at_other, sums.at_other_clear, sums.all, sums.clear);
-        let (of_looker, of_other) = sums.spreads(value);
+        let (of_observer, of_other) = sums.spreads(value);
         let (gradient_a, gradient_b) =
-            if a_looks { (over_looker, over_other) } else { (over_other, over_looker) };
+            if a_looks { (over_observer, over_other) } else { (over_other, over_observer) };
         let (spread_a, spread_b) =
-            if a_looks { (of_looker, of_other) } else { (of_other, of_looker) };
+            if a_looks { (of_observer, of_other) } else { (of_other, of_observer) };
         Visibility {
             value,
             gradient_a,
@@ -300,7 +293,7 @@ impl<'a> Clipping<'a> {
 
     /// Whether no point sees more of the other end than slivers that rounding leaves between shadows.
     fn sees_next_to_nothing(&self) -> bool {
-        self.lookout.room.looks.points.iter().all(|&(all, clear)| clear <= SLIVER * all)
+        self.prepare_view.scratch.views.points.iter().all(|&(all, clear)| clear <= SLIVER * all)
     }
 
     /// Visibility from four points, and how far it may be off: about its root mean square.
@@ -318,11 +311,11 @@ impl<'a> Clipping<'a> {
         let mut is_hidden = None;
         while cells < CELLS_MAX && self.sees_next_to_nothing() {
             // A sliver of each in front of the other: V is not nothing because no point lies in it.
-            let is_behind = self.lookout.room.looks.points.iter().all(|p| p.0 <= 0.0);
+            let is_behind = self.prepare_view.scratch.views.points.iter().all(|p| p.0 <= 0.0);
             let overlooked = OVERLOOKED / f64::from(cells * cells);
             if !is_behind
                 && (overlooked <= error_max
-                    || *is_hidden.get_or_insert_with(|| self.lookout.is_hidden(self.looker)))
+                    || *is_hidden.get_or_insert_with(|| self.prepare_view.is_hidden(self.observer)))
             {
                 break;
             }
@@ -331,7 +324,7 @@ impl<'a> Clipping<'a> {
             v = Visibility { segments: v.segments + again.segments, ..again };
         }
         let spread = if self.a_looks { v.spread_a } else { v.spread_b };
-        let points = &self.lookout.room.looks.points;
+        let points = &self.prepare_view.scratch.views.points;
         let sees_nothing = |&(_, clear): &(f64, f64)| clear <= 0.0;
         let sees_all = |&(all, clear): &(f64, f64)| clear > 0.0 && clear >= all * (1.0 - NOTHING);
         let doubt = if points.iter().all(sees_nothing) || points.iter().all(sees_all) {
@@ -377,7 +370,7 @@ const UNSEEN: f64 = 0.075;
 pub const CELLS_MAX: u32 = 8;
 
 /// How many times as much shadows move over the other end for the larger to be looked from.
-const MUCH: f64 = 16.0;
+const MOTION_RATIO: f64 = 16.0;
 
 /// Share of an end that must face the other for that not to matter. A value that quadtree elements do not meet
 /// exactly.
@@ -404,8 +397,8 @@ fn looks_best(a: &WorldElement, b: &WorldElement, between: &Between<'_>) -> bool
     let (by_a, by_b) =
         (a.radius * around.distance(&b.bounds), b.radius * around.distance(&a.bounds));
     match no_smaller(b.area, a.area) {
-        true => by_a <= MUCH * by_b,
-        false => by_b > MUCH * by_a,
+        true => by_a <= MOTION_RATIO * by_b,
+        false => by_b > MOTION_RATIO * by_a,
     }
 }
 
@@ -421,8 +414,8 @@ pub struct FactorPast {
     pub is_exact: bool,
 }
 
-/// What a single point sees of a convex polygon past convex occluders.
-struct PointLook {
+/// View from a single point to a convex polygon past convex occluders.
+struct PointView {
     frame: TargetFrame,
     /// The point, and the polygon, in it.
     from: DVec3,
@@ -430,12 +423,12 @@ struct PointLook {
     cutter: Cutter,
 }
 
-impl PointLook {
+impl PointView {
     fn new<'a>(
         point: DVec3,
         target: &[DVec3],
         occluders: impl Iterator<Item = &'a [DVec3]>,
-    ) -> PointLook {
+    ) -> PointView {
         let frame = TargetFrame::of_polygon(target);
         let from = frame.place(point);
         let mut between = Occluders::default();
@@ -446,7 +439,7 @@ impl PointLook {
         let mut cutter = Cutter::default();
         let flat = frame.flat(target);
         cutter.cut(from, &flat, &between);
-        PointLook { frame, from, flat, cutter }
+        PointView { frame, from, flat, cutter }
     }
 }
 
@@ -459,7 +452,7 @@ pub fn form_factor_past<'a>(
     target: &[DVec3],
     occluders: impl Iterator<Item = &'a [DVec3]>,
 ) -> FactorPast {
-    let PointLook { frame, from, flat, cutter } = PointLook::new(point, target, occluders);
+    let PointView { frame, from, flat, cutter } = PointView::new(point, target, occluders);
     let normal = frame.direction(normal);
     let mut solid = Vec::new();
     let (mut factor, mut moment) = (0.0, DVec2::ZERO);
@@ -486,7 +479,7 @@ pub(super) fn is_hidden<'a>(
     target: &[DVec3],
     occluders: impl Iterator<Item = &'a [DVec3]>,
 ) -> bool {
-    let PointLook { flat, cutter, .. } = PointLook::new(point, target, occluders);
+    let PointView { flat, cutter, .. } = PointView::new(point, target, occluders);
     let left: f64 = cutter.left.iter().map(twice_area).sum();
     let dark: f64 = cutter.dark.iter().map(twice_area).sum();
     left - dark <= HIDDEN * twice_area(&flat)
@@ -511,7 +504,7 @@ impl TargetFrame {
         TargetFrame { origin: e.centre, axes: [e.axes[0], e.axes[1], e.plane.normal] }
     }
 
-    /// Of a planar polygon with three or more corners.
+    /// Frame of a planar polygon with three or more corners.
     fn of_polygon(c: &[DVec3]) -> TargetFrame {
         let fan = |k: usize| (c[k] - c[0]).cross(c[k + 1] - c[0]);
         let up = (1..c.len() - 1).map(fan).sum::<DVec3>().normalize_or_zero();
@@ -538,13 +531,13 @@ impl TargetFrame {
     }
 }
 
-/// What points of the looker see, with form factors evaluated many edges at a time.
+/// Views from points of the observer, with form factors evaluated many edges at a time.
 #[derive(Default)]
-struct Looks {
+struct PointViews {
     sums: Sums,
     /// Form factors from each point, of the target and of what is clear of it.
     points: Vec<(f64, f64)>,
-    /// If first moments are wanted, the looker's normal.
+    /// If first moments are wanted, the observer's normal.
     moments: Option<DVec3>,
     edges: EdgeBundles,
     seen: Vec<Seen>,
@@ -557,7 +550,7 @@ struct Seen {
     at: DVec2,
     /// The middle of what the polygon sends.
     middle: DVec2,
-    /// Where its edges end in the list of edges.
+    /// End of its edges in the list of edges.
     edges_end: usize,
 }
 
@@ -571,7 +564,7 @@ enum What {
     Dark,
 }
 
-impl Looks {
+impl PointViews {
     fn start(&mut self) {
         self.sums = Sums::default();
         self.points.clear();
@@ -618,7 +611,7 @@ impl Looks {
                 self.points.push((f, 0.0));
                 sums.all += f;
                 if self.moments.is_some() {
-                    sums.at_looker += seen.at * f;
+                    sums.at_observer += seen.at * f;
                     sums.at_other += seen.middle * f;
                 }
             }
@@ -629,7 +622,7 @@ impl Looks {
             };
             self.points.last_mut().expect("a target comes first").1 += clear;
             if self.moments.is_some() {
-                sums.at_looker_clear += seen.at * clear;
+                sums.at_observer_clear += seen.at * clear;
                 sums.at_other_clear += seen.middle * clear;
             }
         }
@@ -650,8 +643,8 @@ impl Looks {
 struct Sums {
     all: f64,
     clear: f64,
-    at_looker: DVec2,
-    at_looker_clear: DVec2,
+    at_observer: DVec2,
+    at_observer_clear: DVec2,
     at_other: DVec2,
     at_other_clear: DVec2,
     /// Sum over the points of their clear part squared over all.
@@ -669,7 +662,7 @@ impl Sums {
         if self.all > 0.0 { (self.clear / self.all).clamp(0.0, 1.0) } else { 0.0 }
     }
 
-    /// Standard deviations of visibility over the looker (between its points) and over the
+    /// Standard deviations of visibility over the observer (between its points) and over the
     /// other end (within what each point sees: there it is 0 or 1).
     fn spreads(&self, value: f64) -> (f64, f64) {
         if self.all <= 0.0 {
@@ -682,7 +675,7 @@ impl Sums {
     }
 }
 
-/// What occlusion adds to the relative gradient over an element: the shift of the centre of what
+/// Contribution of occlusion to the relative gradient over an element: the shift of the centre of what
 /// passes, against the element's second moment.
 fn gradient(e: &WorldElement, at: DVec2, at_clear: DVec2, all: f64, clear: f64) -> DVec2 {
     if clear <= NOTHING * all {

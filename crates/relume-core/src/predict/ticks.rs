@@ -15,7 +15,7 @@ pub struct Ticks {
 }
 
 /// Steps this much longer or shorter than a tick start a new clock.
-const ODD: f64 = 4.0;
+const STEP_RATIO_MAX: f64 = 4.0;
 
 impl Ticks {
     /// Goes on from one time to another. Whether all certificates are void: time went back, jumped or
@@ -42,7 +42,10 @@ impl Ticks {
 
     fn tick_at(&self, from_s: f64, to_s: f64) -> Option<Tick> {
         let step = to_s - from_s;
-        if step <= 0.0 || step > ODD * self.length_s || step * ODD < self.length_s {
+        if step <= 0.0
+            || step > STEP_RATIO_MAX * self.length_s
+            || step * STEP_RATIO_MAX < self.length_s
+        {
             return None;
         }
         let mut now = u32::from(self.now);

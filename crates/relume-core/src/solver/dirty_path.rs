@@ -1,4 +1,4 @@
-//! Batches of facets, and the ways from facets down to what concerns them.
+//! Batches of facets, and the paths from facets down to changed elements.
 
 use super::field::Linear;
 use super::surfaces::Surfaces;
@@ -7,16 +7,16 @@ use super::surfaces::Surfaces;
 #[derive(Default)]
 pub(super) struct Batch {
     pub(super) facets: Vec<u32>,
-    /// Receivers to be gathered, and settled with what is below them; once gathered, those that cannot wait.
+    /// Receivers to be gathered and then settled with their subtrees; after gathering, only those that cannot wait.
     pub(super) receivers: Vec<u32>,
-    /// One by one, by how much what they gathered changed, W/m2 and per metre; none before it was gathered, or where
-    /// everything is settled.
-    pub(super) news: Vec<Linear>,
-    /// Further elements to be settled with all that is below them.
+    /// Change of the gathered irradiance of each receiver, W/m2 and per metre; empty before gathering, or where everything is
+    /// settled.
+    pub(super) changes: Vec<Linear>,
+    /// Further elements to be settled with their subtrees.
     pub(super) parents: Vec<u32>,
 }
 
-/// Sets a bit; whether it was set already.
+/// Sets a bit; returns whether it was set already.
 pub(super) fn set_bit(bits: &mut [u64], id: u32) -> bool {
     let (word, bit) = (&mut bits[id as usize / 64], 1 << (id % 64));
     let before = *word & bit != 0;
@@ -32,34 +32,35 @@ pub(super) fn bit(bits: &[u64], id: u32) -> bool {
     bits[id as usize / 64] >> (id % 64) & 1 == 1
 }
 
-/// The ways from facets to the elements that a batch concerns.
-pub(super) struct Way {
-    /// Elements on a way.
+/// Paths from facets down to the changed elements of a batch.
+pub(super) struct DirtyPath {
+    /// Elements on a path.
     pub(super) on: Vec<u64>,
-    /// Ends of the ways.
+    /// Ends of the paths.
     ends: Vec<u64>,
-    /// Which news those of the ends are; [`ALL`] where children came or went.
+    /// Index in `changes` for each end; [`ALL`] where children came or went.
     numbers: Vec<u32>,
-    news: Vec<Linear>,
+    changes: Vec<Linear>,
 }
 
-/// In place of a number of news: everything below may differ.
+/// In place of an index in `changes`: everything below may differ.
 const ALL: u32 = u32::MAX;
 
-impl Way {
-    pub(super) fn new(len: usize) -> Way {
+impl DirtyPath {
+    pub(super) fn new(len: usize) -> DirtyPath {
         let bits = || vec![0; len / 64 + 1];
-        Way { on: bits(), ends: bits(), numbers: vec![0; len], news: Vec::new() }
+        DirtyPath { on: bits(), ends: bits(), numbers: vec![0; len], changes: Vec::new() }
     }
 
-    /// Whether anything changed at an element itself, and by how much what it gathered did, if that is all.
-    pub(super) fn news(&self, id: u32) -> Option<Option<&Linear>> {
+    /// `Some` where an element itself changed: with the change of its gathered irradiance, or `None` where its children came
+    /// or went.
+    pub(super) fn changes(&self, id: u32) -> Option<Option<&Linear>> {
         let number = || self.numbers[id as usize];
-        bit(&self.ends, id).then(|| (number() != ALL).then(|| &self.news[number() as usize]))
+        bit(&self.ends, id).then(|| (number() != ALL).then(|| &self.changes[number() as usize]))
     }
 
-    pub(super) fn mark(&mut self, surfaces: &impl Surfaces, batch: &mut Batch) -> &Way {
-        self.news = std::mem::take(&mut batch.news);
+    pub(super) fn mark(&mut self, surfaces: &impl Surfaces, batch: &mut Batch) -> &DirtyPath {
+        self.changes = std::mem::take(&mut batch.changes);
         let receivers = batch.receivers.iter().copied().zip(0..);
         let parents = batch.parents.iter().map(|&id| (id, ALL));
         for (id, number) in receivers.chain(parents) {

@@ -1,4 +1,4 @@
-//! What happened since the last update, and which pairs it may concern.
+//! Difference of two world states, and which pairs it may affect.
 
 use crate::element::{ElementId, Forest, Kind, WorldElement, WorldView};
 use crate::scene::{BodyId, LightKind, PatchId, Scene};
@@ -8,7 +8,7 @@ use super::ends::{BoxShaft, LightPlace, body_of};
 use super::margin::{Growth, Shift};
 use super::update::Stale;
 
-/// How much of a node of the forest's fixed part has moved, appeared or vanished.
+/// Motion of a node of the forest's fixed part: its bodies that moved, appeared or vanished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Motion {
     Still,
@@ -16,27 +16,31 @@ enum Motion {
     All,
 }
 
-/// The difference between two instants, as far as pairs may feel it.
+/// Difference of two world states: moved bodies and changed brightness.
 ///
-/// Only the two instants count, not what lies between them: the state of a pair is a function of
-/// one of them.
-pub struct Since<'a> {
+/// Only the two states count, not the motion between them: the state of a pair is a function of one instant.
+pub struct WorldChange<'a> {
     old: &'a WorldView,
     motion: Vec<Motion>,
     movers: Vec<BodyId>,
-    /// How the brightness of coarse elements changed, by number.
-    dimmed: Vec<Option<Shift>>,
-    /// How punctual lights changed theirs.
+    /// Change of brightness of each coarse element, by number; `None` where it did not change.
+    shifts: Vec<Option<Shift>>,
+    /// Change of intensity of each punctual light.
     lights: Vec<Option<Shift>>,
-    /// Kept nodes above the coarse level with such an element below.
-    dimmed_below: Vec<bool>,
-    /// Whether margins count from the first instant.
+    /// Nodes above the coarse level with a changed coarse element or light below.
+    brightness_changed_below: Vec<bool>,
+    /// Whether all margins count from the first instant.
     knows_margins: bool,
 }
 
-impl<'a> Since<'a> {
-    /// What moved between two instants. Cost: proportional to the forest's fixed part.
-    pub fn new(scene: &Scene, forest: &Forest, old: &'a WorldView, new: &WorldView) -> Since<'a> {
+impl<'a> WorldChange<'a> {
+    /// Motion between two instants, without changes of brightness. Cost: proportional to the forest's fixed part.
+    pub fn new(
+        scene: &Scene,
+        forest: &Forest,
+        old: &'a WorldView,
+        new: &WorldView,
+    ) -> WorldChange<'a> {
         let bodies = (0..scene.bodies.len() as u32).map(BodyId);
         let moved = |body: &BodyId| {
             let k = body.0 as usize;
@@ -73,73 +77,72 @@ impl<'a> Since<'a> {
                 motion[id as usize] = if any { Motion::Some } else { Motion::Still };
             }
         }
-        Since {
+        WorldChange {
             old,
             motion,
             movers,
-            dimmed: Vec::new(),
+            shifts: Vec::new(),
             lights: Vec::new(),
-            dimmed_below: Vec::new(),
+            brightness_changed_below: Vec::new(),
             knows_margins: true,
         }
     }
 
-    /// The same where the last update was left half-way: some margins count from its beginning, others from its end.
-    pub fn after_a_stop(self) -> Since<'a> {
-        Since { knows_margins: false, ..self }
+    /// Difference after an update that was left half-way: some margins count from its beginning, others from its end.
+    pub fn after_a_stop(self) -> WorldChange<'a> {
+        WorldChange { knows_margins: false, ..self }
     }
 
-    /// Adds how coarse elements (by number) changed their brightness.
-    pub fn dim(
+    /// Adds the changes of brightness of coarse elements (by number) and of punctual lights.
+    pub fn set_brightness_shifts(
         &mut self,
         forest: &Forest,
         coarse: &[u32],
-        (dimmed, lights): (Vec<Option<Shift>>, Vec<Option<Shift>>),
+        (shifts, lights): (Vec<Option<Shift>>, Vec<Option<Shift>>),
     ) {
-        self.dimmed_below = vec![false; forest.kept_len() as usize];
-        let elements = coarse.iter().zip(&dimmed).filter(|(_, shift)| shift.is_some());
-        let is_dimmed =
+        self.brightness_changed_below = vec![false; forest.kept_len() as usize];
+        let elements = coarse.iter().zip(&shifts).filter(|(_, shift)| shift.is_some());
+        let is_shifted =
             |id: &u32| forest.light(ElementId(*id)).is_some_and(|light| lights[light].is_some());
-        let below = elements.map(|(&id, _)| id).chain((0..forest.fixed_len()).filter(is_dimmed));
+        let below = elements.map(|(&id, _)| id).chain((0..forest.fixed_len()).filter(is_shifted));
         for id in below {
             let mut above = forest.parent(ElementId(id));
             while let Some(id) = above {
-                if std::mem::replace(&mut self.dimmed_below[id.0 as usize], true) {
+                if std::mem::replace(&mut self.brightness_changed_below[id.0 as usize], true) {
                     break;
                 }
                 above = forest.parent(id);
             }
         }
-        (self.dimmed, self.lights) = (dimmed, lights);
+        (self.shifts, self.lights) = (shifts, lights);
     }
 
-    /// What the changes of brightness mean to a pair.
+    /// Staleness of a pair by changes of brightness.
     pub(super) fn brightness(&self, forest: &Forest, a: ElementId, b: ElementId) -> Stale {
-        if self.dimmed.is_empty() {
+        if self.shifts.is_empty() {
             return Stale::Nothing;
         }
-        let dim = |id: ElementId| match (forest.coarse(id), forest.light(id)) {
-            (Some(number), _) => self.dimmed[number].is_some(),
+        let shifted = |id: ElementId| match (forest.coarse(id), forest.light(id)) {
+            (Some(number), _) => self.shifts[number].is_some(),
             (None, Some(light)) => self.lights[light].is_some(),
-            (None, None) => self.dimmed_below[id.0 as usize],
+            (None, None) => self.brightness_changed_below[id.0 as usize],
         };
         // Above the coarse level no verdict depends on brightness.
         let low = |id| forest.coarse(id).is_some() || forest.kind(id) == Kind::Light;
-        match dim(a) || dim(b) {
+        match shifted(a) || shifted(b) {
             false => Stale::Nothing,
             true if low(a) && low(b) => Stale::Brightness,
             true => Stale::Below,
         }
     }
 
-    /// By how much the errors of a pair at or below the coarse level grew since its margin was counted; `None` if that is
-    /// not known.
+    /// Growth of the errors of a pair at or below the coarse level since its margin was counted; `None` if unknown.
     pub(super) fn growth(&self, forest: &Forest, a: ElementId, b: ElementId) -> Option<Growth> {
         let shift = |id| {
             let of_light = || forest.light(id).and_then(|light| self.lights[light]);
             forest
                 .coarse(id)
-                .map_or_else(of_light, |number| self.dimmed[number])
+                .map_or_else(of_light, |number| self.shifts[number])
                 .unwrap_or_default()
         };
         self.knows_margins.then(|| Growth::of_pair(&shift(a), &shift(b)))
@@ -159,7 +162,7 @@ impl<'a> Since<'a> {
         !one_body && (moved(a) || moved(b))
     }
 
-    /// What the motion means to a pair.
+    /// Staleness of a pair by motion.
     pub(super) fn geometry(
         &self,
         forest: &Forest,

@@ -33,7 +33,7 @@ pub struct Lookahead {
 
 /// Share by which X may be extrapolated away from its last evaluation: then it is evaluated again. A
 /// line trusted further may give a receiver more than it can see, and interreflection without end.
-const TRUSTED: f64 = 0.25;
+const EXTRAPOLATED_SHARE_MAX: f64 = 0.25;
 
 /// The last two evaluations of a pair, and when the next one is due. Empty unless the pair is dynamic.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -83,7 +83,8 @@ impl History {
         let x = along(f64::from(p.exchange_area_m2), f64::from(q.exchange_area_m2));
         let v = along(f64::from(p.visibility), f64::from(q.visibility));
         let last = f64::from(q.exchange_area_m2);
-        let x = x.clamp((1.0 - TRUSTED) * last, (1.0 + TRUSTED) * last);
+        let x =
+            x.clamp((1.0 - EXTRAPOLATED_SHARE_MAX) * last, (1.0 + EXTRAPOLATED_SHARE_MAX) * last);
         (x, v.clamp(0.0, 65_535.0))
     }
 
@@ -143,7 +144,7 @@ impl History {
             least = least.min(frames(f64::from(p.margin), f64::from(q.margin), 0.0));
         }
         let x = [p, q].map(|s| f64::from(s.exchange_area_m2));
-        for share in [1.0 - TRUSTED, 1.0 + TRUSTED] {
+        for share in [1.0 - EXTRAPOLATED_SHARE_MAX, 1.0 + EXTRAPOLATED_SHARE_MAX] {
             least = least.min(frames(x[0], x[1], share * x[1]));
         }
         for goal in [0.0, 65_535.0] {

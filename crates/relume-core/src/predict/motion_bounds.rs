@@ -1,4 +1,4 @@
-//! How far each body can get until each of a few coming ticks.
+//! Bounds of the bodies' motion until each of a few coming ticks.
 
 use super::ticks::{Tick, Ticks};
 use crate::geometry::Aabb;
@@ -7,7 +7,7 @@ use crate::scene::{BodyId, Drift, Scene};
 /// Ticks ahead that are looked at.
 const AHEAD: [Tick; 7] = [1, 2, 4, 8, 16, 32, 64];
 
-/// What is known beforehand of the motion of a scene, in space or in the plane (that of z = 0).
+/// Known motion of a scene, in space or in the plane (that of z = 0).
 pub trait KnownMotion {
     /// Bodies are numbered below this.
     fn body_count(&self) -> usize;
@@ -17,9 +17,9 @@ pub trait KnownMotion {
     fn is_distant(&self, _body: BodyId) -> bool {
         false
     }
-    /// Where the points of a body can get between two times, the earlier one first.
+    /// Bounds of the displacement of a body's points between two times, the earlier one first.
     fn drift(&self, body: BodyId, span_s: [f64; 2]) -> Drift;
-    /// The same of each punctual light.
+    /// Bounds of the displacement of each punctual light.
     fn light_drifts(&self, span_s: [f64; 2]) -> Vec<Drift>;
     /// The first time after `time_s` at which a body or a light appears or vanishes; infinite if none
     /// does any more.
@@ -52,10 +52,10 @@ impl KnownMotion for Scene {
     }
 }
 
-/// How far the bodies of a scene can get until some coming ticks, the *horizons*, counted from the
-/// nearest. No body and no light appears or vanishes before any of them.
+/// Bounds of the bodies' motion until some coming ticks, the *horizons*, counted from the nearest. No body and no light
+/// appears or vanishes before any of them.
 #[derive(Clone, Debug, Default)]
-pub struct Foresight {
+pub struct MotionBounds {
     now: Tick,
     horizons: Vec<Horizon>,
     /// Row of each body; the rows are those of bodies that are animated at all.
@@ -72,13 +72,13 @@ struct Horizon {
     widest_distant: Aabb,
 }
 
-impl Foresight {
-    /// What the motion of `scene` holds from `time_s` on, the present of `ticks`. Cost:
+impl MotionBounds {
+    /// Bounds from `time_s` on, the present of `ticks`. Cost:
     /// proportional to the bodies and their keys within the horizons.
-    pub fn new(scene: &impl KnownMotion, ticks: &Ticks, time_s: f64) -> Foresight {
+    pub fn new(scene: &impl KnownMotion, ticks: &Ticks, time_s: f64) -> MotionBounds {
         let all = (0..scene.body_count() as u32).map(BodyId);
         let bodies: Vec<BodyId> = all.clone().filter(|&b| scene.moves(b)).collect();
-        let mut out = Foresight { now: ticks.now(), bodies, ..Foresight::default() };
+        let mut out = MotionBounds { now: ticks.now(), bodies, ..MotionBounds::default() };
         out.rows = vec![None; scene.body_count()];
         for (row, body) in out.bodies.iter().enumerate() {
             out.rows[body.0 as usize] = Some(row as u32);
@@ -103,10 +103,10 @@ impl Foresight {
         out
     }
 
-    /// Whether what holds until `due` holds now.
+    /// Whether a certificate that expires after `until` stands now.
     #[inline]
-    pub fn holds(&self, due: Tick) -> bool {
-        due >= self.now
+    pub fn holds(&self, until: Tick) -> bool {
+        until >= self.now
     }
 
     /// The horizons, from the nearest.
@@ -119,7 +119,7 @@ impl Foresight {
         self.horizons[horizon].until
     }
 
-    /// How far a body can get.
+    /// Bounds of a body's displacement.
     #[inline]
     pub fn drift(&self, horizon: usize, body: BodyId) -> Drift {
         match self.rows[body.0 as usize] {

@@ -1,0 +1,12 @@
+//! Prediction: what the known motion allows within the coming time, and until when.
+//!
+//! [`MotionBounds`] say how far bodies can get until coming ticks ([`Ticks`]): certificates rest on them. [`History`] draws a
+//! line through the last evaluations of a pair: extrapolation rests on it. Must not know pairs or light.
+
+mod history;
+mod motion_bounds;
+mod ticks;
+
+pub use history::{History, Lookahead, Sample};
+pub use motion_bounds::{KnownMotion, MotionBounds};
+pub use ticks::{Tick, Ticks};

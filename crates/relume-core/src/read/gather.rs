@@ -15,6 +15,7 @@ use crate::transport::{
     segment_is_clear,
 };
 
+use super::tuning::{BY_LINES, GATHER_FAR, GATHER_FOLLOWED, GATHER_LITTLE, IN_A_GAP};
 use crate::space::{Solved, place_of};
 
 /// A place and a direction at which irradiance is asked for.
@@ -46,23 +47,6 @@ const SENSOR_ROUNDING: f64 = 1.0 / (1 << 20) as f64;
 
 /// How far what lies on a patch is lifted off it, in roundings of its corners.
 const LIFT: f64 = 8.0;
-
-/// Elements in plain view that are no larger than this share of their distance send their mean
-/// radiosity: what is brighter in them than the rest then weighs at most this much too much.
-const FAR: f64 = 1.0 / 32.0;
-
-/// Form factor to a part of a leaf below which it is taken to send what the leaf's line says.
-const LITTLE: f64 = 0.01;
-
-/// Share of what a point sees above which leaves that are large against their distance are not taken at their word: it
-/// is in a gap, and what leaves them is followed on.
-const IN_A_GAP: f64 = 0.5;
-
-/// Share of the light below which nobody follows on what leaves a leaf, and how often at most.
-const FOLLOWED: (f64, usize) = (1e-3, 24);
-
-/// Share of what arrives in a gap that may come from parts that are taken at their leaf's word.
-const BY_LINES: f64 = 0.02;
 
 /// Halvings of a leaf that falls into too many pieces; then its middle decides.
 const SPLITS: u32 = 6;
@@ -140,7 +124,7 @@ impl<'a> Look<'a> {
         };
         let is_in_a_gap = parts.iter().map(|p| p.factor).sum::<f64>() > IN_A_GAP;
         let (large, little): (Vec<_>, Vec<_>) =
-            parts.iter().enumerate().partition(|(_, part)| part.factor > LITTLE);
+            parts.iter().enumerate().partition(|(_, part)| part.factor > GATHER_LITTLE);
         for (k, part) in large {
             add(&mut sum, part, self.sent_by(part, k));
         }
@@ -260,7 +244,7 @@ impl<'a> Look<'a> {
         let Some(in_the_way) = self.in_the_way(&seen, occluders) else { return };
         let children = self.forest.children(id);
         let distance = (e.centre - self.point).length();
-        let as_one = in_the_way.is_empty() && e.radius < FAR * distance;
+        let as_one = in_the_way.is_empty() && e.radius < GATHER_FAR * distance;
         if !children.is_empty() && !as_one {
             children.for_each(|child| self.add_element(ElementId(child), &in_the_way, out));
             return;
@@ -396,10 +380,10 @@ impl<'a> Look<'a> {
             }
             let seen: f64 = near.iter().map(|n| n.factor).sum();
             let left = seen * share.iter().fold(0.0, |most: f64, s| most.max(*s));
-            if seen > IN_A_GAP && left <= FOLLOWED.0 {
+            if seen > IN_A_GAP && left <= GATHER_FOLLOWED.0 {
                 return b;
             }
-            let next = (seen > IN_A_GAP && step < FOLLOWED.1)
+            let next = (seen > IN_A_GAP && step < GATHER_FOLLOWED.1)
                 .then(|| look.choose(&near, [spread(k, 2 * step), spread(k, 2 * step + 1)]));
             match next.flatten() {
                 Some(next) => (share, part) = (share.map(|s| s * seen), next),

@@ -1,4 +1,5 @@
-//! The tests of the face, and of the order of all crates.
+//! The tests of the face, of the order of all crates, and of the page of constants.
 
 mod layers;
 mod program;
+mod tuning;

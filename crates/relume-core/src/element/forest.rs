@@ -15,6 +15,9 @@ use crate::scene::{BodyId, Covered, Enclosure, Lines, PatchId, Scene, Solid, Sol
 
 mod replant;
 
+use super::tuning::{
+    CROSSED_PART, CROSSED_SHARE, CROSSED_TIMES, CUT_LEAST, CUT_SHARE, EXPOSED_LEAST,
+};
 pub use replant::old_coarse_numbers;
 
 /// Index of a node in a [`Forest`].
@@ -112,9 +115,6 @@ type Plot<'a> = (&'a Scene, &'a Cuts, &'a Layout);
 
 /// Vectors of the forest are given room for this share more than they need.
 const SLACK: usize = 32;
-
-/// Elements of which a smaller share is exposed count as covered wholly.
-const EXPOSED_LEAST: f64 = 1.0 / 16.0;
 
 /// Levels that a path has room for.
 const LEVELS_MAX: u32 = 15;
@@ -1113,18 +1113,6 @@ struct PatchCuts<'a> {
     least_m2: f64,
     slack_m: f64,
 }
-
-/// Share of a polygon's chord along a line that must be covered by the lines of contact on it.
-const CUT_SHARE: f64 = 0.25;
-
-/// Polygons of a smaller share of the scene's area are not cut: light jumps from one to the next anyway.
-const CUT_LEAST: f64 = 1.0 / 64.0;
-
-/// Smaller ones too where another patch crosses them, so that one part is before a wall and one behind it: along lines that
-/// cover this share of the chord, into parts of at least this share of the area, and at most so often.
-const CROSSED_SHARE: f64 = 0.9;
-const CROSSED_PART: f64 = 1.0 / 64.0;
-const CROSSED_TIMES: u32 = 2;
 
 impl Cuts {
     fn new(scene: &Scene) -> Cuts {

@@ -8,19 +8,8 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::forest::{ElementId, Forest, Kind};
+use super::tuning::{ACROSS_SHARE, AREA_SHARE, PATCHES_MIN, SMALL_SHARE};
 use crate::scene::{BodyId, Scene};
-
-/// A patch of at most this share of the scene's area is small: larger ones are ends of links themselves.
-const SMALL_SHARE: f64 = 1.0 / 2_000.0;
-
-/// A rigid body of fewer small patches has no groups.
-const PATCHES_MIN: usize = 64;
-
-/// Share of the scene's area that a group has at most.
-const AREA_SHARE: f64 = 1.0 / 128.0;
-
-/// Share of the scene's diagonal that a group's box is at most across.
-const ACROSS_SHARE: f64 = 1.0 / 8.0;
 
 /// Height over the plane of a face, in radii of a group, from which a corner counts as in front of it.
 const IN_FRONT: f64 = 1e-6;

@@ -8,6 +8,7 @@ mod exposed;
 mod forest;
 mod groups;
 mod split;
+mod tuning;
 mod world;
 
 pub use forest::{Counts, ElementId, ElementKey, Forest, Kind, Renumbering, old_coarse_numbers};

@@ -1,5 +1,6 @@
 //! How a quadrilateral or triangle is split into well-shaped children.
 
+use super::tuning::{ELONGATED, SLENDER};
 use glam::{DVec2, DVec3};
 
 /// Corners of an element in its patch's frame, metres, and whether there are three or four; a
@@ -11,12 +12,6 @@ pub struct Shape {
     /// Three or four.
     pub len: usize,
 }
-
-/// Side ratio above which an element is halved across its long side instead of quartered.
-const ELONGATED: f64 = 1.5;
-
-/// Longest edge squared : area above which a triangle is halved (right isosceles: 4).
-const SLENDER: f64 = 6.0;
 
 impl Shape {
     /// A shape from three or four corners.

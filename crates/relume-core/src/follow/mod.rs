@@ -12,6 +12,7 @@ mod prediction;
 mod report;
 mod space;
 mod tally;
+mod tuning;
 mod update;
 mod watch;
 

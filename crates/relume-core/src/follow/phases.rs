@@ -16,6 +16,7 @@ use super::links::{Receivers, apply_edits, links_of};
 use super::prediction::{Clocked, Prediction, mean_radiosity_limit, while_extrapolated};
 use super::report::{FrameReport, Memory, PairCounts};
 use super::space::{Balance, Level, Motion, Space};
+use super::tuning::VACANT_PAIRS;
 use super::update::Update;
 use super::watch::Watch;
 
@@ -52,9 +53,6 @@ struct Step<'f, 'g, S: Space> {
     /// Whether this is a cold build.
     is_cold: bool,
 }
-
-/// The pair tree is compacted when more than one pair in this many is vacant.
-const VACANT_PAIRS: usize = 16;
 
 // Spaces are the engine's own: nobody else has one to follow.
 #[allow(private_bounds)]

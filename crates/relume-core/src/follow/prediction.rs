@@ -4,11 +4,8 @@ use crate::pair::PairTree;
 use crate::predict::{KnownMotion, Lookahead, MotionBounds, Ticks};
 use crate::solver::Stop;
 
+use super::tuning::{DIVERGENCE_RATIO, GROWTH_MAX, LINK_ERROR_RATIO};
 use super::update::Update;
-
-/// Mean radiosity over that of the last exact solution from which an extrapolated frame is rebuilt: extrapolated links that
-/// are a little too large amplify each other.
-const GROWTH_MAX: f64 = 1.25;
 
 /// Stop criterion of a solve over extrapolated links: it is given up where the mean radiosity passes that of the last exact
 /// solution, or the bound of the scene, by a factor. Mean radiosities, W/m2.
@@ -31,12 +28,6 @@ pub(super) fn mean_radiosity_limit(mean_radiosity_bound_w_m2: f64) -> f64 {
         f64::INFINITY
     }
 }
-
-/// Mean radiosity over the upper bound of the scene from which a solve is given up as diverging.
-const DIVERGENCE_RATIO: f64 = 2.0;
-
-/// Mean radiosity over the upper bound of the scene that errors of links may explain.
-const LINK_ERROR_RATIO: f64 = 1.1;
 
 /// Assumptions of certificates that no longer hold.
 #[derive(Clone, Copy, Default)]

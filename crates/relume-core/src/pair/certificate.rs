@@ -26,9 +26,6 @@ pub(super) struct SpaceCertificateTests<'a> {
     pub(super) effort: Cell<u32>,
 }
 
-/// Nodes that are looked at for one pair: a certificate that takes more costs more than it saves.
-pub(super) const EFFORT: u32 = 256;
-
 /// Two ends of a pair as far as shafts are concerned.
 struct Ends<'a> {
     bounds: (Aabb, Aabb),

@@ -11,27 +11,9 @@ use super::judge::{SpaceJudge, Stage, culled, passing};
 use super::margin::{Margin, SideMargin};
 use super::oracle::Oracle;
 use super::tree::{Carried, CullReason, Gradients, in_steps};
+use super::tuning::{APART, MISSED, PLACE, SHARED, SHARED_BY_FACETS, TURNED};
 use super::update::{Judgement, Verdict};
 use crate::transport::Side;
-
-/// Distance of two ends, in sums of their radii, below which they are refined whatever they bring: neither reaches into the
-/// ball around the other.
-const APART: f64 = 1.0;
-
-/// Weight of the second order in size over distance, of either end: what facets at their own places leave out.
-const PLACE: f64 = 1.0;
-
-/// Weight of the standard deviation of visibility between the segments of a pair on an element: what all of it shares.
-const SHARED: f64 = 1.0;
-
-/// The same on a group: its facets have a visibility of their own, to the whole of the other end.
-const SHARED_BY_FACETS: f64 = 0.5;
-
-/// Visibility that sixteen segments may miss, as a variance.
-const MISSED: f64 = 0.01;
-
-/// Share of its area that a group shows, for each radius over distance of the other end, beyond what it shows to its middle.
-const TURNED: f64 = 0.5;
 
 /// Exchange of a pair with a group, without occlusion.
 struct GroupExchange {

@@ -15,7 +15,7 @@ use crate::transport::{
     visibility,
 };
 
-use super::certificate::{EFFORT, SpaceCertificateTests};
+use super::certificate::SpaceCertificateTests;
 use super::certificate_tests::{CertificateTests, Finding};
 use super::coarse_brightness::CoarseBrightness;
 use super::ends::{BoxShaft, LightPlace, body_of};
@@ -23,6 +23,10 @@ use super::hash::pair_key;
 use super::margin::{Margin, SideMargin};
 use super::oracle::{End, Estimate, Oracle, estimate};
 use super::tree::{Carried, CullReason, Gradients, in_steps};
+use super::tuning::{
+    CLIPPED_MAX_CLOSE, CLIPPED_MAX_REST, CLOSE_SHARE, CLOSER, CONNECTED_SHARE, EFFORT, FINEST,
+    OVERLOOKED_MAX, SAMPLED_MAX,
+};
 use super::update::{Hierarchy, Judge, Judgement, Stale, Verdict};
 use super::world_change::WorldChange;
 use crate::transport::Side;
@@ -762,28 +766,3 @@ fn look_closer(v: Visibility, clipped: &mut Clipping<'_>, error: f64) -> Visibil
     let again = clipped.visibility(cells as u32);
     Visibility { segments: v.segments + again.segments, ..again }
 }
-
-/// Where a pair brings this many thresholds or more, any number of occluders is clipped in reason.
-const CLOSE_SHARE: f64 = 2.0;
-
-/// Occluders up to which pairs are clipped that bring so much.
-const CLIPPED_MAX_CLOSE: usize = 96;
-
-/// The same for pairs that bring less: sampling a few of their shares of light does little harm.
-const CLIPPED_MAX_REST: usize = 4;
-
-/// What segments that are all blocked may have overlooked of V.
-const SAMPLED_MAX: f64 = 0.15;
-
-/// Share of the area of connected patches at which an element of them weighs 1 in the error norm: a face of a cube. With 1/2
-/// the device in a hall misses the tolerance, with 1/12 a room of 64 boxes has a fifth more links.
-const CONNECTED_SHARE: f64 = 1.0 / 6.0;
-
-/// Share of a receiver's light, over what a link may err by, that a pair may bring unseen.
-const OVERLOOKED_MAX: f64 = 0.25;
-
-/// Thresholds below this ask for no more points a link: elements shrink instead.
-const FINEST: f64 = 0.002;
-
-/// Stake times doubt of visibility above which a link is clipped from more points.
-const CLOSER: f64 = 0.03;

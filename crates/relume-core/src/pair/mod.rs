@@ -16,6 +16,7 @@ mod judge;
 mod margin;
 mod oracle;
 mod tree;
+mod tuning;
 mod update;
 mod world_change;
 

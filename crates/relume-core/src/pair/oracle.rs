@@ -5,6 +5,10 @@ use crate::transport::{BlockerSizes, Exchange, SEGMENTS, Variation, Visibility};
 
 use super::brightness::Brightness;
 use super::margin::Margin;
+use super::tuning::{
+    ALIKE_FACTOR, ALIKE_SHARE, BENT, EDGE, EDGE_REFLECTED, NOISE, PREFERENCE, SEEN, SHADOW_AREAS,
+    SOURCE_VARIATION, STEEP,
+};
 use crate::transport::Side;
 
 /// Oracle: criterion by which a pair of elements becomes a link.
@@ -36,10 +40,6 @@ pub(super) struct End {
     /// Area of the surface that it is a part of and that may send alike: of its patch, or of the sky; m2.
     pub(super) surface_area: f64,
 }
-
-/// Share of a source's reflected radiosity by which it may vary over a reference-sized element
-/// beyond its gradient.
-const SOURCE_VARIATION: f64 = 0.2;
 
 /// Errors of a link, each relative to its threshold's unit.
 #[derive(Clone, Copy, Debug)]
@@ -76,42 +76,6 @@ impl Estimate {
         (side, Margin::between(by_large.max(by_small), by_large.min(by_small)))
     }
 }
-
-/// How many times as much the smaller side must mend to be refined in place of the larger.
-const PREFERENCE: f64 = 3.0;
-
-/// Weight of the variation of visibility over a receiver beyond its gradient, for a link whose neighbours are hidden in
-/// other ways: their errors differ in sign.
-const EDGE: f64 = 0.2;
-
-/// The same for reflected light, at least: all surfaces around reflect, and what nearly touches a receiver hides many of
-/// them along the same edge. With 1, tables of form factors behind partitions and white closets miss their limits.
-const EDGE_REFLECTED: f64 = 3.0;
-
-/// Share of the links across which an edge sweeps that err alike. With 1, tables and halls have a quarter more links for the same
-/// errors.
-const ALIKE_SHARE: f64 = 0.5;
-
-/// Form factor, at most, of all that is counted as hidden along one edge. With 1, scenes have a tenth more links for the
-/// same errors.
-const ALIKE_FACTOR: f64 = 0.3;
-
-/// Weight of the variation of the kernel over a receiver beyond its gradient: most of it is found again
-/// when the solution is read.
-const BENT: f64 = 0.5;
-
-/// Standard deviation of visibility over both ends, at least, where a pair is partly hidden and its kernel is steep.
-const STEEP: f64 = 0.3;
-
-/// V from which the end is seen, and not a sliver that rounding leaves between what covers it and its plane.
-const SEEN: f64 = 1e-4;
-
-/// Area of a shadow, in areas of the blockers that throw it: elements as large as that of the smallest weigh 1 where its
-/// edge is concerned, and sources within that of all are hidden alike.
-const SMALL: f64 = 5.0;
-
-/// Weight of the sampling error of V: it is independent from link to link and averages out.
-const NOISE: f64 = 0.2;
 
 /// The errors that a link makes on both its receivers.
 ///
@@ -159,8 +123,8 @@ pub(super) fn estimate(
     let link = LinkSize {
         exchange: x.area_m2,
         noise,
-        least_shadow: SMALL * blockers.least_m2,
-        shadow: SMALL * blockers.all_m2,
+        least_shadow: SHADOW_AREAS * blockers.least_m2,
+        shadow: SHADOW_AREAS * blockers.all_m2,
         reference_area,
         threshold,
         leverage: blockers.leverage.0,

@@ -17,6 +17,7 @@ use super::certificate_tests::Finding;
 use super::hash::{PairHash, pair_key};
 use super::margin::Margin;
 use super::tree::{Carried, CullReason, PairId, PairTree, State};
+use super::tuning::{BLOCK, CHUNK};
 use crate::transport::Side;
 
 /// Decision on a pair.
@@ -286,12 +287,6 @@ pub struct Changes {
 /// Error: the memory limit of an update is reached, or it was called off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutOfMemory;
-
-/// Pairs judged by one task.
-const CHUNK: usize = 128;
-
-/// Pairs judged before their results are applied.
-const BLOCK: usize = 1 << 15;
 
 /// A pair tree with the hash over its links.
 pub struct Pairs<'a> {

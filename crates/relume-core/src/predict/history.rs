@@ -1,5 +1,7 @@
 //! The last two evaluations of a pair, and the line through them.
 
+use super::tuning::EXTRAPOLATED_SHARE_MAX;
+
 /// What an evaluation of a pair found, as far as a line is drawn through it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
@@ -30,10 +32,6 @@ pub struct Lookahead {
     /// events count.
     pub error: Option<f64>,
 }
-
-/// Share by which X may be extrapolated away from its last evaluation: then it is evaluated again. A
-/// line trusted further may give a receiver more than it can see, and interreflection without end.
-const EXTRAPOLATED_SHARE_MAX: f64 = 0.25;
 
 /// The last two evaluations of a pair, and when the next one is due. Empty unless the pair is dynamic.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

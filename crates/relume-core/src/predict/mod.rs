@@ -6,6 +6,7 @@
 mod history;
 mod motion_bounds;
 mod ticks;
+mod tuning;
 
 pub use history::{History, Lookahead, Sample};
 pub use motion_bounds::{KnownMotion, MotionBounds};

@@ -1,11 +1,9 @@
 //! Bounds of the bodies' motion until each of a few coming ticks.
 
 use super::ticks::{Tick, Ticks};
+use super::tuning::AHEAD;
 use crate::geometry::Aabb;
 use crate::scene::{BodyId, Drift, Scene};
-
-/// Ticks ahead that are looked at.
-const AHEAD: [Tick; 7] = [1, 2, 4, 8, 16, 32, 64];
 
 /// Known motion of a scene, in space or in the plane (that of z = 0).
 pub trait KnownMotion {

@@ -1,5 +1,7 @@
 //! A clock of even ticks by which certificates expire.
 
+use super::tuning::STEP_RATIO_MAX;
+
 /// Number of a tick; 0 is before all of them.
 pub type Tick = u16;
 
@@ -13,9 +15,6 @@ pub struct Ticks {
     length_s: f64,
     now: Tick,
 }
-
-/// Steps this much longer or shorter than a tick start a new clock.
-const STEP_RATIO_MAX: f64 = 4.0;
 
 impl Ticks {
     /// Goes on from one time to another. Whether all certificates are void: time went back, jumped or

@@ -18,28 +18,7 @@ use super::choice::spread;
 use super::gather::{Look, Purpose, Sensor};
 use super::rays::{Hit, Rays};
 use super::snapshot::{self, Leaf};
-
-/// Walks from each point.
-const WALKS: usize = 8;
-
-/// Rays that a point looks around with, for each walk: a square number. Half as many cost half as much, and resolve errors
-/// larger by the root of two.
-const RAYS: usize = 64;
-
-/// Points that a walk comes to at most: what is left after six reflections weighs little beside the residuals before.
-const STEPS: usize = 6;
-
-/// Weight below which a walk ends.
-const LITTLE: f64 = 0.02;
-
-/// Irradiance below which a surface counts as dark, relative to the mean: errors there are relative to it.
-const DARK: f64 = 1e-3;
-
-/// Patches whose emission is gathered exactly, at most: the brightest. Other light is found by rays.
-const LAMPS: usize = 16;
-
-/// Exitance from which a patch counts as a lamp, relative to the mean radiosity.
-const BRIGHT: f64 = 4.0;
+use super::tuning::{ACCURACY_RAYS, BRIGHT, DARK, LAMPS, STEPS, WALK_LEAST, WALKS};
 
 /// What one point says: errors (sum of channels), relative to what arrives, by each walk.
 struct Found {
@@ -233,9 +212,9 @@ impl<'a> Meter<'a> {
     ) -> ([f64; 3], Vec<Option<Hit>>) {
         let (one, two) = sensor.normal.any_orthonormal_pair();
         let from = sensor.at + sensor.normal * self.lift_m;
-        let side = RAYS.isqrt();
+        let side = ACCURACY_RAYS.isqrt();
         let shift = [spread(walk, 3 * step + 3), spread(walk, 3 * step + 4)];
-        let hits: Vec<Option<Hit>> = (0..RAYS)
+        let hits: Vec<Option<Hit>> = (0..ACCURACY_RAYS)
             .map(|k| {
                 // As many rays as the cosine weighs.
                 let [u, v] = [(k / side, shift[0]), (k % side, shift[1])]
@@ -252,7 +231,7 @@ impl<'a> Meter<'a> {
             let sent = self.said_by(hit);
             let is_lamp = self.lamps.binary_search(&hit.patch).is_ok();
             let counted = if is_lamp { self.emitted_by(hit) } else { [0.0; 3] };
-            (0..3).for_each(|c| sum[c] += (sent[c] - counted[c]) / RAYS as f64);
+            (0..3).for_each(|c| sum[c] += (sent[c] - counted[c]) / ACCURACY_RAYS as f64);
         }
         (sum, hits)
     }
@@ -261,8 +240,8 @@ impl<'a> Meter<'a> {
     fn error_of_hits(&self, mut hits: Vec<Option<Hit>>, walk: usize) -> [f64; 3] {
         let (mut error, mut weight) = ([0.0; 3], [1.0; 3]);
         for step in 0..STEPS {
-            let chosen = (spread(walk, 3 * step + 5) * RAYS as f64) as usize;
-            let Some(hit) = hits[chosen.min(RAYS - 1)] else { break };
+            let chosen = (spread(walk, 3 * step + 5) * ACCURACY_RAYS as f64) as usize;
+            let Some(hit) = hits[chosen.min(ACCURACY_RAYS - 1)] else { break };
             if self.solved.space.forest.is_distant(hit.leaf) {
                 break;
             }
@@ -277,7 +256,7 @@ impl<'a> Meter<'a> {
                 error[c] += weight[c] * (m[c] + rho[c] * arrives[c] - said[c]);
                 weight[c] *= rho[c];
             }
-            if weight.iter().all(|&w| w < LITTLE) {
+            if weight.iter().all(|&w| w < WALK_LEAST) {
                 break;
             }
             hits = next;

@@ -10,21 +10,7 @@ use crate::space::Solved;
 
 use super::choice::{at_share, spread};
 use super::gather::{Gathered, Look, Part, Purpose, Sensor};
-
-/// Width of a gap at most, as a share of the length at which an element weighs 1 in the error norm.
-const NARROW: f64 = 0.25;
-
-/// Share of what a point sees above which leaves that are large against their distance make a gap of any width.
-const SURROUNDED: f64 = 0.5;
-
-/// Distance up to which leaves are not taken at their word, in widths of the gap.
-const REACH: f64 = 8.0;
-
-/// Walks from a sensor.
-const WALKS: usize = 64;
-
-/// Share of the light below which a walk ends, and its steps at most.
-const FOLLOWED: (f64, usize) = (1e-2, 24);
+use super::tuning::{GAP_FOLLOWED, GAP_NARROW, GAP_REACH, GAP_WALKS, IN_A_GAP};
 
 /// The gap that a sensor is in.
 pub(super) struct Gap {
@@ -40,10 +26,10 @@ impl Gap {
     pub(super) fn around(solved: &Solved, found: &Gathered) -> Option<Gap> {
         let width_m = half_seen_m(&found.seen);
         let near: f64 = found.parts.iter().map(|part| part.factor).sum();
-        let narrow_m = NARROW * solved.space.reference_area_m2().sqrt();
+        let narrow_m = GAP_NARROW * solved.space.reference_area_m2().sqrt();
         match width_m < narrow_m {
-            true => Some(Gap { reach_m: REACH * width_m }),
-            false => (near > SURROUNDED).then_some(Gap::NONE),
+            true => Some(Gap { reach_m: GAP_REACH * width_m }),
+            false => (near > IN_A_GAP).then_some(Gap::NONE),
         }
     }
 
@@ -56,9 +42,9 @@ impl Gap {
             (0..3).for_each(|c| sum[c] += part.factor * line[c]);
         }
         let factors = || parts.iter().map(|part| part.factor);
-        let weight = factors().sum::<f64>() / WALKS as f64;
-        for walk in 0..WALKS {
-            let share = (walk as f64 + 0.5) / WALKS as f64;
+        let weight = factors().sum::<f64>() / GAP_WALKS as f64;
+        for walk in 0..GAP_WALKS {
+            let share = (walk as f64 + 0.5) / GAP_WALKS as f64;
             let Some(k) = at_share(factors(), share) else { break };
             let b = self.radiosity_of(solved, &parts[k], walk);
             (0..3).for_each(|c| sum[c] += weight * (b[c] - lines[k][c]));
@@ -86,9 +72,9 @@ impl Gap {
                 b[c] += share[c] * (m[c] + rho[c] * arrives - known[c]);
                 share[c] *= rho[c] * seen;
             }
-            let goes_on = self.reach_m > 0.0 || seen > SURROUNDED;
+            let goes_on = self.reach_m > 0.0 || seen > IN_A_GAP;
             let left = share.iter().fold(0.0, |most: f64, s| most.max(*s));
-            if !goes_on || left <= FOLLOWED.0 || step == FOLLOWED.1 {
+            if !goes_on || left <= GAP_FOLLOWED.0 || step == GAP_FOLLOWED.1 {
                 return b;
             }
             match look.choose(&near, [spread(k, 2 * step), spread(k, 2 * step + 1)]) {

@@ -19,6 +19,7 @@ use crate::space::{Solved, place_of};
 
 use super::choice::at_share;
 use super::gap::Gap;
+use super::tuning::{GATHER_FAR, GATHER_LITTLE};
 
 /// A place and a direction at which irradiance is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,13 +50,6 @@ const SENSOR_ROUNDING: f64 = 1.0 / (1 << 20) as f64;
 
 /// How far what lies on a patch is lifted off it, in roundings of its corners.
 const LIFT: f64 = 8.0;
-
-/// Elements in plain view that are no larger than this share of their distance send their mean
-/// radiosity: what is brighter in them than the rest then weighs at most this much too much.
-const FAR: f64 = 1.0 / 32.0;
-
-/// Form factor to a part of a leaf below which it is taken to send what the leaf's line says.
-const LITTLE: f64 = 0.01;
 
 /// Halvings of a leaf that falls into too many pieces; then its middle decides.
 const SPLITS: u32 = 6;
@@ -144,7 +138,7 @@ impl<'a> Look<'a> {
         }
         let Gathered { mut sum, parts, .. } = found;
         for (k, part) in parts.iter().enumerate() {
-            let b = match part.factor > LITTLE {
+            let b = match part.factor > GATHER_LITTLE {
                 true => Gap::NONE.radiosity_of(self.solved, part, k),
                 false => part.line(self.solved),
             };
@@ -250,7 +244,7 @@ impl<'a> Look<'a> {
         let Some(in_the_way) = self.in_the_way(&seen, occluders) else { return };
         let children = self.forest.children(id);
         let distance = (e.centre - self.point).length();
-        let as_one = in_the_way.is_empty() && e.radius < FAR * distance;
+        let as_one = in_the_way.is_empty() && e.radius < GATHER_FAR * distance;
         if !children.is_empty() && !as_one {
             children.for_each(|child| self.add_element(ElementId(child), &in_the_way, out));
             return;

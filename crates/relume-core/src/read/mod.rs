@@ -18,6 +18,7 @@ mod rays;
 mod reconstruct;
 mod snapshot;
 mod solution;
+mod tuning;
 
 pub use compare::{Difference, RadiosityGap, Which, compare, radiosity_gap};
 pub use events::{Event, EventKind};

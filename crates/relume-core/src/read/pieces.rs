@@ -13,6 +13,10 @@ use crate::transport::{
     overlap_m2, prepare_view,
 };
 
+use super::tuning::{
+    AROUND, FITS, PIECES_APART, PIECES_CELLS_MAX, PIECES_CLIPPED_MAX, PIECES_CLOSER, PIECES_NEAR,
+    PIECES_UNSEEN, PIECES_UNSEEN_NEAR, PIECES_UNSEEN_PARTLY, SEEN_MIN,
+};
 use crate::space::{Solved, SpaceState};
 
 /// What is needed to share out what links carry.
@@ -21,7 +25,7 @@ pub(super) struct Sharing<'a> {
     forest: &'a Forest,
     view: &'a WorldView,
     simd: Simd,
-    /// See [`CLOSER`].
+    /// See [`PIECES_CLOSER`].
     closer: f64,
     /// Bodies that are looked through, if any.
     through: &'a [bool],
@@ -57,16 +61,6 @@ struct Look {
     is_clear: bool,
 }
 
-/// (sum of the radii / distance)^2 above which two pieces are not points.
-const POINTS: f64 = 0.01;
-
-/// Occluders up to which pieces of partly hidden links are looked at by clipping.
-const CLIPPED_MAX: usize = 96;
-
-/// Form factor of a piece to the other end times the bend of visibility over the piece above which it
-/// is looked at from more points, as a share of the tolerance.
-const CLOSER: f64 = 0.01;
-
 /// Pieces are side by side if their middles are closer than this share of their radii.
 const BESIDE: f64 = 1.01;
 
@@ -74,36 +68,10 @@ const BESIDE: f64 = 1.01;
 /// of one.
 const OPPOSITE: f64 = 0.1;
 
-/// Parts of a piece along each side that are looked from at most.
-const CELLS_MAX: f64 = 8.0;
-
-/// How far apart in their order pieces are asked whether they are side by side.
-const AROUND: usize = 32;
-
-/// Bend of visibility that pieces side by side which agree may have overlooked.
-const UNSEEN: f64 = 0.6;
-
-/// The same where what blocks is nearer than this many radii of the piece.
-const NEAR: f64 = 4.0;
-
-/// See [`NEAR`].
-const UNSEEN_NEAR: f64 = 1.5;
-
-/// The same where a piece and those beside it all see a part of the other end: V has kinks only where that
-/// begins and ends.
-const UNSEEN_PARTLY: f64 = 0.2;
-
-/// Steps in which shares are fitted to what every piece sees.
-const FITS: usize = 8;
-
-/// Visibility of a pair of pieces relative to that of the link from which fitting starts, at least:
-/// what seems hidden may have to take what others cannot.
-const SEEN_MIN: f64 = 1e-3;
-
 impl<'a> Sharing<'a> {
     pub(super) fn new(solved: &'a Solved) -> Sharing<'a> {
         let SpaceState { forest, view, tuning, .. } = &solved.space;
-        let closer = CLOSER * tuning.tolerance;
+        let closer = PIECES_CLOSER * tuning.tolerance;
         Sharing { forest, view, simd: tuning.simd, closer, through: &[] }
     }
 
@@ -162,7 +130,7 @@ impl<'a> Sharing<'a> {
         let from = if observer == Side::B { ends.1 } else { ends.0 };
         let all = |_| f64::from(link.carried.exchange_area_m2);
         let see = || self.seen_from(&cut, observer, std::slice::from_ref(from), &blockers, &all)[0];
-        (self.shaft(&cut, ends).occluders(&blockers) <= CLIPPED_MAX).then(see)
+        (self.shaft(&cut, ends).occluders(&blockers) <= PIECES_CLIPPED_MAX).then(see)
     }
 
     fn cut(&self, link: &Link, (a, b): (&[Shape], &[Shape])) -> Cut {
@@ -198,7 +166,7 @@ impl<'a> Sharing<'a> {
         let columns = other.pieces.len();
         let of_row = |k: usize| shares[k * columns..][..columns].iter().sum::<f64>();
         let of_column = |k: usize| shares.iter().skip(k).step_by(columns).sum::<f64>();
-        if self.shaft(cut, (&one.whole, &other.whole)).occluders(blockers) > CLIPPED_MAX {
+        if self.shaft(cut, (&one.whole, &other.whole)).occluders(blockers) > PIECES_CLIPPED_MAX {
             return shares.iter_mut().for_each(|share| *share *= v);
         }
         // An end in one piece sees what the pieces of the other see together.
@@ -291,7 +259,7 @@ impl<'a> Sharing<'a> {
                     }
                 };
                 let radius = place.own.radius;
-                let is_near = blockers.iter().any(|patch| distance(patch) < NEAR * radius);
+                let is_near = blockers.iter().any(|patch| distance(patch) < PIECES_NEAR * radius);
                 let is_clear = blockers.is_empty();
                 let value = if is_clear { 1.0 } else { value };
                 Look { value, from: (place.own.centre, radius), is_near, is_clear }
@@ -304,18 +272,18 @@ impl<'a> Sharing<'a> {
             }
             let (bend, is_partly) = bend(&looks, k);
             let unseen = if is_partly {
-                UNSEEN_PARTLY
+                PIECES_UNSEEN_PARTLY
             } else if first.is_near {
-                UNSEEN_NEAR
+                PIECES_UNSEEN_NEAR
             } else {
-                UNSEEN
+                PIECES_UNSEEN
             };
             let error = factor * bend.max(unseen);
             if error <= self.closer {
                 return first.value;
             }
             // The error of n x n points on a function with kinks falls as 1 / n^2.
-            let cells = (0.5 * (error / self.closer).sqrt()).ceil().min(CELLS_MAX);
+            let cells = (0.5 * (error / self.closer).sqrt()).ceil().min(PIECES_CELLS_MAX);
             from.visibility(&place.own, cells as u32)
         };
         looks.iter().zip(pieces).enumerate().map(look_closer).collect()
@@ -331,7 +299,7 @@ impl<'a> Sharing<'a> {
     fn exchange(&self, a: &WorldElement, b: &WorldElement) -> Exchange {
         let d = b.centre - a.centre;
         let reach = a.radius + b.radius;
-        if reach * reach < POINTS * d.length_squared() {
+        if reach * reach < PIECES_APART * d.length_squared() {
             return exchange_of_points(a, b);
         }
         match meeting(a, b) {

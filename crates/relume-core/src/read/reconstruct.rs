@@ -16,17 +16,10 @@ use crate::transport::{Meeting, Side, meeting};
 
 use super::compare::mean_radiosity;
 use super::pieces::Sharing;
-
-/// Links whose line is off by less than this share of the tolerance times the mean radiosity are
-/// left as they are.
-const NEGLIGIBLE_SHARE: f64 = 0.001;
+use super::tuning::{NEGLIGIBLE_SHARE, RECONSTRUCTION_SWEEPS};
 
 /// Links that one task looks at.
 const LINKS_AT_ONCE: usize = 512;
-
-/// Sweeps over everything once leaves have links of their own. What the first of them changes is
-/// below the tolerance, and each passes on less than half of it.
-const SWEEPS: u32 = 8;
 
 /// The solution with the links of leaves in place of those of their ancestors.
 pub(super) fn solve(solved: &Solved) -> (Links, Radiosity) {
@@ -48,7 +41,7 @@ pub(super) fn solve(solved: &Solved) -> (Links, Radiosity) {
     found.iter().flatten().for_each(|(receiver, _)| builder.count(*receiver));
     let links = builder.fill(|add| found.iter().flatten().for_each(|(to, link)| add(*to, *link)));
     let mut out = solved.radiosity.clone();
-    out.solve(&solved.space.surfaces(), &links, Dirty::All, Stop::Sweeps(SWEEPS));
+    out.solve(&solved.space.surfaces(), &links, Dirty::All, Stop::Sweeps(RECONSTRUCTION_SWEEPS));
     (links, out)
 }
 

@@ -12,6 +12,7 @@ use crate::solver::{Links, Radiosity, Surfaces};
 use crate::space::{Solved, SpaceState};
 
 use super::bends::Bends;
+use super::tuning::VISIBLE;
 
 /// The solution at one instant.
 #[derive(Clone, Debug)]
@@ -101,9 +102,6 @@ impl Snapshot {
         &self.leaves[self.leaf_offsets[i] as usize..self.leaf_offsets[i + 1] as usize]
     }
 }
-
-/// Error of a solution in dark places, in tolerances of the mean irradiance. Not calibrated.
-const VISIBLE: f64 = 0.05;
 
 /// The leaves of a solved forest with a solution over it.
 pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Snapshot {

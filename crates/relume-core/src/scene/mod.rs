@@ -43,6 +43,7 @@ mod shell;
 mod solid;
 mod tint;
 mod topology;
+mod tuning;
 mod weld;
 mod world;
 

@@ -13,6 +13,7 @@ mod command;
 mod estimate;
 mod options;
 mod replant;
+mod tuning;
 
 pub use command::{Command, CommandError, Removed};
 pub use estimate::Estimate;
@@ -121,10 +122,6 @@ pub struct Session {
     /// Steps so far.
     frames: u32,
 }
-
-/// Threshold of the error oracle for a link, relative to the tolerance of the whole: the errors of
-/// a receiver's links add up. Measured; see docs/tolerance.md.
-const LINK_SHARE: f64 = 0.25;
 
 impl Session {
     /// Prepares a scene for solving; the links are built by the first [`Session::solve`].

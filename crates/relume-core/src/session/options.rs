@@ -2,6 +2,8 @@
 
 use crate::follow::Update;
 
+use super::tuning::LINK_SHARE;
+
 /// Options of a solution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
@@ -81,9 +83,7 @@ impl Options {
     /// The oracle in the pair tree's terms.
     pub(super) fn pair_oracle(&self) -> crate::pair::Oracle {
         match self.oracle {
-            Oracle::Error => {
-                crate::pair::Oracle::Error { threshold: self.tolerance * super::LINK_SHARE }
-            }
+            Oracle::Error => crate::pair::Oracle::Error { threshold: self.tolerance * LINK_SHARE },
             Oracle::FormFactor { epsilon, min_area_m2 } => {
                 crate::pair::Oracle::FormFactor { epsilon, min_area_m2 }
             }

@@ -1,6 +1,7 @@
 //! Extrapolation of an iteration that has settled into one mode.
 
 use super::field::Field;
+use super::tuning::PARALLEL;
 
 /// Aitken's extrapolation: once successive changes are all but parallel, one mode is left, and its
 /// geometric series is summed at once.
@@ -10,9 +11,6 @@ pub(super) struct Jump {
     change: Vec<f32>,
     last: Vec<f32>,
 }
-
-/// Square of the cosine between successive changes above which they count as parallel.
-const PARALLEL: f64 = 0.9;
 
 impl Jump {
     pub(super) fn before(&mut self, field: &Field) {

@@ -14,6 +14,7 @@ mod radiosity;
 mod settle;
 mod surfaces;
 mod trend;
+mod tuning;
 mod work;
 
 pub use field::Linear;

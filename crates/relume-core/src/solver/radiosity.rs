@@ -19,7 +19,8 @@ use super::push::{push, row_sums};
 use super::settle::{Below, IrradianceChange, Settled};
 use super::surfaces::{Surfaces, for_each_below};
 use super::trend::Trend;
-use super::work::{Dirty, PENDING_SHARE, Work};
+use super::tuning::{PENDING_SHARE, SKIPPED_MAX};
+use super::work::{Dirty, Work};
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,9 +131,6 @@ const SWEEPS_MAX: u32 = 2_000;
 
 /// Receivers gathered by one task.
 const CHUNK: usize = 256;
-
-/// What may be left undone, relative to what may be left undone now.
-const SKIPPED_MAX: f32 = 2.0;
 
 impl Radiosity {
     /// A solution to begin with: the exitance of surfaces. Sources other than surfaces are given by

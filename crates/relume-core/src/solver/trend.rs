@@ -4,6 +4,7 @@ use crate::element::Renumbering;
 
 use super::field::{Field, NINE, SLACK};
 use super::surfaces::{Surfaces, for_each_below};
+use super::tuning::WIDE_SHARE;
 
 /// The last change of every mean radiosity; nothing where the last solve changed few. 4 bytes an element, since it only
 /// says where to begin: a step of 1/127 of the largest of the three channels.
@@ -15,9 +16,6 @@ pub(super) struct Trend {
     /// Whether the last solve changed most of the scene.
     pub(super) is_wide: bool,
 }
-
-/// One in so many elements that change is most of the scene: for as many all sources are gathered anew.
-const WIDE_SHARE: usize = 4;
 
 /// Three changes in steps of a power of two.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

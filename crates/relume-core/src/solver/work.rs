@@ -5,6 +5,7 @@ use super::field::Linear;
 use super::links::Links;
 use super::settle::Settled;
 use super::surfaces::{Surfaces, for_each_below};
+use super::tuning::{ALL_SHARE, BATCHES, PENDING_SHARE, SOME_SHARE};
 
 /// Which receivers to gather anew to begin with.
 #[derive(Clone, Debug)]
@@ -41,18 +42,6 @@ pub(super) struct Scratch {
     pub(super) gathered: Vec<Linear>,
     pub(super) settled: Vec<Settled>,
 }
-
-/// Batches there are at most.
-const BATCHES: usize = 16;
-
-/// Share of the receivers above which all are gathered: to find out which is dearer then.
-const SOME_SHARE: usize = 4;
-
-/// Share of the elements that must change in a sweep over all for the next to be over all.
-const ALL_SHARE: usize = 16;
-
-/// Share of the residual to which changes of sources may add up before a receiver gathers anew.
-pub(super) const PENDING_SHARE: f32 = 0.5;
 
 impl Work {
     pub(super) fn new(surfaces: &impl Surfaces, dirty: Dirty) -> Work {

@@ -10,24 +10,7 @@ use crate::solver::{Dirty, Link, Links, Radiosity, Stop, Surfaces};
 use crate::follow::set_pairs;
 
 use super::surfaces::{CoarseReceivers, CoarseSurfaces, LitForest};
-
-/// Coarse elements are no larger than this share of the scene's area: some 1/31, which equal quadtrees do not meet
-/// exactly.
-const COARSE_SHARE: f64 = 0.0323;
-
-/// An element of this share of the scene's area weighs 1 in the error norm.
-pub(super) const REFERENCE_SHARE: f64 = 1.0 / 512.0;
-
-/// Sweeps of the coarse solution: five bounces bring every closed room within 10 % or so.
-const SWEEPS: u32 = 8;
-
-/// Errors on dark receivers are measured against at least this share of the mean irradiance: a room into which light comes
-/// through a door that is ajar is some 200 times darker than the one beside it, and keeps the tolerance.
-const DARK_FLOOR: f64 = 1e-3;
-
-/// Share of what would arrive directly if nothing were in the way, below which what arrives is what rounding lets through
-/// between shadows: errors relative to that would have no end. (A lamp outside a closed room.)
-const LOST: f64 = 1e-4;
+use super::tuning::{COARSE_SHARE, COARSE_SWEEPS, DARK_FLOOR, LOST, REFERENCE_SHARE};
 
 /// Splits facets down to coarse elements, numbers them and keeps them for good; returns their ids
 /// by number.
@@ -100,7 +83,7 @@ impl Coarse {
         for &group in seed.groups().roots() {
             self.radiosity.set(group.0, surfaces.material(group.0).exitance);
         }
-        self.radiosity.solve(&surfaces, &self.links, Dirty::All, Stop::Sweeps(SWEEPS));
+        self.radiosity.solve(&surfaces, &self.links, Dirty::All, Stop::Sweeps(COARSE_SWEEPS));
         self.brightness = self.measure((scene, now), seed, coarse, &surfaces);
     }
 

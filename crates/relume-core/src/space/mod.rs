@@ -11,6 +11,7 @@ mod promise;
 mod state;
 mod surfaces;
 mod tally;
+mod tuning;
 
 pub(crate) use bed::Bed;
 pub(crate) use groups::{Before, group_links};

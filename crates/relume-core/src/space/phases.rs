@@ -15,22 +15,8 @@ use super::coarse::{self, Coarse};
 use super::promise::Promise;
 use super::state::{SpaceState, Tuning};
 use super::surfaces::LitForest;
+use super::tuning::{FOLLOWED_SHARE, RESIDUAL_SHARE, VACANT_ELEMENTS};
 use super::{emission, groups, tally};
-
-/// Residual of the solver after a cold build, relative to the tolerance.
-const RESIDUAL_SHARE: f64 = 0.005;
-
-/// The same after an update: a small body that moves changes nearly everything a little, and that
-/// little need not be followed.
-const FOLLOWED_SHARE: f64 = 0.05;
-
-/// Share of the elements' room that may be vacant: an element takes more than a hundred bytes of the
-/// 128 it may take.
-///
-/// Putting everything together is a pass over all pairs, some nanoseconds each; at least as many
-/// elements as this share, with all their pairs, have gone since the last such pass, and every one of
-/// those pairs cost a judgement (a microsecond or so).
-const VACANT_ELEMENTS: usize = 32;
 
 /// What a frame leads to.
 pub(crate) struct Goal<'a> {

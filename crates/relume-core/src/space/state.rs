@@ -8,8 +8,9 @@ use crate::scene::{Held, Scene, World};
 use crate::solver::GroupLinks;
 use crate::transport::Simd;
 
-use super::coarse::{Coarse, REFERENCE_SHARE};
+use super::coarse::Coarse;
 use super::surfaces::LitForest;
+use super::tuning::REFERENCE_SHARE;
 
 /// What a scene is solved with.
 #[derive(Clone, Copy, Debug)]

@@ -4,13 +4,11 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::tuning::COVERED;
 use crate::element::{ElementId, Forest, Kind, WorldView};
 use crate::follow::Receivers;
 use crate::scene::{PatchId, Scene, World};
 use crate::solver::{FacetMaterial, GroupLinks, Place, Surfaces};
-
-/// Elements of which a smaller share is exposed are covered.
-const COVERED: f64 = 1e-4;
 
 /// A forest with its materials at one instant.
 pub(crate) struct LitForest<'a> {

@@ -6,18 +6,13 @@ use glam::{DMat3, DVec2, DVec3};
 use super::exchange::light_at;
 use super::kernel::{GaussPoints, Simd};
 use super::point::{LANES, PointBundle, form_factors_from_points};
+use super::tuning::{BEND_CLOSE, BEND_FAR};
 use crate::element::{WorldElement, WorldLight, bilinear_area};
 use crate::geometry::ConvexPolygon;
 
 /// Coefficients of three parabolas in the arriving light over an element, relative to its mean, with lengths in radii of the
 /// element: see [`Receiver::polynomial`].
 pub type Bend = [f64; 3];
-
-/// (Sum of the radii / distance)^2 from which what arrives is known in closed form only.
-const CLOSE: f64 = 1.0;
-
-/// The same below which a source is a point.
-const FAR: f64 = 0.03;
 
 /// Points of Gauss-Legendre on [0, 1] with three points, and their weights.
 const G3: [(f64, f64); 3] = [
@@ -97,12 +92,12 @@ impl<'a> Receiver<'a> {
     /// order. About 40 ns, near the source 0.2 microseconds.
     pub fn bend(&self, simd: Simd, from: &WorldElement) -> Bend {
         let near = self.nearness(from.centre, from.radius);
-        if near >= CLOSE {
+        if near >= BEND_CLOSE {
             return self.fitted(&self.receive_close(simd, from));
         }
         let mut values = [0.0; LANES];
         let normal = from.plane.normal;
-        if near < FAR {
+        if near < BEND_FAR {
             let middle = [(from.centre, 1.0)];
             dispatch!(simd.level(), _simd => self.receive(&middle, normal, &mut values));
         } else {

@@ -12,6 +12,10 @@ use glam::{DVec2, DVec3};
 use super::contour::exchange_along_outlines;
 use super::kernel::{GaussPoints, Simd, kernel_grid};
 use super::point::{LANES, PointBundle, bundle_sums, sum_of_lanes};
+use super::tuning::{
+    AGREE, CURVATURE, EXCHANGE_BENT, EXCHANGE_CLOSE, EXCHANGE_NEAR, FORM_FACTOR_RANGE, FULL,
+    OUTLINE_ERROR,
+};
 use crate::element::{WorldElement, WorldLight, bilinear, bilinear_area};
 use crate::geometry::{ConvexPolygon, no_smaller};
 use crate::scene::LightKind;
@@ -71,13 +75,6 @@ pub fn meeting(a: &WorldElement, b: &WorldElement) -> Meeting {
     if a_lo < -slack || b_lo < -slack { Meeting::Cut } else { Meeting::Facing }
 }
 
-/// (Sum of the radii / distance)^2 below which 2 x 2 Gauss points are accurate to 0.2 %.
-/// A value that quadtree elements of equal planes do not meet exactly.
-const NEAR: f64 = 0.1193;
-
-/// The same below which 4 x 4 points are accurate to 0.02 %.
-const CLOSE: f64 = 0.3993;
-
 /// Exchange of two elements in contact that have `overlap_m2` in common: all that leaves it arrives.
 pub fn contact_exchange(a: &WorldElement, b: &WorldElement, overlap_m2: f64) -> Exchange {
     let over = |e: &WorldElement| {
@@ -111,10 +108,10 @@ pub fn exchange_by_points(
 ) -> Exchange {
     let (reach, apart) = (a.radius + b.radius, (b.centre - a.centre).length_squared());
     let beyond = |nearness: f64| meeting == Meeting::Facing && reach * reach <= nearness * apart;
-    if !beyond(CLOSE) {
+    if !beyond(EXCHANGE_CLOSE) {
         return close_exchange(simd, a, b);
     }
-    if !beyond(NEAR) {
+    if !beyond(EXCHANGE_NEAR) {
         return dispatch!(simd.level(), _simd => exchange_of_grids(a, b));
     }
     let grid = kernel_grid(simd, a, b);
@@ -168,10 +165,6 @@ struct Fit {
     /// Whether values at neighbouring points differ too much for a linear fit.
     is_steep: bool,
 }
-
-/// Second-order variation of the kernel over first-order variation squared: 1/r^n falls by n d to
-/// first order in the relative distance d and by n (n + 1) d^2 / 2 to second.
-const CURVATURE: f64 = 0.4;
 
 impl Fit {
     #[inline]
@@ -322,7 +315,7 @@ fn close_exchange(simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
     let disagree = large - small > AGREE * large || small <= 0.0;
     // Where nearly all of the smaller end is seen, what its edges lose lies between the points.
     let is_full = large > FULL * a.area.min(b.area);
-    let is_steep = disagree || is_full || bend > BENT || steep_a || steep_b;
+    let is_steep = disagree || is_full || bend > EXCHANGE_BENT || steep_a || steep_b;
     let area_m2 = match is_steep {
         true => small,
         false if no_smaller(b.area, a.area) => from_a,
@@ -356,19 +349,6 @@ impl Exchange {
     }
 }
 
-/// Relative difference of what points of both sides find up to which they are right.
-const AGREE: f64 = 2e-3;
-
-/// Form factor from the smaller end above which points miss what happens along its edges.
-const FULL: f64 = 0.8;
-
-/// Bend over both sides above which points may have missed what is between them, though they agree. Of 52,000 pairs of
-/// three scenes with a bend from 0.3 to this, half are off by less than 1e-4, one in a hundred by 1e-3 to 3e-3.
-const BENT: f64 = 0.75;
-
-/// Relative error of exchange areas along outlines.
-const OUTLINE_ERROR: f64 = 1e-4;
-
 /// Integral over `part` of `e` of the form factor to `seen`, m2, its variation over `e`, and whether points
 /// beside each other find too different ones for the integral to be right.
 fn integrate_polygon(
@@ -394,9 +374,6 @@ fn integrate_polygon(
     let bend = if whole { variation.bend } else { variation.bend.max(1.0) };
     (sum, Variation { bend, ..variation }, fit.is_steep)
 }
-
-/// Range of form factors over a quadrilateral above which it is integrated in four parts.
-const STEEP: f64 = 0.5;
 
 /// The end of a near pair from whose points the other is seen.
 struct Viewer<'a> {
@@ -433,10 +410,10 @@ impl Viewer<'_> {
         for &f in &factors {
             (lo, hi) = (lo.min(f), hi.max(f));
         }
-        if hi - lo > STEEP && may_part {
+        if hi - lo > FORM_FACTOR_RANGE && may_part {
             return None;
         }
-        fit.is_steep |= hi - lo > STEEP;
+        fit.is_steep |= hi - lo > FORM_FACTOR_RANGE;
         let before = fit.value;
         fit.add_all(&grid, &factors);
         Some(fit.value - before)
@@ -575,7 +552,8 @@ mod tests {
                     let error = (exchange(Simd::detect(), &a, &b, m).area_m2 / exact - 1.0).abs();
                     let reach = a.radius + b.radius;
                     let nearness = reach * reach / (b.centre - a.centre).length_squared();
-                    let by_grid = m == Meeting::Facing && (NEAR..=CLOSE).contains(&nearness);
+                    let by_grid = m == Meeting::Facing
+                        && (EXCHANGE_NEAR..=EXCHANGE_CLOSE).contains(&nearness);
                     let most = if by_grid { 2e-4 } else { 2.5e-3 };
                     grids += usize::from(by_grid);
                     worst = worst.max(error);

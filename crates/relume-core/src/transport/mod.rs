@@ -16,6 +16,7 @@ mod prepared_view;
 mod segments;
 mod side;
 mod silhouette;
+mod tuning;
 mod visibility;
 
 pub use bend::{Bend, Receiver};
@@ -28,10 +29,11 @@ pub use exchange::{
 pub use group::{GROUP_SEGMENTS, GroupSight, Slope, Spread, common_body};
 pub use kernel::Simd;
 pub use point::form_factor_from_point;
-pub use prepared_view::{CELLS_MAX, Clipping, FactorPast, PreparedView, form_factor_past};
+pub use prepared_view::{Clipping, FactorPast, PreparedView, form_factor_past};
 pub use segments::{SEGMENTS, SegmentBundle};
 pub use side::Side;
+pub use tuning::{CELLS_MAX, CLIPPED_MAX};
 pub use visibility::{
-    BlockerSizes, CLIPPED_MAX, Candidates, Shaft, Visibility, clipping, light_visibility,
-    prepare_view, segment_is_clear, visibility,
+    BlockerSizes, Candidates, Shaft, Visibility, clipping, light_visibility, prepare_view,
+    segment_is_clear, visibility,
 };

@@ -11,6 +11,10 @@ use super::clip::{Cutter, FRAGMENTS_MAX, Occluders, keep_front};
 use super::kernel::{G, Simd};
 use super::point::{EdgeBundles, form_factor_from_point};
 use super::silhouette::Silhouette;
+use super::tuning::{
+    CELLS_MAX, ERROR_KINKED, ERROR_SMOOTH, FACING, HALVINGS, MOTION_RATIO, OVERLOOKED, UNSEEN,
+    UNSEEN_KINKED, UNSEEN_SMOOTH,
+};
 use super::visibility::Visibility;
 use crate::element::WorldElement;
 use crate::geometry::{Aabb, ConvexPolygon, Plane, Pose, no_smaller};
@@ -330,9 +334,9 @@ impl<'a> Clipping<'a> {
         let doubt = if points.iter().all(sees_nothing) || points.iter().all(sees_all) {
             UNSEEN
         } else if points.iter().any(|p| sees_nothing(p) || sees_all(p)) {
-            (KINKED * spread).max(UNSEEN_KINKED)
+            (ERROR_KINKED * spread).max(UNSEEN_KINKED)
         } else {
-            SMOOTH * spread + UNSEEN_SMOOTH
+            ERROR_SMOOTH * spread + UNSEEN_SMOOTH
         };
         (v, doubt)
     }
@@ -341,40 +345,9 @@ impl<'a> Clipping<'a> {
 /// Share of the other end below which what a point sees may be a sliver between shadows.
 const SLIVER: f64 = 1e-4;
 
-/// What four points that see nothing may have overlooked of V, where nothing proves that it is hidden.
-const OVERLOOKED: f64 = 0.3;
-
-/// Halvings of an end of which each part must be hidden by one occluder.
-const HALVINGS: u32 = 5;
-
 /// Share of the way to the middle by which the corners of an end are drawn in, so that none lies in the plane of
 /// what stands on the end.
 const DRAWN_IN: f64 = 0.005;
-
-/// How far V is off relative to its spread over four points that all see a part of the other end.
-const SMOOTH: f64 = 0.06;
-
-/// How far it is off where their spread is nothing.
-const UNSEEN_SMOOTH: f64 = 0.002;
-
-/// The same where some points see all of the other end or nothing.
-const KINKED: f64 = 0.33;
-
-/// See [`KINKED`].
-const UNSEEN_KINKED: f64 = 0.05;
-
-/// The same where all points see all of it, or all nothing.
-const UNSEEN: f64 = 0.075;
-
-/// Cells along a side of an end at most.
-pub const CELLS_MAX: u32 = 8;
-
-/// How many times as much shadows move over the other end for the larger to be looked from.
-const MOTION_RATIO: f64 = 16.0;
-
-/// Share of an end that must face the other for that not to matter. A value that quadtree elements do not meet
-/// exactly.
-const FACING: f64 = 0.7303;
 
 /// Whether the first end is the one to look from: the smaller, unless shadows move much more for it, or one faces
 /// the other with a part only: points behind the other's plane see nothing.

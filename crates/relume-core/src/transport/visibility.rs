@@ -602,9 +602,6 @@ pub fn visibility(
     tally.finish(1 << log2_count, a, b)
 }
 
-/// Occluders up to which partial visibility is found by clipping where nothing is known of the light.
-pub const CLIPPED_MAX: usize = 12;
-
 /// A pair made ready to be clipped past its blockers ([`Shaft::occluders`] says how many that are): in the
 /// frame of the body that both ends ride on, if they do.
 pub fn clipping<'a>(simd: Simd, shaft: &Shaft<'a>, blockers: &[PatchId]) -> Clipping<'a> {
@@ -764,6 +761,7 @@ mod tests {
     use super::*;
     use crate::element::Shape;
     use crate::scene::SceneBuilder;
+    use crate::transport::CLIPPED_MAX;
     use glam::DQuat;
 
     /// Floor and ceiling, both double-sided if wanted, and what `fill` adds: V of their inner sides.

@@ -8,6 +8,7 @@ use std::f64::consts::FRAC_PI_4;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::super::tuning::{SKY_SHARE, SKY_SHARE_ALL_ROUND};
 use super::sky::SkyNow;
 
 /// A part of a side of the cube [-1, 1]^3, seen from its middle.
@@ -37,13 +38,6 @@ pub(super) struct Facet {
     depth: u32,
 }
 
-/// Share of what facets may make irradiance wrong by that the sum of their errors may be: a bound for any surface, of
-/// which shaped skies come to two thirds.
-const SHARE: f64 = 0.5;
-
-/// The same where light comes from below too: no surface sees more than half of it.
-const SHARE_ALL_ROUND: f64 = 0.25;
-
 /// Facets of a sky at most.
 const FACETS_MAX: usize = 1024;
 
@@ -64,7 +58,7 @@ const DEPTH_MAX: (u32, u32) = (5, 8);
 /// The cell that errs most is divided until the errors of all are below half of `fineness`, relative to the sky's light.
 pub(super) fn facets(skies: &[SkyNow], all_round: bool, fineness: f64) -> Vec<Facet> {
     let pictured = matches!(skies.first(), Some(SkyNow::Picture(_)));
-    let share = if all_round { SHARE_ALL_ROUND } else { SHARE };
+    let share = if all_round { SKY_SHARE_ALL_ROUND } else { SKY_SHARE };
     let depth_max = if pictured { DEPTH_MAX.1 } else { DEPTH_MAX.0 };
     let look = |cell: &Cell| skies.iter().map(|s| Mean::of(s, cell)).collect::<Vec<_>>();
     let roots = roots(all_round);

@@ -6,6 +6,7 @@ use crate::scene::{BodyId, PatchId};
 use crate::transport::segments::EDGE_OVERLAP;
 use glam::DVec3;
 
+use super::super::tuning::FACET_RAYS;
 use super::{GROUP_SEGMENTS, Points, Spread, factor, point_of, scrambled, seen_from};
 
 /// Query for the occluders between two ends of which one is a group.
@@ -117,9 +118,6 @@ pub struct FacetSight {
     /// Visibility of each facet of both ends to the whole of the other; empty for an element.
     pub of_facets: [Vec<f32>; 2],
 }
-
-/// Rays from each facet of the end that has more of them.
-const FACET_RAYS: usize = 4;
 
 /// Rays of a pair at least, and at most.
 const RAYS: (usize, usize) = (32, 4_096);

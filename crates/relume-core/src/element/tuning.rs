@@ -1,0 +1,100 @@
+//! Calibration constants of the room `element`: each with its unit, the range tried, and what gets worse either way.
+//!
+//! `docs/tuning.md` is made of this file. Constants that are exact, guard a representation or stand for rounding stay where
+//! they are used.
+
+/// Share of an element that must be exposed for light to count over the exposed part.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: elements almost wholly covered are too dark
+/// - Smaller: errors of visibility on slivers are amplified
+pub(super) const EXPOSED_LEAST: f64 = 1.0 / 16.0;
+
+/// Share of a polygon's chord that lines of contact must cover for it to be cut there.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: light leaks under walls that cover less
+/// - Smaller: polygons are cut where little stands on them
+pub(super) const CUT_SHARE: f64 = 0.25;
+
+/// Area of a polygon, over that of the scene, from which lines of contact cut it.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: light leaks under walls
+/// - Smaller: more elements than light needs
+pub(super) const CUT_LEAST: f64 = 1.0 / 64.0;
+
+/// Share of the chord of a smaller polygon that a crossing patch must cover for it to be cut there.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: light leaks through walls that furniture pierces
+/// - Smaller: polygons are cut where little crosses them
+pub(super) const CROSSED_SHARE: f64 = 0.9;
+
+/// Area of a part, over that of a smaller polygon that is cut by what crosses it.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: light leaks through walls that furniture pierces
+/// - Smaller: slivers
+pub(super) const CROSSED_PART: f64 = 1.0 / 64.0;
+
+/// Cuts of a smaller polygon by what crosses it.
+///
+/// - Unit: cuts
+/// - Tried: not varied
+/// - Larger: more elements
+/// - Smaller: light leaks through the other walls
+pub(super) const CROSSED_TIMES: u32 = 2;
+
+/// Ratio of the sides from which an element is halved across its long side, not quartered.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: long elements
+/// - Smaller: neighbours of different shape
+pub(super) const ELONGATED: f64 = 1.5;
+
+/// Longest edge squared over area above which a triangle is halved; 4 for the right isosceles one.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: long triangles
+/// - Smaller: neighbours of different shape
+pub(super) const SLENDER: f64 = 6.0;
+
+/// Area of a patch, over that of the scene, up to which it may be in a group.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: errors: larger patches lose links of their own
+/// - Smaller: more links
+pub(super) const SMALL_SHARE: f64 = 1.0 / 2_000.0;
+
+/// Small patches of a rigid body from which it has groups.
+///
+/// - Unit: patches
+/// - Tried: not varied
+/// - Larger: time in scenes of many small things
+/// - Smaller: groups where links of patches are cheap
+pub(super) const PATCHES_MIN: usize = 64;
+
+/// Area of a group, over that of the scene, at most.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: errors of the coarse solution
+/// - Smaller: more pairs
+pub(super) const AREA_SHARE: f64 = 1.0 / 128.0;
+
+/// Diagonal of a group's box, over that of the scene, at most.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: errors of the coarse solution
+/// - Smaller: more pairs
+pub(super) const ACROSS_SHARE: f64 = 1.0 / 8.0;

@@ -1,0 +1,228 @@
+//! Calibration constants of the room `pair`: each with its unit, the range tried, and what gets worse either way.
+//!
+//! `docs/tuning.md` is made of this file. Constants that are exact, guard a representation or stand for rounding stay where
+//! they are used.
+
+/// Standard deviation of a source's reflected radiosity over a reference-sized element beyond its gradient, relative to its mean.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: more links to bright walls
+/// - Smaller: uneven radiosity of large sources goes unseen
+pub(super) const SOURCE_VARIATION: f64 = 0.2;
+
+/// Error that splitting the smaller end must remove, over that of the larger, for the smaller to be split.
+///
+/// - Unit: 1
+/// - Tried: 1, 1.5, 3, infinite
+/// - Larger: a tenth more links and a third more error where the larger end is always split
+/// - Smaller: pairs change sides under the smallest motion: at 1 a quarter of all edits under a moving lamp
+pub(super) const PREFERENCE: f64 = 3.0;
+
+/// Weight of the variation of visibility over a receiver beyond its gradient, for a link whose neighbours are hidden otherwise.
+///
+/// - Unit: 1
+/// - Tried: 0.2 against counting neighbours alike (docs/tolerance.md)
+/// - Larger: more links at the edges of lamps' shadows
+/// - Smaller: edges of shadows are too coarse
+pub(super) const EDGE: f64 = 0.2;
+
+/// Least weight of the variation of visibility over a receiver for reflected light, whose sources all around are hidden along one edge.
+///
+/// - Unit: 1
+/// - Tried: 0.2, 0.4, 1, 2, 3
+/// - Larger: more links in corners and gaps
+/// - Smaller: with 1 or 0.2 tables of form factors behind partitions and white closets miss their limits; at 0.4 the gap behind a lamp made 95 % of a room's squared error
+pub(super) const EDGE_REFLECTED: f64 = 3.0;
+
+/// Share of the links across which a shadow's edge sweeps whose errors have one sign.
+///
+/// - Unit: 1
+/// - Tried: 0.5, 1
+/// - Larger: with 1 tables and halls have a quarter more links for the same errors
+/// - Smaller: lanes under the sky err by more than the tolerance
+pub(super) const ALIKE_SHARE: f64 = 0.5;
+
+/// Largest form factor of all sources that are counted as hidden along one edge.
+///
+/// - Unit: 1
+/// - Tried: 0.3, 1
+/// - Larger: with 1 scenes have a tenth more links for the same errors
+/// - Smaller: lanes under the sky err by more than the tolerance
+pub(super) const ALIKE_FACTOR: f64 = 0.3;
+
+/// Weight of the variation of the kernel over a receiver beyond its gradient; readings find most of it again.
+///
+/// - Unit: 1
+/// - Tried: 1, 0.5, below 0.5
+/// - Larger: more links than the error needs, since readings add the bend
+/// - Smaller: the solver's own errors within elements make everything brighter by 5e-4
+pub(super) const BENT: f64 = 0.5;
+
+/// Least standard deviation of visibility over both ends of a partly hidden pair with a steep kernel.
+///
+/// - Unit: 1
+/// - Tried: 0, 0.3
+/// - Larger: more links at near misses
+/// - Smaller: with 0 the rows of louvres summed to 0.70
+pub(super) const STEEP: f64 = 0.3;
+
+/// Visibility below which an end counts as hidden: a sliver that rounding leaves.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: thin gaps are taken for hidden
+/// - Smaller: slivers of rounding are refined
+pub(super) const SEEN: f64 = 1e-4;
+
+/// Area of a shadow over the area of the blockers that throw it.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: elements in shadows of small things weigh less, and more sources count as hidden alike
+/// - Smaller: elements in shadows of small things are split further, and fewer sources count as hidden alike
+pub(super) const SHADOW_AREAS: f64 = 5.0;
+
+/// Weight of the sampling error of visibility, which is independent from link to link.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: sampled pairs are refined for noise that averages out
+/// - Smaller: noise of sampled pairs shows
+pub(super) const NOISE: f64 = 0.2;
+
+/// Contribution of a pair to its receiver, in thresholds of a link, from which up to `CLIPPED_MAX_CLOSE` occluders are clipped.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: pairs that matter are sampled: noise
+/// - Smaller: time: pairs that do not matter are clipped
+pub(super) const CLOSE_SHARE: f64 = 2.0;
+
+/// Most occluders of a pair that contributes much for clipping; beyond it is sampled.
+///
+/// - Unit: occluders
+/// - Tried: 12 for all pairs, 96
+/// - Larger: time in rooms with many things
+/// - Smaller: with 12 the error of a room of 64 boxes was 2.5 % in place of 1.1 %, from 2 % of the links
+pub(super) const CLIPPED_MAX_CLOSE: usize = 96;
+
+/// Most occluders of a pair that contributes little for clipping.
+///
+/// - Unit: occluders
+/// - Tried: 4, 12
+/// - Larger: with 12 most of the clipping goes to links that do not need it
+/// - Smaller: noise of sampling
+pub(super) const CLIPPED_MAX_REST: usize = 4;
+
+/// Visibility that segments which are all blocked may have missed.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: more pairs are clipped to be sure that they are hidden
+/// - Smaller: narrow gaps are lost
+pub(super) const SAMPLED_MAX: f64 = 0.15;
+
+/// Area at which an element weighs 1 in the error norm, over the area of the connected patches that it belongs to: a face of a cube.
+///
+/// - Unit: 1
+/// - Tried: 1/12, 1/6, 1/2
+/// - Larger: with 1/2 a device in a hall misses the tolerance
+/// - Smaller: with 1/12 a room of 64 boxes has a fifth more links
+pub(super) const CONNECTED_SHARE: f64 = 1.0 / 6.0;
+
+/// Contribution of a pair that may go unseen, over the error that a link may have.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: narrow gaps are lost
+/// - Smaller: more points on pairs that are hidden
+pub(super) const OVERLOOKED_MAX: f64 = 0.25;
+
+/// Threshold below which links get no more points; elements shrink instead.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: fine tolerances keep the error of four points
+/// - Smaller: time at fine tolerances
+pub(super) const FINEST: f64 = 0.002;
+
+/// Form factor times error of visibility, over the error that a link may have, for each square of points on an end.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: partly hidden links keep the error of few points
+/// - Smaller: time: more points on each link
+pub(super) const CLOSER: f64 = 0.03;
+
+/// Distance of two ends, in sums of their radii, below which a pair with a group is refined whatever it carries.
+///
+/// - Unit: 1
+/// - Tried: 0.7 to 1.3: no difference in rooms and towns (0.2 % by patch); on a lumpy body 1.0 takes a quarter of the links away
+/// - Larger: more links of groups
+/// - Smaller: errors of groups close to each other
+pub(super) const APART: f64 = 1.0;
+
+/// Weight of the second order in size over distance of either end in the error of a group's link.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: more links of groups
+/// - Smaller: groups close to each other err
+pub(super) const PLACE: f64 = 1.0;
+
+/// Weight of the standard deviation of visibility on an element linked with a group, which has one visibility for all of it.
+///
+/// - Unit: 1
+/// - Tried: 0.5, 1
+/// - Larger: more links of groups
+/// - Smaller: with 0.5 places on a ceiling close above a lamp err more: 4.5 to 7.4 % by area
+pub(super) const SHARED: f64 = 1.0;
+
+/// Weight of the standard deviation of visibility on a group, whose facets have visibilities of their own.
+///
+/// - Unit: 1
+/// - Tried: 0.25, 0.5, 1
+/// - Larger: with 1 5 % more links and no difference in the error
+/// - Smaller: no difference down to 0.25
+pub(super) const SHARED_BY_FACETS: f64 = 0.5;
+
+/// Variance of visibility that sixteen segments may miss.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: more links of groups
+/// - Smaller: small blockers of groups go unseen
+pub(super) const MISSED: f64 = 0.01;
+
+/// Further share of a group's area that it may show, for each radius over distance of the other end.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: more links of groups
+/// - Smaller: groups close to an end are taken for smaller than they look
+pub(super) const TURNED: f64 = 0.5;
+
+/// Nodes of the hierarchy visited for the certificate of one pair.
+///
+/// - Unit: nodes
+/// - Tried: 256, unlimited
+/// - Larger: certificates cost more than they save: unlimited, a frame with a turning ball took 1.7 cold builds in place of 1.25
+/// - Smaller: fewer pairs are certified
+pub(super) const EFFORT: u32 = 256;
+
+/// Pairs judged by one task.
+///
+/// - Unit: pairs
+/// - Tried: not varied
+/// - Larger: threads wait for each other
+/// - Smaller: overhead of tasks
+pub(super) const CHUNK: usize = 128;
+
+/// Pairs judged before their results are applied.
+///
+/// - Unit: pairs
+/// - Tried: not varied
+/// - Larger: scratch memory
+/// - Smaller: threads wait for the writer
+pub(super) const BLOCK: usize = 1 << 15;

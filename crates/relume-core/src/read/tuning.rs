@@ -1,0 +1,228 @@
+//! Calibration constants of the room `read`: each with its unit, the range tried, and what gets worse either way.
+//!
+//! `docs/tuning.md` is made of this file. Constants that are exact, guard a representation or stand for rounding stay where
+//! they are used.
+
+/// (Sum of the radii / distance)^2 above which two pieces of a link are no points.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: errors of shares beside edges
+/// - Smaller: time of readings
+pub(super) const PIECES_APART: f64 = 0.01;
+
+/// Most occluders for pieces of a link to be clipped.
+///
+/// - Unit: occluders
+/// - Tried: not varied
+/// - Larger: time of readings
+/// - Smaller: shares of partly hidden links are those of the lines
+pub(super) const PIECES_CLIPPED_MAX: usize = 96;
+
+/// Form factor of a piece times the bend of visibility, over the tolerance, for each square of points on it.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: errors of shares across shadows
+/// - Smaller: time of readings
+pub(super) const PIECES_CLOSER: f64 = 0.01;
+
+/// Most cells along a side of a piece.
+///
+/// - Unit: cells
+/// - Tried: not varied
+/// - Larger: time of readings
+/// - Smaller: errors of shares across shadows
+pub(super) const PIECES_CELLS_MAX: f64 = 8.0;
+
+/// Pieces before and after one that may lie beside it.
+///
+/// - Unit: pieces
+/// - Tried: not varied
+/// - Larger: time of readings
+/// - Smaller: neighbours are missed
+pub(super) const AROUND: usize = 32;
+
+/// Bend of visibility that neighbouring pieces which agree may have missed.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: time of readings
+/// - Smaller: errors of shares across shadows
+pub(super) const PIECES_UNSEEN: f64 = 0.6;
+
+/// Distance of a blocker, in radii of a piece, below which `PIECES_UNSEEN_NEAR` counts.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: time of readings
+/// - Smaller: errors of shares close to blockers
+pub(super) const PIECES_NEAR: f64 = 4.0;
+
+/// Bend of visibility that neighbouring pieces may have missed where a blocker is near.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: time of readings
+/// - Smaller: errors of shares close to blockers
+pub(super) const PIECES_UNSEEN_NEAR: f64 = 1.5;
+
+/// Bend of visibility that neighbouring pieces may have missed where all see a part of the other end.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: time of readings
+/// - Smaller: errors of shares across shadows
+pub(super) const PIECES_UNSEEN_PARTLY: f64 = 0.2;
+
+/// Steps in which shares are fitted to what every piece sees.
+///
+/// - Unit: steps
+/// - Tried: not varied
+/// - Larger: time of readings
+/// - Smaller: rows of pieces do not add up
+pub(super) const FITS: usize = 8;
+
+/// Least visibility of a pair of pieces that fitting starts from, over that of the link.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: light where pieces are hidden
+/// - Smaller: fits that cannot settle
+pub(super) const SEEN_MIN: f64 = 1e-3;
+
+/// Size over distance up to which an element in plain view sends its mean.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: errors of sensors up to this share
+/// - Smaller: time of sensors
+pub(super) const GATHER_FAR: f64 = 1.0 / 32.0;
+
+/// Form factor to a part of a leaf below which the part sends what the leaf's line says.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: errors of sensors beside contact shadows
+/// - Smaller: time of sensors
+pub(super) const GATHER_LITTLE: f64 = 0.01;
+
+/// Share of a point's view above which leaves that are large against their distance make a gap of any width.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: gaps are too bright: 20 to 70 times 20 gaps deep
+/// - Smaller: time of sensors
+pub(super) const IN_A_GAP: f64 = 0.5;
+
+/// Largest width of a gap, over the length at which an element weighs 1 in the error norm.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: time of sensors
+/// - Smaller: sensors in gaps are as wrong as leaves there, by a tenth
+pub(super) const GAP_NARROW: f64 = 0.25;
+
+/// Distance up to which leaves are not taken at their line in a gap, over its width.
+///
+/// - Unit: 1
+/// - Tried: 0, 4, 8, 16
+/// - Larger: time of sensors and scatter of walks
+/// - Smaller: sensors in gaps are as wrong as leaves there (0: by up to 16 %; 4: by 3 %)
+pub(super) const GAP_REACH: f64 = 8.0;
+
+/// Walks from a sensor in a gap.
+///
+/// - Unit: walks
+/// - Tried: 15, 64, 120
+/// - Larger: time of sensors
+/// - Smaller: scatter of readings in gaps (64: up to 3 %)
+pub(super) const GAP_WALKS: usize = 64;
+
+/// Share of the light below which a walk in a gap ends, and its bounces at most.
+///
+/// - Unit: 1, bounces
+/// - Tried: 1e-3, 1e-2
+/// - Larger: errors of leaves in gaps show
+/// - Smaller: time of sensors
+pub(super) const GAP_FOLLOWED: (f64, usize) = (1e-2, 24);
+
+/// Error of a solution in dark places, in tolerances of the mean irradiance: where automatic exposure stops.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: dark pictures
+/// - Smaller: blotches of dark places show
+pub(super) const VISIBLE: f64 = 0.05;
+
+/// Walks from each point of an estimate of accuracy.
+///
+/// - Unit: walks
+/// - Tried: not varied
+/// - Larger: time of estimates
+/// - Smaller: smaller errors stay unresolved
+pub(super) const WALKS: usize = 8;
+
+/// Rays that a point looks around with for each walk; a square number.
+///
+/// - Unit: rays
+/// - Tried: 64; half as many cost half as much and resolve errors larger by the root of two
+/// - Larger: time of estimates
+/// - Smaller: smaller errors stay unresolved
+pub(super) const ACCURACY_RAYS: usize = 64;
+
+/// Most points of a walk.
+///
+/// - Unit: points
+/// - Tried: not varied
+/// - Larger: time of estimates
+/// - Smaller: errors of many bounces stay unseen
+pub(super) const STEPS: usize = 6;
+
+/// Weight below which a walk ends.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: errors of many bounces stay unseen
+/// - Smaller: time of estimates
+pub(super) const WALK_LEAST: f64 = 0.02;
+
+/// Irradiance below which a surface counts as dark, over the mean.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: errors in dim places count less
+/// - Smaller: relative errors of what is black
+pub(super) const DARK: f64 = 1e-3;
+
+/// Brightest patches whose emission is gathered exactly.
+///
+/// - Unit: patches
+/// - Tried: not varied
+/// - Larger: time of estimates
+/// - Smaller: noise where many lamps are small
+pub(super) const LAMPS: usize = 16;
+
+/// Exitance over the mean radiosity from which a patch counts as a lamp.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: noise from lamps that are found by rays
+/// - Smaller: time of estimates
+pub(super) const BRIGHT: f64 = 4.0;
+
+/// Error of a link's line, over the tolerance times the mean radiosity, below which the line is left as it is.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: errors between leaves
+/// - Smaller: time of readings
+pub(super) const NEGLIGIBLE_SHARE: f64 = 0.001;
+
+/// Sweeps over everything once leaves have links of their own; each passes on less than half.
+///
+/// - Unit: sweeps
+/// - Tried: not varied
+/// - Larger: time of readings
+/// - Smaller: leaves do not settle
+pub(super) const RECONSTRUCTION_SWEEPS: u32 = 8;

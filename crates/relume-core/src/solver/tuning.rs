@@ -1,0 +1,60 @@
+//! Calibration constants of the room `solver`: each with its unit, the range tried, and what gets worse either way.
+//!
+//! `docs/tuning.md` is made of this file. Constants that are exact, guard a representation or stand for rounding stay where
+//! they are used.
+
+/// Most batches of a sweep: each gathers what the batches before it found.
+///
+/// - Unit: batches
+/// - Tried: not varied
+/// - Larger: threads wait for each other
+/// - Smaller: more sweeps
+pub(super) const BATCHES: usize = 16;
+
+/// Elements for each changed receiver below which all are gathered.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: time: all are gathered where few changed
+/// - Smaller: time: many receivers are found one by one
+pub(super) const SOME_SHARE: usize = 4;
+
+/// Elements for each one that a full sweep changed below which the next sweep is full.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: time: full sweeps where few change
+/// - Smaller: time: many receivers are found one by one
+pub(super) const ALL_SHARE: usize = 16;
+
+/// Change of a receiver's sources, over the residual, from which it gathers again.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: larger residuals
+/// - Smaller: more gathers
+pub(super) const PENDING_SHARE: f32 = 0.5;
+
+/// Changes skipped since the last full sweep, over the present limit, from which all are gathered.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: larger residuals
+/// - Smaller: more full sweeps
+pub(super) const SKIPPED_MAX: f32 = 2.0;
+
+/// Elements for each changed one below which the last solve counts as one of most of the scene.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: the next solve starts with all where few change
+/// - Smaller: sweeps that extrapolation of the trend would save
+pub(super) const WIDE_SHARE: usize = 4;
+
+/// Squared cosine between successive changes above which the geometric series is summed at once.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: more sweeps
+/// - Smaller: jumps in a wrong direction
+pub(super) const PARALLEL: f64 = 0.9;

@@ -215,6 +215,10 @@ impl SpaceCertificateTests<'_> {
         if self.view.is_hidden_twin(patch) {
             return false;
         }
+        // A lamp matters wherever it is in the shaft.
+        if self.forest.glows(patch) {
+            return true;
+        }
         let Some((a, b)) = ends.places else { return true };
         let half = 0.5 * (a.rounding_m + b.rounding_m);
         let c = self.view.occluder(patch);

@@ -10,9 +10,9 @@ use crate::geometry::{Aabb, Plane, no_smaller};
 use crate::predict::{Lookahead, MotionBounds, Tick};
 use crate::scene::{BodyId, PatchId};
 use crate::transport::{
-    BlockerSizes, CELLS_MAX, CLIPPED_MAX, Clipping, Exchange, Meeting, Shaft, Simd, Visibility,
-    clipping, contact_exchange, exchange_by_points, light_exchange, light_visibility, meeting,
-    visibility,
+    BlockerSizes, CELLS_MAX, CLIPPED_MAX, Clipping, Exchange, InShaft, Meeting, Shaft, Simd,
+    Visibility, clipping, contact_exchange, exchange_by_points, light_exchange, light_visibility,
+    meeting, visibility,
 };
 
 use super::certificate::SpaceCertificateTests;
@@ -25,7 +25,7 @@ use super::oracle::{End, Estimate, Oracle, estimate};
 use super::tree::{Carried, CullReason, Gradients, in_steps};
 use super::tuning::{
     CLIPPED_MAX_CLOSE, CLIPPED_MAX_REST, CLOSE_SHARE, CLOSER, CONNECTED_SHARE, EFFORT, FINEST,
-    OVERLOOKED_MAX, SAMPLED_MAX,
+    OVERLOOKED_MAX, SAMPLED_MAX, SPOT_AROUND,
 };
 use super::update::{Hierarchy, Judge, Judgement, Stale, Verdict};
 use super::world_change::WorldChange;
@@ -365,8 +365,8 @@ impl SpaceJudge<'_> {
             shaft.narrow(candidates, narrowed);
             return passing(Verdict::Refine(self.larger_above_coarse(a, b)), 0);
         }
-        let blockers = shaft.narrow_to_blockers(candidates, narrowed);
-        self.decide((a, b), known, (&places.own.0, &places.own.1), met, &shaft, &blockers)
+        let found = shaft.narrow_to_blockers(candidates, narrowed);
+        self.decide((a, b), known, (&places.own.0, &places.own.1), met, &shaft, &found)
     }
 
     fn shaft<'a>(
@@ -394,8 +394,9 @@ impl SpaceJudge<'_> {
         (place_a, place_b): (&WorldElement, &WorldElement),
         met: Meeting,
         shaft: &Shaft<'_>,
-        blockers: &[PatchId],
+        found: &InShaft,
     ) -> Judgement {
+        let blockers = &found.blockers[..];
         let key = pair_key(self.forest.key(a), self.forest.key(b));
         let in_contact = met == Meeting::Coplanar;
         let end = |brightness: &CoarseBrightness, id, area| End {
@@ -509,7 +510,8 @@ impl SpaceJudge<'_> {
         };
         let ends = (end(brightness, a, place_a.area), end(brightness, b, place_b.area));
         let scale = (brightness.reference_area_m2(), threshold);
-        let sizes = shaft.sizes_of(blockers);
+        let around = |end: &End| end.surface_area.min(SPOT_AROUND * brightness.reference_area_m2());
+        let sizes = shaft.sizes_of(found, (around(&ends.0), around(&ends.1)));
         let e = estimate(&x, &v, (&ends.0, &ends.1), &sizes, scale);
         let stake = factor / threshold.max(FINEST);
         let both_ways = way != Margin::ENDLESS;
@@ -669,7 +671,7 @@ impl SpaceJudge<'_> {
         }
         let place = LightPlace::new(lamp, &e, self.view.far_m());
         let shaft = self.shaft((&e, &place.stand_in), None, (patch, patch));
-        let blockers = shaft.narrow_to_blockers(candidates, narrowed);
+        let InShaft { blockers, .. } = shaft.narrow_to_blockers(candidates, narrowed);
         let key = pair_key(self.forest.key(element), self.forest.key(light));
         let segments = place.segments(lamp, &e, key);
         let v = light_visibility(self.simd, &shaft, &blockers, (&segments, place.from(lamp, &e)));

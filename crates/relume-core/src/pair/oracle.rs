@@ -7,7 +7,7 @@ use super::brightness::Brightness;
 use super::margin::Margin;
 use super::tuning::{
     ALIKE_FACTOR, ALIKE_SHARE, BENT, EDGE, EDGE_REFLECTED, NOISE, PREFERENCE, SEEN, SHADOW_AREAS,
-    SOURCE_VARIATION, STEEP,
+    SOURCE_VARIATION, SPOT, STEEP,
 };
 use crate::transport::Side;
 
@@ -99,27 +99,19 @@ pub(super) fn estimate(
         ((v.value * (1.0 - v.value) + 0.02) / f64::from(v.segments)).sqrt() * NOISE
     };
     let sends = |over: &Variation, spread: f64| length(v.value * (over.slope + over.bend), spread);
-    // What a narrow lamp lights, it lights the more: where as much light as comes of it leaves what is hidden, the mean
-    // of the product of radiosity and visibility is off by the one's excess times the other's variance.
-    let hidden = |edge: f64, end: &End, width_m: f64| {
-        let brighter = (reference_area.sqrt() / width_m).max(1.0);
-        let most = (reference_area / end.area).max(1.0).min(brighter);
-        let off = (brighter * edge * edge).max(most * edge).min(most);
-        if width_m.is_finite() { off } else { 0.0 }
-    };
-    let over = |over: &Variation, edge: f64, hidden: f64| Uneven {
+    let over = |over: &Variation, edge: f64, spot: f64| Uneven {
         bend: BENT * v.value * over.bend,
         edge,
         sends: sends(over, edge),
-        hidden,
+        spot: SPOT * spot,
     };
     // The points that V is found from tell no more than those of the kernel.
     let least = match x.is_steep && v.segments > 0 {
         true => STEEP * (v.value / SEEN).min(1.0),
         false => 0.0,
     };
-    let over_a = over(&x.over_a, v.spread_a.max(least), hidden(v.spread_a, a, blockers.lamps_m.0));
-    let over_b = over(&x.over_b, v.spread_b.max(least), hidden(v.spread_b, b, blockers.lamps_m.1));
+    let over_a = over(&x.over_a, v.spread_a.max(least), blockers.spots.0);
+    let over_b = over(&x.over_b, v.spread_b.max(least), blockers.spots.1);
     let link = LinkSize {
         exchange: x.area_m2,
         noise,
@@ -181,9 +173,8 @@ struct Uneven {
     edge: f64,
     /// Standard deviation of both with the gradient, by which uneven radiosity of the source is weighed.
     sends: f64,
-    /// How many times the mean reflected radiosity may be counted wrongly because it leaves what is hidden alone: a
-    /// lamp close to a wall lights just the part of it that it hides.
-    hidden: f64,
+    /// Of what is reflected from a lamp close by, over the mean around: 1.
+    spot: f64,
 }
 
 /// Error on the receiver, and the parts of it that splitting receiver and source would mend.
@@ -211,7 +202,8 @@ fn one_way(
     let uneven = length(radiosity * over_receiver.bend * whole, edge * over_receiver.edge * finer);
     let by_receiver = per_radiosity * uneven;
     // The edges of what is hidden run through as many sources as it is long: all err in the same sense.
-    let sends = (varies * over_source.sends).max(over_source.hidden * whole.sqrt());
+    let spot = over_source.spot * whole.sqrt();
+    let sends = over_source.sends * varies.max(spot);
     let by_source = per_radiosity * reflected * sends;
     let by_noise = per_radiosity * radiosity * link.noise;
     // Relative to what the link itself brings, which no light changes: close to a lamp that is the most of what arrives.

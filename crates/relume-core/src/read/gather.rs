@@ -19,7 +19,7 @@ use crate::space::{Solved, place_of};
 
 use super::choice::at_share;
 use super::gap::Gap;
-use super::tuning::{GATHER_FAR, GATHER_LITTLE};
+use super::tuning::{GAP_FAR, GATHER_FAR, GATHER_LITTLE};
 
 /// A place and a direction at which irradiance is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -244,7 +244,8 @@ impl<'a> Look<'a> {
         let Some(in_the_way) = self.in_the_way(&seen, occluders) else { return };
         let children = self.forest.children(id);
         let distance = (e.centre - self.point).length();
-        let as_one = in_the_way.is_empty() && e.radius < GATHER_FAR * distance;
+        let far = if self.reach_m > 0.0 { GAP_FAR } else { GATHER_FAR };
+        let as_one = in_the_way.is_empty() && e.radius < far * distance;
         if !children.is_empty() && !as_one {
             children.for_each(|child| self.add_element(ElementId(child), &in_the_way, out));
             return;

@@ -16,6 +16,7 @@ mod prepared_view;
 mod segments;
 mod side;
 mod silhouette;
+mod spot;
 mod tuning;
 mod visibility;
 
@@ -34,6 +35,6 @@ pub use segments::{SEGMENTS, SegmentBundle};
 pub use side::Side;
 pub use tuning::{CELLS_MAX, CLIPPED_MAX};
 pub use visibility::{
-    BlockerSizes, Candidates, Shaft, Visibility, clipping, light_visibility, prepare_view,
+    BlockerSizes, Candidates, InShaft, Shaft, Visibility, clipping, light_visibility, prepare_view,
     segment_is_clear, visibility,
 };

@@ -12,6 +12,7 @@ use super::kernel::Simd;
 use super::prepared_view::{Between, Clipping, PlacedSolid, PreparedView, is_hidden};
 use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use super::side::Side;
+use super::spot::spot;
 use glam::{DVec2, DVec3};
 
 /// Candidate occluders of a pair: nodes of the forest's fixed part (clusters and patch roots) that may stand between its ends.
@@ -71,12 +72,20 @@ const COVER: f64 = 0.5;
 /// disregarded because it is close to an end.
 const LIFT: f64 = 8.0;
 
+/// Patches in the shaft of a pair.
+#[derive(Clone, Debug, Default)]
+pub struct InShaft {
+    /// Those that block.
+    pub blockers: Vec<PatchId>,
+    /// Those that emit light at any time; they may block as well or not.
+    pub lamps: Vec<PatchId>,
+}
+
 /// Sizes of the blockers between two ends; infinite where there are none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BlockerSizes {
-    /// For each end the width (area over length, m) of the narrowest blocker that emits light at any time and shines
-    /// on the end.
-    pub lamps_m: (f64, f64),
+    /// For each end how unevenly lamps in the shaft light it ([`spot`]): 1.
+    pub spots: (f64, f64),
     /// Area of the smallest blocker, m2.
     pub least_m2: f64,
     /// Area of all blockers, m2.
@@ -89,7 +98,7 @@ pub struct BlockerSizes {
 impl BlockerSizes {
     /// Nothing stands between the ends.
     pub const NOTHING: BlockerSizes = BlockerSizes {
-        lamps_m: (f64::INFINITY, f64::INFINITY),
+        spots: (0.0, 0.0),
         least_m2: f64::INFINITY,
         all_m2: f64::INFINITY,
         leverage: (0.0, 0.0),
@@ -206,6 +215,8 @@ impl<'a> Shaft<'a> {
         if !shaft.meets(bounds, wide_margin) {
             return Standing::Out;
         }
+        // A lamp beside the ends lights the one unevenly, though it blocks nothing.
+        let unseen = if self.forest.glows(patch) { Standing::Beside } else { Standing::Out };
         let (above_a, above_b) = (span(&occluder, &a.plane), span(&occluder, &b.plane));
         let is_near = |(lo, hi): (f64, f64)| lo >= -wide_margin && hi <= wide_margin;
         let (passes_wide, passes) = if is_near(above_a) || is_near(above_b) {
@@ -217,13 +228,13 @@ impl<'a> Shaft<'a> {
             // The same without a look at what covers an end.
             let height = above_a.1.min(above_b.1);
             if height <= 0.5 * slack {
-                return Standing::Out;
+                return unseen;
             }
             let reach = reach(&occluder.plane, a, b);
             (reach > 0.5 * slack, reach > slack && height > slack)
         };
         if !passes_wide {
-            return Standing::Out;
+            return unseen;
         }
         match passes && shaft.meets(bounds, margin) {
             true => Standing::Between,
@@ -249,39 +260,39 @@ impl<'a> Shaft<'a> {
         !behind.0 && !behind.1 && reach(&occluder.plane, a, b) > slack
     }
 
-    /// For each end the width (area over length, m) of the narrowest blocker that emits light at any time and shines
-    /// on the end: what it hides of it is what it lights. Infinite if there is none.
-    fn lamp_widths_m(&self, blockers: &[PatchId]) -> (f64, f64) {
-        let mut widths = (f64::INFINITY, f64::INFINITY);
-        for &patch in blockers.iter().filter(|&&patch| self.forest.glows(patch)) {
+    /// For each end the largest [`spot`] of some lamps that shine on it, 1; what surrounds the ends has the areas `around_m2`.
+    fn spots(&self, lamps: &[PatchId], around_m2: (f64, f64)) -> (f64, f64) {
+        let mut most = (0.0_f64, 0.0_f64);
+        for &patch in lamps {
             let both = self.view.patch(patch).twin.is_some();
             let (own, a, b) = self.seen_by(Some(self.view.patch(patch).body));
-            let polygon = match own {
+            let lamp = match own {
                 true => self.view.occluder_in_body(patch),
                 false => self.view.occluder(patch),
             };
-            let first = polygon.corners[0];
-            let length = polygon.corners.iter().map(|c| c.distance(first)).fold(0.0, f64::max);
-            let width = self.forest.area_m2(self.forest.patch_root(patch)) / length;
-            let narrowed = |e: &WorldElement, before: f64| match both
-                || polygon.plane.distance(e.centre) > 0.0
-            {
-                true => before.min(width),
-                false => before,
+            let lamp_m2 = self.forest.area_m2(self.forest.patch_root(patch));
+            let of = |e: &WorldElement, around_m2: f64| {
+                let shines = both || lamp.plane.distance(e.centre) > 0.0;
+                if shines { spot(e, around_m2, (&lamp, lamp_m2)) } else { 0.0 }
             };
-            widths = (narrowed(a, widths.0), narrowed(b, widths.1));
+            most = (most.0.max(of(a, around_m2.0)), most.1.max(of(b, around_m2.1)));
         }
-        widths
+        most
     }
 
-    /// The sizes of some blockers.
-    pub fn sizes_of(&self, blockers: &[PatchId]) -> BlockerSizes {
+    /// Sizes of some blockers and lamps.
+    pub fn sizes_of(
+        &self,
+        InShaft { blockers, lamps }: &InShaft,
+        around_m2: (f64, f64),
+    ) -> BlockerSizes {
+        let spots = self.spots(lamps, around_m2);
         if blockers.is_empty() {
-            return BlockerSizes::NOTHING;
+            return BlockerSizes { spots, ..BlockerSizes::NOTHING };
         }
         let area = |&patch: &PatchId| self.forest.area_m2(self.forest.patch_root(patch));
         BlockerSizes {
-            lamps_m: self.lamp_widths_m(blockers),
+            spots,
             least_m2: blockers.iter().map(area).fold(f64::INFINITY, f64::min),
             all_m2: blockers.iter().map(area).sum(),
             leverage: self.leverage(blockers),
@@ -393,19 +404,27 @@ impl<'a> Shaft<'a> {
     }
 
     /// [`Shaft::narrow`] and [`Shaft::blockers`] in one walk.
-    pub fn narrow_to_blockers(&self, parents: &Candidates, out: &mut Vec<u32>) -> Vec<PatchId> {
+    pub fn narrow_to_blockers(&self, parents: &Candidates, out: &mut Vec<u32>) -> InShaft {
         let (shafts, keep_m) = (self.shafts(), self.keep_m());
-        let mut blockers = Vec::new();
+        let mut found = InShaft::default();
+        let mut meet = |patch: PatchId, standing: Standing| {
+            if standing == Standing::Between {
+                found.blockers.push(patch);
+            }
+            if self.forest.glows(patch) {
+                found.lamps.push(patch);
+            }
+        };
         for &parent in parents {
             self.walk(&shafts, ElementId(parent), keep_m, &mut |id, standing| {
                 out.push(id.0);
                 match self.forest.patch(id) {
-                    Some(patch) if standing == Standing::Between => blockers.push(patch),
-                    Some(_) => {}
+                    Some(patch) => meet(patch, standing),
                     None => {
                         self.walk(&shafts, id, -1.0, &mut |id, standing| {
-                            let blocks = standing == Standing::Between;
-                            blockers.extend(self.forest.patch(id).filter(|_| blocks));
+                            if let Some(patch) = self.forest.patch(id) {
+                                meet(patch, standing);
+                            }
                             true
                         });
                     }
@@ -413,7 +432,7 @@ impl<'a> Shaft<'a> {
                 true
             });
         }
-        blockers
+        found
     }
 
     /// Blockers of this pair among those of a pair above.

@@ -14,6 +14,7 @@ mod kernel;
 mod point;
 mod prepared_view;
 mod segments;
+mod share;
 mod side;
 mod silhouette;
 mod tuning;
@@ -31,9 +32,10 @@ pub use kernel::Simd;
 pub use point::form_factor_from_point;
 pub use prepared_view::{Clipping, FactorPast, PreparedView, form_factor_past};
 pub use segments::{SEGMENTS, SegmentBundle};
+pub use share::Visibility;
 pub use side::Side;
 pub use tuning::{CELLS_MAX, CLIPPED_MAX};
 pub use visibility::{
-    BlockerSizes, Candidates, Shaft, Visibility, clipping, light_visibility, prepare_view,
-    segment_is_clear, visibility,
+    BlockerSizes, Candidates, Shaft, clipping, light_visibility, prepare_view, segment_is_clear,
+    visibility,
 };

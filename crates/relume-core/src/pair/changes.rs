@@ -1,15 +1,17 @@
 //! Result of an update: counts of its work, edits to the links, events.
 
+use serde::Serialize;
+
 use crate::element::{ElementId, ElementKey};
 
 use super::tree::{Carried, PairId};
 
 /// Exact counts of the work of an update.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Work {
     /// Pairs visited on the walk, unaffected ones included.
     pub visited: u64,
-    /// Pairs judged.
+    /// Pairs judged, each counted once.
     pub examined: u64,
     /// Pairs with moved ends of which only the exchange area was evaluated: a certificate says that nothing stands between
     /// the ends.
@@ -20,11 +22,11 @@ pub struct Work {
     pub certified: u64,
     /// Pairs judged for the coarse solution before; each is visited again.
     pub coarse_examined: u64,
-    /// Pairs judged because an end moved, or for the first time.
+    /// Examined pairs that were judged because an end moved against the other, or for the first time.
     pub reevaluated: u64,
-    /// Pairs judged because something moved between their ends.
+    /// Examined pairs of which only the visibility may have changed.
     pub visibility_only: u64,
-    /// Pairs judged because the light on their ends changed.
+    /// Examined pairs of which only the brightness of their ends may have changed.
     pub brightness_only: u64,
     /// Pairs whose state, or what they carry as a link, differs from before.
     pub changed: u64,

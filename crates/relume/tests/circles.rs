@@ -1,11 +1,11 @@
 //! Circles between the files of a room: files of which each uses the other, at once or by way of more. Held down by number.
 //!
 //! Read from the text of every file: paths from `super`, `self` and `crate`, followed through what `mod.rs` re-exports. A
-//! file that uses its own parent makes no circle with it.
+//! file counts together with the files in the folder of its name (`forest.rs` and `forest/plant.rs`).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::layers::{crates_dir, sources, without_comments};
 
@@ -16,8 +16,27 @@ const CIRCLES: [(&str, usize); 4] =
 /// A module, as its path from the crate's root.
 type Module = Vec<String>;
 
-/// The modules of a crate with their text, without comments and unit tests.
-fn modules(dir: &Path) -> BTreeMap<Module, String> {
+/// The modules of a crate.
+#[derive(Default)]
+struct Source {
+    /// Their text, without comments and unit tests.
+    text: BTreeMap<Module, String>,
+    /// Heads of folders (`mod.rs`), which are no files of their own.
+    heads: BTreeSet<Module>,
+}
+
+impl Source {
+    /// The file that a module counts to: the topmost one above it that is no head of a folder.
+    fn file(&self, module: &Module) -> Module {
+        let above = (1..=module.len()).map(|len| module[..len].to_vec());
+        let is_file =
+            |module: &Module| self.text.contains_key(module) && !self.heads.contains(module);
+        above.clone().find(is_file).unwrap_or_else(|| module.clone())
+    }
+}
+
+/// The modules of a crate's source folder.
+fn modules(dir: &Path) -> Source {
     let module = |file: &Path| -> Module {
         let relative = file.strip_prefix(dir).unwrap().with_extension("");
         let mut parts: Module =
@@ -29,7 +48,12 @@ fn modules(dir: &Path) -> BTreeMap<Module, String> {
         let text = without_comments(&fs::read_to_string(file).unwrap());
         text.split("#[cfg(test)]\nmod tests").next().unwrap().to_owned()
     };
-    sources(dir).iter().map(|file| (module(file), text(file))).collect()
+    let files = sources(dir);
+    let is_head = |file: &&PathBuf| file.ends_with("mod.rs");
+    Source {
+        text: files.iter().map(|file| (module(file), text(file))).collect(),
+        heads: files.iter().filter(is_head).map(|file| module(file)).collect(),
+    }
 }
 
 /// Every path of a `use` tree or expression that begins at `from`: braces expanded.
@@ -128,17 +152,18 @@ fn exports(modules: &BTreeMap<Module, String>) -> BTreeMap<(Module, String), Mod
     found
 }
 
-/// Uses of files by files of a room, without those of its head and of parents.
-fn uses(modules: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>> {
-    let exports = exports(modules);
+/// Uses of files by files of a room, without those of its head.
+fn uses(source: &Source) -> BTreeMap<Module, BTreeSet<Module>> {
+    let exports = exports(&source.text);
     let mut out: BTreeMap<Module, BTreeSet<Module>> = BTreeMap::new();
-    for (module, text) in modules {
+    for (module, text) in &source.text {
         for path in used(module, text) {
             // As far as modules go; names that a module re-exports lead on to its child.
             let mut at: Module = Vec::new();
             for name in &path {
                 let child = [at.clone(), vec![name.clone()]].concat();
-                let Some(next) = modules
+                let Some(next) = source
+                    .text
                     .contains_key(&child)
                     .then_some(child)
                     .or_else(|| exports.get(&(at.clone(), name.clone())).cloned())
@@ -147,9 +172,10 @@ fn uses(modules: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>
                 };
                 at = next;
             }
-            let is_other = !module.starts_with(&at) && !at.starts_with(module);
-            if is_other && (module.len() == 1 || at.first() == module.first()) {
-                out.entry(module.clone()).or_default().insert(at);
+            let (from, to) = (source.file(module), source.file(&at));
+            let of_one_room = from.len() == 1 || from.first() == to.first();
+            if from != to && of_one_room && !source.heads.contains(&to) && !to.is_empty() {
+                out.entry(from).or_default().insert(to);
             }
         }
     }
@@ -157,8 +183,8 @@ fn uses(modules: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>
 }
 
 /// Files that can reach each other, group by group.
-fn circles(modules: &BTreeMap<Module, String>) -> Vec<Vec<String>> {
-    let uses = uses(modules);
+fn circles(source: &Source) -> Vec<Vec<String>> {
+    let uses = uses(source);
     let reach = |from: &Module| {
         let (mut seen, mut stack) = (BTreeSet::new(), vec![from]);
         while let Some(at) = stack.pop() {
@@ -170,13 +196,12 @@ fn circles(modules: &BTreeMap<Module, String>) -> Vec<Vec<String>> {
         }
         seen
     };
-    let reached: BTreeMap<&Module, _> = modules.keys().map(|m| (m, reach(m))).collect();
+    let reached: BTreeMap<&Module, _> = uses.keys().map(|m| (m, reach(m))).collect();
     let mut found: BTreeSet<Vec<String>> = BTreeSet::new();
     for (one, all) in &reached {
         if all.contains(one) {
-            let mutual =
-                modules.keys().filter(|two| all.contains(two) && reached[two].contains(one));
-            found.insert(mutual.map(|m| m.join("/")).collect());
+            let is_mutual = |two: &&&Module| all.contains(**two) && reached[**two].contains(one);
+            found.insert(reached.keys().filter(is_mutual).map(|m| m.join("/")).collect());
         }
     }
     found.into_iter().collect()
@@ -187,7 +212,7 @@ fn circles_between_files_do_not_come_back() {
     let mut wrong = Vec::new();
     for (dir, allowed) in CIRCLES {
         let modules = modules(&crates_dir().join(dir).join("src"));
-        assert!(modules.len() > 10, "{dir}: its source was not found");
+        assert!(modules.text.len() > 10, "{dir}: its source was not found");
         let found = circles(&modules);
         if found.len() != allowed {
             wrong.push(format!("{dir}: {} circles, not {allowed}: {found:?}", found.len()));
@@ -200,7 +225,8 @@ fn circles_between_files_do_not_come_back() {
 fn the_counter_finds_circles_of_two_and_three_and_through_re_exports() {
     let of = |files: &[(&str, &str)]| {
         let module = |path: &str| path.split('/').map(str::to_owned).collect::<Module>();
-        circles(&files.iter().map(|(path, text)| (module(path), (*text).to_owned())).collect())
+        let text = files.iter().map(|(path, text)| (module(path), (*text).to_owned())).collect();
+        circles(&Source { text, heads: BTreeSet::from([module("room")]) })
     };
     let head = ("room", "mod a;\nmod b;\npub use a::{A, Other};\npub use b::B;");
     let two = of(&[head, ("room/a", "use super::b::B;"), ("room/b", "use super::{a::A, x};")]);
@@ -221,4 +247,11 @@ fn the_counter_finds_circles_of_two_and_three_and_through_re_exports() {
         ("room/a/child", "use super::A; use crate::room::b::B;"),
     ]);
     assert_eq!(none, Vec::<Vec<String>>::new());
+    let by_child = of(&[
+        head,
+        ("room/a", "mod child;"),
+        ("room/a/child", "use super::A; use crate::room::b::B;"),
+        ("room/b", "use super::a::A;"),
+    ]);
+    assert_eq!(by_child, [["room/a", "room/b"]]);
 }

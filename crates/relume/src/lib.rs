@@ -69,7 +69,12 @@ pub use relume_io::export;
 
 /// The plane: scenes that do not change along one direction, with that direction integrated out.
 pub mod flat {
-    pub use relume_core::flat::*;
+    pub use relume_core::flat::{
+        Body, BodyIndex, FlatElement, FlatFrame, FlatLink, FlatOptions, FlatScene, FlatSession,
+        Key, Material, Motion, OptionError, PlanePose, SceneError, Segment, Wall, WallIndex,
+    };
+    #[doc(hidden)]
+    pub use relume_core::flat::{FlatForest, FlatSolved, PlaneState, PlaneView, Shaft};
     pub use relume_io::flat::{SvgError, TextError, parse, parse_svg};
 }
 

@@ -1,6 +1,6 @@
 //! Ids and names of the forest's nodes, and how ids change.
 
-/// Index of a node in a [`Forest`].
+/// Index of a node in a [`Forest`](super::Forest).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ElementId(pub u32);
 

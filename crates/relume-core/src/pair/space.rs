@@ -78,7 +78,7 @@ pub trait Judge: Hierarchy + Sync {
     fn is_coarse_pair(&self, a: ElementId, b: ElementId) -> bool;
 
     /// Whether a link between these two ends is evaluated facet by facet (groups), so that judged pairs must be recorded in
-    /// [`Changes::apart`].
+    /// [`Changes::apart`](super::Changes::apart).
     fn is_apart(&self, _a: ElementId, _b: ElementId) -> bool {
         false
     }

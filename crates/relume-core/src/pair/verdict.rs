@@ -15,7 +15,7 @@ pub enum Verdict {
     RefineSelf,
     /// The pair exchanges nothing.
     Cull(CullReason),
-    /// The pair is a link of the coarse solution: it keeps its state, and is reported in [`Changes::coarse_links`].
+    /// The pair is a link of the coarse solution: it keeps its state, and is reported in [`Changes::coarse_links`](super::Changes::coarse_links).
     CoarseLink,
 }
 

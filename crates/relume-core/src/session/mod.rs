@@ -214,7 +214,7 @@ impl Session {
     }
 
     /// Says at which time the frame before the next step was, where that is not the last step:
-    /// [`FrameReport::moved`] and [`FrameReport::dynamic_links`] count from there. Nothing else
+    /// [`FrameReport::moved`] and [`Work::dynamic_links`](crate::pair::Work::dynamic_links) count from there. Nothing else
     /// depends on it.
     #[doc(hidden)]
     pub fn count_motion_from(&mut self, time_s: Option<f64>) {

@@ -179,22 +179,22 @@ type Read = fn(&FrameReport) -> u64;
 
 const COUNTERS: [(&str, Read); 21] = [
     ("links", |r| r.links),
-    ("dynamic_links", |r| r.dynamic_links),
-    ("visited", |r| r.visited),
-    ("examined", |r| r.examined),
-    ("followed", |r| r.followed),
-    ("certified", |r| r.certified),
-    ("extrapolated", |r| r.extrapolated),
-    ("coarse_examined", |r| r.coarse_examined),
-    ("reevaluated", |r| r.reevaluated),
-    ("visibility_only", |r| r.visibility_only),
-    ("brightness_only", |r| r.brightness_only),
-    ("changed", |r| r.changed),
-    ("promoted", |r| r.promoted),
-    ("demoted", |r| r.demoted),
-    ("occlusion_changed", |r| r.occlusion_changed),
-    ("segments", |r| r.segments),
-    ("elements_made", |r| r.elements_made),
+    ("dynamic_links", |r| r.work.dynamic_links),
+    ("visited", |r| r.work.visited),
+    ("examined", |r| r.work.examined),
+    ("followed", |r| r.work.followed),
+    ("certified", |r| r.work.certified),
+    ("extrapolated", |r| r.work.extrapolated),
+    ("coarse_examined", |r| r.work.coarse_examined),
+    ("reevaluated", |r| r.work.reevaluated),
+    ("visibility_only", |r| r.work.visibility_only),
+    ("brightness_only", |r| r.work.brightness_only),
+    ("changed", |r| r.work.changed),
+    ("promoted", |r| r.work.promoted),
+    ("demoted", |r| r.work.demoted),
+    ("occlusion_changed", |r| r.work.occlusion_changed),
+    ("segments", |r| r.work.segments),
+    ("elements_made", |r| r.work.elements_made),
     ("elements_reaped", |r| r.elements_reaped),
     ("sweeps", |r| u64::from(r.sweeps)),
     ("gathers", |r| r.gathers),
@@ -222,7 +222,7 @@ impl Measured {
 impl Cold {
     /// Share of its links with an end that moved since the frame before, and its time there.
     fn dynamic(&self) -> (f64, f64) {
-        let share = by(self.report.dynamic_links as f64, self.report.links as f64, 0.0);
+        let share = by(self.report.work.dynamic_links as f64, self.report.links as f64, 0.0);
         (share, share * self.report.seconds.evaluate)
     }
 }
@@ -319,12 +319,12 @@ impl Figures {
             line(counter.name, whole(counter.frame), counter.from_scratch.map(whole))?;
         }
         let sum = |read: Read| self.frames.iter().map(|m| read(&m.report) as f64).sum::<f64>();
-        let examined = sum(|r| r.examined);
+        let examined = sum(|r| r.work.examined);
         writeln!(
             out,
             "examined are {:.2} % of all pairs, {:.2} for each pair changed",
             100.0 * by(examined, sum(|r| r.pairs.active + r.pairs.refined + r.pairs.culled), 0.0),
-            by(examined, sum(|r| r.changed), 0.0)
+            by(examined, sum(|r| r.work.changed), 0.0)
         )
     }
 
@@ -533,16 +533,14 @@ pub(crate) fn whole(mean: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use relume::session::PairCounts;
+    use relume::session::{PairCounts, Work};
 
     use super::*;
 
     /// Two frames after the first: 10 and 30 ms, against 200 ms from scratch for one of them.
     fn figures() -> Figures {
         let report = |dynamic_links, examined| FrameReport {
-            dynamic_links,
-            examined,
-            changed: 5,
+            work: Work { dynamic_links, examined, changed: 5, ..Work::default() },
             links: 1_000,
             pairs: PairCounts { active: 100, refined: 30, culled: 20 },
             seconds: Seconds { evaluate: 0.1, solve: 0.004, ..<_>::default() },

@@ -74,7 +74,7 @@ impl Told {
             "solve {:>4}  {:>10} links  {:>9} changed  {hash}{verdict}\n",
             self.solves,
             count(report.links),
-            count(report.changed)
+            count(report.work.changed)
         );
         self.solves += 1;
         if !self.quiet && self.failed.is_none() {

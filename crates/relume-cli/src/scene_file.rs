@@ -35,22 +35,8 @@ pub(crate) fn failure(error: SceneError) -> Failure {
         return memory::exceeded(&format!("`{file}`: {what} ({needs})"));
     }
     let text = error.to_string();
-    let remedy = match &error {
-        SceneError::Read { remedy, .. }
-        | SceneError::Format { remedy, .. }
-        | SceneError::Outside { remedy, .. }
-        | SceneError::TooLarge { remedy, .. }
-        | SceneError::View3d { remedy, .. }
-        | SceneError::Mesh { remedy, .. }
-        | SceneError::Extension { remedy, .. }
-        | SceneError::Geometry { remedy, .. }
-        | SceneError::Material { remedy, .. }
-        | SceneError::Hierarchy { remedy, .. }
-        | SceneError::Animation { remedy, .. }
-        | SceneError::Edit { remedy, .. }
-        | SceneError::Empty { remedy, .. } => remedy,
-    };
-    match text.strip_suffix(remedy.as_str()) {
+    let remedy = error.remedy();
+    match text.strip_suffix(remedy) {
         Some(what) if !remedy.is_empty() => {
             Failure::new(what.trim_end_matches([' ', ';', ':'])).help(remedy)
         }

@@ -2,10 +2,10 @@
 //! comparison ask of it. Knows nothing of scenes.
 
 use relume::element::ElementId;
-use relume::flat::{FlatFrame, FlatOptions, FlatSession, FlatSolved};
+use relume::flat::{FlatFrame, FlatOptions, FlatSession, PlaneState};
 use relume::pair::OutOfMemory;
-use relume::session::{FrameReport, Memory, Session, Solution};
-use relume::space::Solved;
+use relume::session::{Elements, Follower, FrameReport, Memory, Session};
+use relume::space::SpaceState;
 
 use crate::args::UpdateChoice;
 use crate::clip::{Clip, step_failure};
@@ -14,11 +14,11 @@ use crate::memory;
 
 /// A session that goes from frame to frame.
 pub(crate) trait Stepping {
-    /// What its frames leave.
-    type Solved: Solution;
+    /// The space that it solves in.
+    type Space: Elements;
 
     /// The last solution, if there is one.
-    fn solved(&self) -> Option<&Self::Solved>;
+    fn solved(&self) -> Option<&Follower<Self::Space>>;
     /// Brings the solution to a time; `frame` labels the report. `beside_bytes` are held by others under
     /// the same limit.
     fn go(&mut self, frame: u32, time_s: f64, beside_bytes: u64) -> Result<FrameReport, Failure>;
@@ -35,14 +35,14 @@ pub(crate) trait Stepping {
 }
 
 /// What a session has solved last.
-pub(crate) fn solved<S: Stepping>(session: &S) -> &S::Solved {
+pub(crate) fn solved<S: Stepping>(session: &S) -> &Follower<S::Space> {
     session.solved().expect("a step leaves a solution")
 }
 
 impl Stepping for Session {
-    type Solved = Solved;
+    type Space = SpaceState;
 
-    fn solved(&self) -> Option<&Solved> {
+    fn solved(&self) -> Option<&Follower<SpaceState>> {
         Session::solved(self)
     }
 
@@ -61,9 +61,9 @@ impl Stepping for Session {
 }
 
 impl Stepping for FlatSession {
-    type Solved = FlatSolved;
+    type Space = PlaneState;
 
-    fn solved(&self) -> Option<&FlatSolved> {
+    fn solved(&self) -> Option<&Follower<PlaneState>> {
         FlatSession::solved(self)
     }
 

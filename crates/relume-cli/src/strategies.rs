@@ -132,11 +132,11 @@ impl<Q: Sequence> Comparison<'_, Q> {
                 cells[at] = Cell {
                     seconds,
                     links_seconds: report.seconds.total - report.seconds.solve,
-                    visited: report.visited,
-                    examined: report.examined,
-                    followed: report.followed,
-                    segments: report.segments,
-                    changed: report.changed,
+                    visited: report.work.visited,
+                    examined: report.work.examined,
+                    followed: report.work.followed,
+                    segments: report.work.segments,
+                    changed: report.work.changed,
                     ..Cell::default()
                 };
                 hashes[at] = report.hash;

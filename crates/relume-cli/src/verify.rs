@@ -98,7 +98,7 @@ fn line(report: &FrameReport, gap: &RadiosityGap) -> String {
         "frame {:>4}  {:>10} links  {:>9} changed  {}  equal, radiosities within {:.1e} of {:.1e} W/m2\n",
         report.frame,
         count(report.links),
-        count(report.changed),
+        count(report.work.changed),
         report.hash,
         gap.difference_w_m2,
         gap.bound_w_m2

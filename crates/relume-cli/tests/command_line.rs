@@ -110,6 +110,7 @@ fn frames_outside_the_animation_are_refused() {
         .fails(1, &["frame 30 is outside the animation, which has frames 0-19 at 24 fps", "help:"]);
 }
 
+// Over 60 lines: one run, looked at from all sides.
 #[test]
 fn solve_prints_a_summary_and_writes_a_report() {
     let (dir, scene) = room();

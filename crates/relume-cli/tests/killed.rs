@@ -121,6 +121,20 @@ struct Tally {
     difference: Difference,
 }
 
+impl Finished {
+    /// Asserts that nothing of these frames is lost or changed.
+    fn is_kept_in(&self, now: &Finished) {
+        for (frame, hash) in &self.hashes {
+            assert_eq!(now.hashes.get(frame), Some(hash), "frame {frame} was finished");
+        }
+        for (frame, picture) in &self.pictures {
+            if self.hashes.contains_key(frame) {
+                assert!(now.pictures[frame] == *picture, "picture {frame} was finished");
+            }
+        }
+    }
+}
+
 /// Kills runs at random times, each time going on in the same folder, and compares with the unbroken
 /// run, until there were `kills`.
 fn kill(task: &Task, kills: usize, seed: u64, tally: &mut Tally) {
@@ -155,14 +169,7 @@ fn kill(task: &Task, kills: usize, seed: u64, tally: &mut Tally) {
             tally.hard += usize::from(hard);
             // Nothing that was finished is lost or changed.
             let now = finished(&out, task.draws());
-            for (frame, hash) in &before.hashes {
-                assert_eq!(now.hashes.get(frame), Some(hash), "frame {frame} was finished");
-            }
-            for (frame, picture) in &before.pictures {
-                if before.hashes.contains_key(frame) {
-                    assert!(now.pictures[frame] == *picture, "picture {frame} was finished");
-                }
-            }
+            before.is_kept_in(&now);
             before = now;
         }
         relume(&task.arguments(&out)).succeeds();

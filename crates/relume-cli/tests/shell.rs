@@ -26,12 +26,17 @@ fn options(text: &str) -> BTreeSet<String> {
     names.filter(|name| name.len() > 2 && !name.starts_with('-')).collect()
 }
 
-#[test]
-fn every_shell_completes_every_command_and_option_of_render() {
-    let help = relume(&["render", "--help"]).succeeds().out;
+/// The long options that the help of a command lists.
+fn options_of(command: &str) -> BTreeSet<String> {
+    let help = relume(&[command, "--help"]).succeeds().out;
     let listed = help.split("Options:").nth(1).unwrap();
     let starts = |line: &&str| line.trim_start().starts_with('-');
-    let wanted = options(&listed.lines().filter(starts).collect::<Vec<_>>().join("\n"));
+    options(&listed.lines().filter(starts).collect::<Vec<_>>().join("\n"))
+}
+
+#[test]
+fn every_shell_completes_every_command_and_option_of_render() {
+    let wanted = options_of("render");
     assert!(wanted.contains("tolerance") && wanted.len() > 20, "{wanted:?}");
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
         let script = relume(&["completions", shell]).succeeds().out;
@@ -57,8 +62,11 @@ fn every_command_has_a_page_with_its_options() {
         let own = page(&format!("relume-{command}.1"));
         assert!(own.contains(&format!("relume-{command}")), "{own}");
         assert!(first.contains(&format!("relume\\-{command}(1)")), "{command}");
+        for option in options_of(&command) {
+            let written = format!("\\-\\-{}", option.replace('-', "\\-"));
+            assert!(own.contains(&written), "{command}: --{option}");
+        }
     }
-    assert!(page("relume-render.1").contains("\\-\\-tolerance"));
     assert!(page("relume-flat-figure.1").contains("figure"));
     // A file in the place of the directory.
     let file = folder.path().join("file");

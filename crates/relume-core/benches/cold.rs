@@ -71,7 +71,7 @@ fn run(name: &str, scene: &Arc<Scene>, options: &Options, threads: usize) {
         r.pairs.active + r.pairs.refined + r.pairs.culled,
         r.leaves,
         r.links as f64 / seconds,
-        r.segments,
+        r.work.segments,
         share(r.seconds.evaluate),
         share(r.seconds.solve),
         bytes as f64 / r.links as f64,

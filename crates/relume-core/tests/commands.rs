@@ -252,13 +252,13 @@ fn a_light_moves_with_the_body_it_hangs_on() {
 fn a_move_by_hand_costs_as_a_move_of_the_clip() {
     let mut session = Session::new(room(), at_tolerance(0.2)).unwrap();
     start(&mut session);
-    let all = session.solve().unwrap().report().examined;
+    let all = session.solve().unwrap().report().work.examined;
     session.apply(Command::set_pose(BodyId(3), Pose::translation([0.5, -0.3, 0.02]))).unwrap();
     let report = session.solve().unwrap().report().clone();
     assert_eq!(report.moved, ["two"]);
-    assert!(report.examined < all / 3, "{} of {all} pairs", report.examined);
+    assert!(report.work.examined < all / 3, "{} of {all} pairs", report.work.examined);
     let still = session.solve().unwrap().report().clone();
-    assert_eq!((still.examined, still.gathers), (0, 0));
+    assert_eq!((still.work.examined, still.gathers), (0, 0));
 }
 
 #[test]
@@ -494,7 +494,8 @@ fn hall(boxes: u32) -> Scene {
 fn cost(session: &mut Session, what: &str) -> u64 {
     let start = Instant::now();
     let report = session.solve().unwrap().report().clone();
-    let (pairs, all) = (report.examined + report.coarse_examined, start.elapsed().as_secs_f64());
+    let (pairs, all) =
+        (report.work.examined + report.work.coarse_examined, start.elapsed().as_secs_f64());
     let (links, of_pairs) = (report.links, report.seconds.evaluate);
     println!("{what}: {pairs} pairs looked at, {of_pairs:.2} s; {all:.2} s in all, {links} links");
     pairs
@@ -559,12 +560,12 @@ fn a_body_of_many_patches_is_taken_up_where_it_rests() {
     let scene = b.build().unwrap();
     let mut session = Session::new(scene, at_tolerance(0.3)).unwrap();
     let first = session.solve().unwrap();
-    let (all, hash) = (first.report().examined, first.hash());
+    let (all, hash) = (first.report().work.examined, first.hash());
     assert!(first.report().link_kinds.is_some(), "there are groups");
     let undo = Command::set_pose(bodies[2], Pose::translation([0.02, 0.01, 0.0]));
     let undo = session.apply(undo).unwrap();
     check(&mut session, "taken up");
-    let taken = session.frame().unwrap().report().examined;
+    let taken = session.frame().unwrap().report().work.examined;
     let (points, faces) = ball(v(0.0, -0.5, 0.3), 0.1);
     let new = NewBody::new("new").with_mesh("new", MaterialId(0), &points, &faces);
     let out = session.apply(Command::Insert(new)).unwrap();

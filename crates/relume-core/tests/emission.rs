@@ -88,10 +88,10 @@ fn what_does_not_change_costs_nothing_and_what_does_moves_no_link() {
     session.step(0, 0.0).unwrap();
     let brighter = session.step(1, 1.0).unwrap();
     // Form factors do not depend on the light.
-    assert_eq!((brighter.examined, brighter.changed), (0, 0));
+    assert_eq!((brighter.work.examined, brighter.work.changed), (0, 0));
     assert!(brighter.gathers > 0);
     let same = session.step(2, 1.5).unwrap();
-    assert_eq!((same.visited, same.gathers, &same.hash), (0, 0, &brighter.hash));
+    assert_eq!((same.work.visited, same.gathers, &same.hash), (0, 0, &brighter.hash));
     assert!(session.step(3, 2.5).unwrap().gathers > 0);
 }
 
@@ -186,7 +186,11 @@ fn a_lamp_that_brightens_is_no_reason_to_build_extrapolated_links_anew() {
     for frame in 1..5 {
         let report = session.step(frame, 0.5 + 0.5 * f64::from(frame)).unwrap();
         let pairs = report.pairs.active + report.pairs.refined;
-        assert!(report.examined < pairs / 4, "frame {frame}: {} of {pairs}", report.examined);
+        assert!(
+            report.work.examined < pairs / 4,
+            "frame {frame}: {} of {pairs}",
+            report.work.examined
+        );
     }
 }
 

@@ -72,7 +72,7 @@ fn after_any_motion_links_of_groups_equal_those_of_a_cold_build() {
     for (k, time_s) in [0.0, 0.04, 0.08, 0.5, 0.46, 0.04, 0.0].into_iter().enumerate() {
         let report = warm.step(k as u32, time_s).unwrap();
         let kinds = report.link_kinds.expect("there are groups");
-        println!("{time_s}: {} links, {kinds:?}, {} examined", report.links, report.examined);
+        println!("{time_s}: {} links, {kinds:?}, {} examined", report.links, report.work.examined);
         assert!(kinds.group_element > 100 && kinds.group_group > 20, "{kinds:?}");
         assert_eq!(
             kinds.element_element + kinds.group_element + kinds.group_group,

@@ -144,7 +144,7 @@ fn extrapolated_links_are_evaluated_on_the_way_back() {
     for frame in 0..6 {
         session.solve_at(f64::from(frame) / 24.0).unwrap();
     }
-    assert!(session.frame().unwrap().report().extrapolated > 0);
+    assert!(session.frame().unwrap().report().work.extrapolated > 0);
     session.watch().cancel();
     assert!(session.solve_at(6.0 / 24.0).is_err());
     let mut cold = Session::new(scene, options).unwrap();

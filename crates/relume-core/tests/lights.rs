@@ -127,7 +127,7 @@ fn irradiance_on_a_plane_follows_the_closed_form() {
         println!("{name}: mesh {off:.1e} RMS of the mean irradiance, {} links", report.links);
         assert!(off < 0.02, "{name}: {off}");
         // No shaft is blocked and nothing else is lit.
-        assert_eq!(report.segments, 0, "{name}");
+        assert_eq!(report.work.segments, 0, "{name}");
     }
 }
 

@@ -59,9 +59,18 @@ fn certificates_miss_nothing_and_spare_work() {
                 Missed::default(),
                 "{name}, frame {frame}"
             );
-            assert_eq!((one.changed, one.segments), (two.changed, two.segments));
-            assert_eq!(two.followed + two.certified + two.extrapolated, 0);
-            [one.examined, two.examined, one.followed, one.certified, one.changed]
+            assert_eq!(
+                (one.work.changed, one.work.segments),
+                (two.work.changed, two.work.segments)
+            );
+            assert_eq!(two.work.followed + two.work.certified + two.work.extrapolated, 0);
+            [
+                one.work.examined,
+                two.work.examined,
+                one.work.followed,
+                one.work.certified,
+                one.work.changed,
+            ]
         });
         let sum = |k: usize| seen.iter().map(|s| s[k]).sum::<u64>();
         println!(
@@ -81,7 +90,7 @@ fn extrapolation_of_one_frame_loses_nothing() {
     let options = form_factor_oracle(0.05, 1e-3);
     let one = Update::Extrapolate { frames: 1, error: None };
     follow(&options, [one, Update::Reinspect], 20, |frame, [(one, _), (two, _)]| {
-        assert_eq!(one.extrapolated, 0);
+        assert_eq!(one.work.extrapolated, 0);
         assert_eq!(one.hash, two.hash, "frame {frame}");
     });
 }
@@ -92,7 +101,7 @@ fn extrapolation_spares_work_and_says_what_it_loses() {
         let seen = follow(&options, [SEVEN, Update::Reinspect], 47, |_, [(one, a), (two, b)]| {
             let error = radiosity_error(a.solved().unwrap(), b.solved().unwrap());
             assert!(error.max >= error.rms);
-            (one.examined, two.examined, one.extrapolated, error.rms)
+            (one.work.examined, two.work.examined, one.work.extrapolated, error.rms)
         });
         let judged = seen.iter().map(|s| s.0).sum::<u64>();
         let reinspected = seen.iter().map(|s| s.1).sum::<u64>();
@@ -110,7 +119,7 @@ fn a_smaller_error_asked_for_is_a_smaller_error() {
     let found = [0.1, 0.003].map(|error| {
         let update = Update::Extrapolate { frames: 64, error: Some(error) };
         let seen = follow(&options, [update, Update::Reinspect], 40, |_, [(one, a), (_, b)]| {
-            (one.examined, radiosity_error(a.solved().unwrap(), b.solved().unwrap()).rms)
+            (one.work.examined, radiosity_error(a.solved().unwrap(), b.solved().unwrap()).rms)
         });
         let judged = seen.iter().map(|s| s.0).sum::<u64>();
         (judged, seen.iter().map(|s| s.1).fold(0.0, f64::max))
@@ -127,8 +136,8 @@ fn once_all_is_at_rest_nothing_is_lost() {
         (
             one.hash == two.hash,
             missed(a.solved().unwrap(), b.solved().unwrap()),
-            one.extrapolated,
-            one.examined,
+            one.work.extrapolated,
+            one.work.examined,
         )
     });
     assert!(!last[30].0, "the test means nothing if nothing is extrapolated");
@@ -169,10 +178,14 @@ fn events_are_those_that_are_counted() {
             let count = |kinds: &[EventKind]| {
                 events.iter().filter(|e| kinds.contains(&e.kind)).count() as u64
             };
-            assert_eq!(count(&[EventKind::Promoted]), report.promoted, "{name}, frame {frame}");
-            assert_eq!(count(&[EventKind::Demoted]), report.demoted, "{name}, frame {frame}");
+            assert_eq!(
+                count(&[EventKind::Promoted]),
+                report.work.promoted,
+                "{name}, frame {frame}"
+            );
+            assert_eq!(count(&[EventKind::Demoted]), report.work.demoted, "{name}, frame {frame}");
             let occluded = count(&[EventKind::Occluded, EventKind::Revealed]);
-            assert_eq!(occluded, report.occlusion_changed, "{name}, frame {frame}");
+            assert_eq!(occluded, report.work.occlusion_changed, "{name}, frame {frame}");
             for event in &events {
                 let linked = (event.before.is_some(), event.after.is_some());
                 assert_eq!(
@@ -280,7 +293,7 @@ fn a_scene_that_grows_forgets_no_extrapolated_link() {
         let mut last = String::new();
         for frame in 0..110 {
             let report = warm.step(frame, f64::from(frame) * STEP_S).unwrap();
-            judged += report.extrapolated;
+            judged += report.work.extrapolated;
             last = report.hash;
         }
         let mut cold = session(&scene, &options, Update::Scratch);

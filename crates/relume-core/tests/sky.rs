@@ -390,7 +390,7 @@ fn a_day_with_blinds_before_the_window_equals_cold_builds() {
                 let two = cold.step(k as u32, time).unwrap();
                 println!(
                     "{time}: {} links, {} examined, {:.3} s of {:.3}",
-                    one.links, one.examined, one.seconds.total, two.seconds.total
+                    one.links, one.work.examined, one.seconds.total, two.seconds.total
                 );
                 let differ = || common::pairs::first_differences(&warm, &cold);
                 assert!(one.hash == two.hash, "at {time}: {}", differ());

@@ -36,21 +36,22 @@ fn moved(scene: &Arc<Scene>, options: &Options, [from, to]: [f64; 2]) -> (FrameR
 fn counts_exactly(name: &str, report: &FrameReport, found: &Difference) {
     println!(
         "{name}: visited {} examined {} (moved {}, occlusion {}, brightness {}) changed {} of {} pairs; {found:?}",
-        report.visited,
-        report.examined,
-        report.reevaluated,
-        report.visibility_only,
-        report.brightness_only,
-        report.changed,
+        report.work.visited,
+        report.work.examined,
+        report.work.reevaluated,
+        report.work.visibility_only,
+        report.work.brightness_only,
+        report.work.changed,
         report.pairs.active + report.pairs.refined + report.pairs.culled,
     );
-    assert_eq!(report.changed, found.other + found.new, "{name}: changed");
-    assert_eq!(report.promoted, found.promoted, "{name}: promoted");
-    assert_eq!(report.demoted, found.demoted, "{name}: demoted");
-    assert_eq!(report.occlusion_changed, found.occluded, "{name}: occluded");
-    assert!(report.examined <= report.visited, "{name}");
-    let reasons = report.reevaluated + report.visibility_only + report.brightness_only;
-    assert_eq!(report.examined, reasons, "{name}: every look has a reason");
+    assert_eq!(report.work.changed, found.other + found.new, "{name}: changed");
+    assert_eq!(report.work.promoted, found.promoted, "{name}: promoted");
+    assert_eq!(report.work.demoted, found.demoted, "{name}: demoted");
+    assert_eq!(report.work.occlusion_changed, found.occluded, "{name}: occluded");
+    assert!(report.work.examined <= report.work.visited, "{name}");
+    let reasons =
+        report.work.reevaluated + report.work.visibility_only + report.work.brightness_only;
+    assert_eq!(report.work.examined, reasons, "{name}: every look has a reason");
 }
 
 fn both_oracles() -> [(&'static str, Options); 2] {
@@ -89,13 +90,13 @@ fn a_body_that_rests_costs_nothing() {
         for time_s in [1.0, 1.5, 90.0] {
             let report = session.step(2, time_s).unwrap();
             let work = [
-                report.visited,
-                report.examined,
-                report.changed,
-                report.segments,
+                report.work.visited,
+                report.work.examined,
+                report.work.changed,
+                report.work.segments,
                 report.gathers,
                 u64::from(report.sweeps),
-                report.elements_made + report.elements_reaped,
+                report.work.elements_made + report.elements_reaped,
             ];
             assert_eq!(work, [0; 7], "{name} at {time_s}");
             assert_eq!((&report.hash, report.links), (&before.hash, before.links), "{name}");
@@ -167,7 +168,7 @@ fn a_box_behind_a_pillar_is_not_news_to_the_lamp() {
         let (report, found) = moved(&scene, &options, [0.0, 1.0]);
         counts_exactly(&format!("behind a pillar, {name}"), &report, &found);
         let all = report.pairs.active + report.pairs.refined + report.pairs.culled;
-        assert!(report.examined < all / 2, "{name}: {} of {all}", report.examined);
+        assert!(report.work.examined < all / 2, "{name}: {} of {all}", report.work.examined);
     }
 }
 
@@ -202,7 +203,7 @@ fn a_second_room_is_left_alone() {
     };
     let inner = tree.links().filter(|l| is_far(l.a) && is_far(l.b)).count() as u64;
     let across = tree.links().filter(|l| is_far(l.a) != is_far(l.b)).count() as u64;
-    let extra = both.0.examined - alone.0.examined;
+    let extra = both.0.work.examined - alone.0.work.examined;
     println!("far room: {inner} links within, {across} into it, {extra} pairs more examined");
     assert!(inner > 20 * across, "the far room is not the larger part: {inner} {across}");
     // Those across are the slider's own, and what the hall sees of the far room past the slider.
@@ -243,7 +244,7 @@ fn comes_and_goes(scene: &Arc<Scene>) {
         let report = session.step(2, 2.0).unwrap();
         let after = pairs_of(&session);
         let hidden = changed_elsewhere(&session, "slider", [&empty, &there]);
-        println!("{name}: {hidden} pairs felt it, {} changed as it left", report.changed);
+        println!("{name}: {hidden} pairs felt it, {} changed as it left", report.work.changed);
         assert!(hidden > 20, "{name}: it blocks nothing");
         assert_eq!(changed_elsewhere(&session, "slider", [&empty, &after]), 0, "{name}");
         let slider = scene.bodies.iter().position(|b| b.name == "slider").unwrap();
@@ -264,7 +265,11 @@ fn a_small_box_in_a_corner_concerns_few_pairs() {
         let (report, found) = moved(&with_second_room(false), &options, [0.0, 1.0]);
         counts_exactly(&format!("small box, {name}"), &report, &found);
         let all = report.pairs.active + report.pairs.refined + report.pairs.culled;
-        assert!(report.examined * 3 < all, "{name}: {} of {all} examined", report.examined);
+        assert!(
+            report.work.examined * 3 < all,
+            "{name}: {} of {all} examined",
+            report.work.examined
+        );
     }
 }
 
@@ -289,6 +294,10 @@ fn a_light_that_moves_concerns_its_own_pairs() {
         })
         .count() as u64;
     // A light blocks nothing: pairs of surfaces feel nothing of it.
-    assert!(report.examined <= lit + 3, "{} examined, {lit} of the light", report.examined);
-    assert_eq!(report.visibility_only, 0);
+    assert!(
+        report.work.examined <= lit + 3,
+        "{} examined, {lit} of the light",
+        report.work.examined
+    );
+    assert_eq!(report.work.visibility_only, 0);
 }

@@ -14,8 +14,10 @@ mod gltf;
 mod import;
 mod log;
 mod mesh_file;
+mod options;
 mod view3d;
 
 pub use environment::read_environment;
-pub use import::{ImportOptions, import};
+pub use import::import;
 pub use log::{Log, LogError};
+pub use options::ImportOptions;

@@ -233,7 +233,8 @@ impl Entry {
             }
             Command::Insert(new) => Entry::Insert(new.clone()),
             Command::Remove(id) => Entry::Remove { body: body(id).unwrap_or_default() },
-            // What puts back, and commands that are newer than this page.
+            Command::PutBack(_) => return None,
+            // None: a test of the face holds that every command stands above.
             _ => return None,
         })
     }

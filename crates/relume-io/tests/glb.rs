@@ -12,6 +12,7 @@ use serde_json::Value;
 
 /// A bit of everything: nested nodes, two materials on one object, weak and strong emission, motion
 /// of several interpolations, a body that comes and goes, cameras and lights.
+// Over 60 lines: one scene with a bit of everything.
 fn everything() -> Scene {
     let mut b = SceneBuilder::new("everything");
     let grey = b.material("grey", [0.5, 0.25, 0.125], [0.0; 3]);

@@ -47,14 +47,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let first = frame.hash();
     println!(
         "from scratch: {} pairs judged, {} links",
-        frame.report().examined,
+        frame.report().work.examined,
         frame.report().links
     );
 
     let undo = session.apply(Command::set_pose(ball, Pose::translation([0.1, 0.0, 0.0])))?;
     let frame = session.solve()?;
     let lit = frame.irradiance_at([0.0, -1.0, 0.0], [0.0, 1.0, 0.0]);
-    println!("moved: {} pairs judged, {lit:.4?} W/m2 on the floor", frame.report().examined);
+    println!("moved: {} pairs judged, {lit:.4?} W/m2 on the floor", frame.report().work.examined);
 
     session.apply(undo)?;
     let frame = session.solve()?;

@@ -69,7 +69,12 @@ pub use relume_io::export;
 
 /// The plane: scenes that do not change along one direction, with that direction integrated out.
 pub mod flat {
-    pub use relume_core::flat::*;
+    pub use relume_core::flat::{
+        Body, BodyIndex, FlatElement, FlatFrame, FlatLink, FlatOptions, FlatScene, FlatSession,
+        Key, Material, Motion, OptionError, PlanePose, SceneError, Segment, Wall, WallIndex,
+    };
+    #[doc(hidden)]
+    pub use relume_core::flat::{FlatForest, FlatSolved, PlaneState, PlaneView, Shaft};
     pub use relume_io::flat::{SvgError, TextError, parse, parse_svg};
 }
 
@@ -89,6 +94,6 @@ pub use relume_core::scene::{
 pub use relume_core::session::{
     Accuracy, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Frame,
     FrameReport, Grouping, Hash, Leaf, Memory, Mesh, Open, Options, Oracle, PairCounts, Removed,
-    RowSumError, Seconds, Sensor, Session, SessionError, Snapshot, Update, Watch,
+    RowSumError, Seconds, Sensor, Session, SessionError, Snapshot, Update, Watch, Work,
 };
 pub use relume_io::{ImportOptions, Log, LogError, import, read_environment};

@@ -38,7 +38,7 @@ const CRATES: [(&str, &str); 5] = [
 const JUDGE: (&str, &str) = ("relume-judge", "relume_judge");
 
 /// Text without comments, with line breaks kept so that lines can be counted.
-fn without_comments(text: &str) -> String {
+pub(crate) fn without_comments(text: &str) -> String {
     text.lines()
         .map(|line| line.split_once("//").map_or(line, |(code, _)| code))
         .collect::<Vec<_>>()
@@ -115,7 +115,7 @@ fn violations(room: &str, file: &str, text: &str) -> Vec<String> {
 }
 
 /// All `.rs` files below `dir`, in name order.
-fn sources(dir: &Path) -> Vec<PathBuf> {
+pub(crate) fn sources(dir: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut entries: Vec<PathBuf> =
         fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path()).collect();
@@ -130,7 +130,7 @@ fn sources(dir: &Path) -> Vec<PathBuf> {
     found
 }
 
-fn crates_dir() -> PathBuf {
+pub(crate) fn crates_dir() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
 }
 
@@ -228,6 +228,51 @@ fn the_engine_knows_no_files() {
 fn crates_that_compute_ban_the_same_calls() {
     let bans = |dir: &str| fs::read_to_string(crates_dir().join(dir).join("clippy.toml")).unwrap();
     assert_eq!(bans("relume-core"), bans("relume-io"));
+}
+
+/// The variants of a public enum in a source text.
+fn variants(text: &str, name: &str) -> Vec<String> {
+    let code = without_comments(text);
+    let body = code.split_once(&format!("pub enum {name} {{\n")).map_or("", |(_, rest)| rest);
+    let body = body.split("\n}").next().unwrap_or("");
+    let of_line = |line: &str| {
+        let line = line.strip_prefix("    ").filter(|rest| rest.starts_with(char::is_uppercase))?;
+        Some(line.chars().take_while(|c| c.is_alphanumeric()).collect())
+    };
+    body.lines().filter_map(of_line).collect()
+}
+
+/// Outside of the engine no match over commands is exhaustive, so that the build does not say which one a log leaves out.
+#[test]
+fn a_log_knows_every_command() {
+    let read = |file: &str| fs::read_to_string(crates_dir().join(file)).unwrap();
+    let commands = variants(&read("relume-core/src/session/command.rs"), "Command");
+    assert!(commands.len() >= 9 && commands.contains(&"PutBack".to_owned()), "{commands:?}");
+    let log = without_comments(&read("relume-io/src/log.rs"));
+    let written = log.split_once("fn of(").unwrap().1;
+    let written = written.split("fn command(").next().unwrap();
+    for command in commands {
+        assert!(written.contains(&format!("Command::{command}(")), "a log leaves out {command}");
+    }
+}
+
+/// A filter that fits no test passes without a word.
+#[test]
+fn the_fast_tier_names_modules_that_are_there() {
+    let script = fs::read_to_string(crates_dir().join("../.ci/fast")).unwrap();
+    let files: Vec<PathBuf> = sources(&crates_dir());
+    for list in ["engine", "others"] {
+        let names = script.split_once(&format!("\n{list}=(")).unwrap().1.split(')').next().unwrap();
+        assert!(names.split_whitespace().count() >= 3, "{list}: {names}");
+        for name in names.split_whitespace() {
+            let is_it = |file: &PathBuf| {
+                let of_tests = file.iter().any(|part| part == "tests");
+                let module = file.with_extension("");
+                of_tests && (module.ends_with(name) || module.ends_with(format!("{name}/mod")))
+            };
+            assert!(files.iter().any(is_it), ".ci/fast: there are no tests `{name}`");
+        }
+    }
 }
 
 /// The entries of one table of a manifest.

@@ -198,8 +198,8 @@ fn gutter_in_motion(dir: &Path) -> Result<Vec<String>, Failure> {
         let mut sheet = gutter_at(solved(&session), 300.0);
         sheet.events(solved(&session));
         let kinds = [
-            (relume::pair::EventKind::Demoted, "demoted", report.demoted),
-            (relume::pair::EventKind::Promoted, "promoted", report.promoted),
+            (relume::pair::EventKind::Demoted, "demoted", report.work.demoted),
+            (relume::pair::EventKind::Promoted, "promoted", report.work.promoted),
             (relume::pair::EventKind::Occluded, "occluded", count(solved(&session), "o")),
             (relume::pair::EventKind::Revealed, "revealed", count(solved(&session), "r")),
         ];

@@ -230,12 +230,12 @@ fn lines(reports: &[FrameReport]) -> String {
             r.frame,
             r.links,
             r.elements,
-            r.examined,
-            r.followed,
-            r.extrapolated,
-            r.demoted,
-            r.promoted,
-            r.occlusion_changed,
+            r.work.examined,
+            r.work.followed,
+            r.work.extrapolated,
+            r.work.demoted,
+            r.work.promoted,
+            r.work.occlusion_changed,
             &r.hash[..8]
         );
     }

@@ -1,7 +1,7 @@
 //! The command in a process of its own, with limits, and what is wrong with how it ended.
 
 use std::io::Read;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 /// What a run may take.
@@ -39,20 +39,7 @@ pub(crate) fn run(arguments: &[String], limits: &Limits) -> Result<i32, Find> {
         })
     };
     let (out, err) = (read(Box::new(out)), read(Box::new(err)));
-    let started = Instant::now();
-    let mut pause = Duration::from_micros(500);
-    let status = loop {
-        if let Some(status) = child.try_wait().unwrap() {
-            break Some(status);
-        }
-        if started.elapsed() > limits.seconds {
-            let _ = child.kill();
-            let _ = child.wait();
-            break None;
-        }
-        std::thread::sleep(pause);
-        pause = (pause * 2).min(Duration::from_millis(20));
-    };
+    let status = ended(&mut child, limits);
     let (out, err) = (out.join().unwrap(), err.join().unwrap());
     let said =
         || err.lines().find(|l| !l.trim().is_empty()).unwrap_or("").chars().take(300).collect();
@@ -86,6 +73,24 @@ pub(crate) fn run(arguments: &[String], limits: &Limits) -> Result<i32, Find> {
             said: line.chars().take(200).collect(),
         }),
         _ => Ok(code),
+    }
+}
+
+/// The status of a child once it ended; `None` if it took too long and was killed.
+fn ended(child: &mut Child, limits: &Limits) -> Option<ExitStatus> {
+    let started = Instant::now();
+    let mut pause = Duration::from_micros(500);
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return Some(status);
+        }
+        if started.elapsed() > limits.seconds {
+            let _ = child.kill();
+            let _ = child.wait();
+            return None;
+        }
+        std::thread::sleep(pause);
+        pause = (pause * 2).min(Duration::from_millis(20));
     }
 }
 

@@ -7,11 +7,13 @@ mod clusters;
 mod exposed;
 mod forest;
 mod groups;
+mod ids;
 mod split;
 mod tuning;
 mod world;
 
-pub use forest::{Counts, ElementId, ElementKey, Forest, Kind, Renumbering, old_coarse_numbers};
+pub use forest::{Counts, Forest, old_coarse_numbers};
 pub use groups::{Group, GroupLeaf, Groups, grouped_patches};
+pub use ids::{ElementId, ElementKey, Kind, Renumbering};
 pub use split::{Extent, Shape, bilinear, bilinear_area};
 pub use world::{OccluderPolygon, WorldElement, WorldLight, WorldPatch, WorldView};

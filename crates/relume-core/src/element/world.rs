@@ -2,7 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::forest::{ElementId, Forest, Kind};
+use super::forest::Forest;
+use super::ids::{ElementId, Kind};
 use super::split::{Shape, bilinear};
 use crate::geometry::{Aabb, Plane, Pose};
 use crate::scene::{BodyId, Frame, Light, LightId, LightKind, PatchId, Scene, World};

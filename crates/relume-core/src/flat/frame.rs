@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::element::{ElementId, ElementKey};
 use crate::follow::{Follower, FrameReport};
 use crate::pair::{Carried, Link, LinkEvent, PairTree};
-use crate::read::{ElementName, Event, Solution, with_names};
+use crate::read::{ElementName, Elements, Event, with_names};
 
 use super::forest::FlatForest;
 use super::plane::Segment;
@@ -126,57 +126,45 @@ impl PlaneState {
     }
 }
 
-impl Solution for FlatSolved {
-    fn tree(&self) -> &PairTree {
-        &self.tree
-    }
-
-    fn report(&self) -> &FrameReport {
-        &self.report
-    }
-
+impl Elements for PlaneState {
     fn facets(&self) -> &[ElementId] {
-        self.space.forest.facets()
+        self.forest.facets()
     }
 
     fn id_limit(&self) -> u32 {
-        self.space.forest.len() as u32
+        self.forest.len() as u32
     }
 
     fn is_element(&self, id: ElementId) -> bool {
-        self.space.forest.is_element(id)
+        self.forest.is_element(id)
     }
 
     fn children(&self, id: ElementId) -> Range<u32> {
-        self.space.forest.children(id)
+        self.forest.children(id)
     }
 
     fn key(&self, id: ElementId) -> ElementKey {
-        self.space.forest.key(id)
+        self.forest.key(id)
     }
 
     fn name_of(&self, key: ElementKey) -> ElementName {
-        self.space.facet_name(ElementId(key.facet)).at(key.path)
+        self.facet_name(ElementId(key.facet)).at(key.path)
     }
 
     fn area_m2(&self, id: ElementId) -> f64 {
-        self.space.forest.length(id)
+        self.forest.length(id)
     }
 
     fn is_present(&self, _: ElementId) -> bool {
         true
     }
 
-    fn radiosity(&self, id: ElementId) -> [f32; 3] {
-        self.radiosity.radiosity(id.0)
-    }
-
     fn reflectance_max(&self) -> f64 {
-        self.space.scene.walls().iter().flat_map(|w| w.material.reflectance).fold(0.0, f64::max)
+        self.scene.walls().iter().flat_map(|w| w.material.reflectance).fold(0.0, f64::max)
     }
 
-    fn is_of_the_scene_of(&self, other: &FlatSolved) -> bool {
-        self.space.forest.facets() == other.space.forest.facets()
-            && self.space.scene.walls().len() == other.space.scene.walls().len()
+    fn is_of_the_scene_of(&self, other: &PlaneState) -> bool {
+        self.forest.facets() == other.forest.facets()
+            && self.scene.walls().len() == other.scene.walls().len()
     }
 }

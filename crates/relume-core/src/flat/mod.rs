@@ -30,6 +30,6 @@ pub use plane::{PlanePose, Segment};
 pub use scene::{Body, BodyIndex, FlatScene, Key, Material, Motion, SceneError, Wall, WallIndex};
 pub use session::FlatSession;
 #[doc(hidden)]
-pub use state::FlatSolved;
+pub use state::{FlatSolved, PlaneState};
 pub use strings::{Shaft, exchange, visible_exchange};
 pub use view::PlaneView;

@@ -112,7 +112,7 @@ impl FlatSession {
     }
 
     /// Says at which time the frame before the next step was, where that is not the last step:
-    /// [`FrameReport::dynamic_links`] of a cold build count from there. Nothing else depends on it.
+    /// [`Work::dynamic_links`](crate::pair::Work::dynamic_links) of a cold build count from there. Nothing else depends on it.
     pub fn count_motion_from(&mut self, time_s: Option<f64>) {
         self.count_motion_from = time_s;
     }

@@ -250,7 +250,7 @@ impl<S: Space> Follower<S> {
         let remade = self.space.remade(step.was, &self.tree);
         changes.edits.extend(remade.into_iter().map(Edit::Set));
         self.events = std::mem::take(&mut changes.events);
-        report.count(&changes.work);
+        report.work = changes.work;
         let mut dirty = self.edit_links(step, &changes.edits, report);
         let apart = (!step.is_cold).then_some(changes.apart);
         self.space.place_groups(step.goal, step.was, &self.tree, apart);
@@ -354,7 +354,7 @@ impl<S: Space> Follower<S> {
             report.suspects = suspects;
         }
         if step.is_cold {
-            report.dynamic_links = self.space.dynamic_links(step.goal, &self.tree);
+            report.work.dynamic_links = self.space.dynamic_links(step.goal, &self.tree);
         }
     }
 

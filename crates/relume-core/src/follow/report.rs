@@ -19,45 +19,14 @@ pub struct FrameReport {
     pub leaves: u64,
     /// Active pairs: links, each used in both directions.
     pub links: u64,
-    /// Links with an end that moved against the other.
-    pub dynamic_links: u64,
     /// Nodes of the pair tree by state.
     pub pairs: PairCounts,
     /// Links by what they end on; absent where no group of patches is an end.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link_kinds: Option<LinkKinds>,
-    /// Pairs met on the walk through the pair tree: those examined, and those next to them that
-    /// turned out to be unaffected.
-    pub visited: u64,
-    /// Pairs judged, each counted once.
-    pub examined: u64,
-    /// Pairs with moved ends of which the exchange area alone was evaluated: by certificate nothing
-    /// stands between their ends.
-    pub followed: u64,
-    /// Links of which exchange area and visibility were extrapolated.
-    pub extrapolated: u64,
-    /// Pairs passed over, with all below them, because their certificate stands.
-    pub certified: u64,
-    /// Pairs judged for the coarse solution, beforehand: all of them are visited again.
-    pub coarse_examined: u64,
-    /// Examined pairs that were judged because an end moved against the other, or for the first time.
-    pub reevaluated: u64,
-    /// Examined pairs of which only the visibility may have changed.
-    pub visibility_only: u64,
-    /// Examined pairs of which only the brightness of their ends may have changed.
-    pub brightness_only: u64,
-    /// Pairs of which the state, or what they carry as a link, differs from before.
-    pub changed: u64,
-    /// Refined pairs that became links.
-    pub promoted: u64,
-    /// Links that were refined.
-    pub demoted: u64,
-    /// Links whose visibility changed.
-    pub occlusion_changed: u64,
-    /// Visibility segments traced.
-    pub segments: u64,
-    /// Elements made.
-    pub elements_made: u64,
+    /// Exact counts of what was evaluated and edited; in JSON its fields stand among the others.
+    #[serde(flatten)]
+    pub work: Work,
     /// Elements reaped.
     pub elements_reaped: u64,
     /// Gather sweeps of the solver.
@@ -185,26 +154,6 @@ pub struct Seconds {
 }
 
 impl FrameReport {
-    /// Takes over the counts of an update.
-    pub(super) fn count(&mut self, work: &Work) {
-        self.visited = work.visited;
-        self.examined = work.examined;
-        self.followed = work.followed;
-        self.certified = work.certified;
-        self.extrapolated = work.extrapolated;
-        self.coarse_examined = work.coarse_examined;
-        self.reevaluated = work.reevaluated;
-        self.visibility_only = work.visibility_only;
-        self.brightness_only = work.brightness_only;
-        self.changed = work.changed;
-        self.promoted = work.promoted;
-        self.demoted = work.demoted;
-        self.occlusion_changed = work.occlusion_changed;
-        self.dynamic_links = work.dynamic_links;
-        self.segments = work.segments;
-        self.elements_made = work.elements_made;
-    }
-
     /// The report of a frame in which nothing changed: the state as it was, and no work.
     pub(super) fn of_a_still_frame(&self, label: FrameReport) -> FrameReport {
         FrameReport {

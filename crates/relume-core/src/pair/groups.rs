@@ -12,7 +12,7 @@ use super::margin::{Margin, SideMargin};
 use super::oracle::Oracle;
 use super::tree::{Carried, CullReason, Gradients, in_steps};
 use super::tuning::{APART, MISSED, PLACE, SHARED, SHARED_BY_FACETS, TURNED};
-use super::update::{Judgement, Verdict};
+use super::verdict::{Judgement, Verdict};
 use crate::transport::Side;
 
 /// Exchange of a pair with a group, without occlusion.

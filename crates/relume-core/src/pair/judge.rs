@@ -22,12 +22,13 @@ use super::ends::{BoxShaft, LightPlace, body_of};
 use super::hash::pair_key;
 use super::margin::{Margin, SideMargin};
 use super::oracle::{End, Estimate, Oracle, estimate};
+use super::space::{Hierarchy, Judge};
 use super::tree::{Carried, CullReason, Gradients, in_steps};
 use super::tuning::{
     CLIPPED_MAX_CLOSE, CLIPPED_MAX_REST, CLOSE_SHARE, CLOSER, CONNECTED_SHARE, EFFORT, FINEST,
     OVERLOOKED_MAX, SAMPLED_MAX, SPOT_AROUND,
 };
-use super::update::{Hierarchy, Judge, Judgement, Stale, Verdict};
+use super::verdict::{Judgement, Stale, Verdict};
 use super::world_change::WorldChange;
 use crate::transport::Side;
 

@@ -8,16 +8,22 @@
 mod brightness;
 mod certificate;
 mod certificate_tests;
+mod changes;
 mod coarse_brightness;
+mod editor;
 mod ends;
+mod evaluate;
 mod groups;
 mod hash;
 mod judge;
 mod margin;
 mod oracle;
+mod space;
 mod tree;
 mod tuning;
 mod update;
+mod verdict;
+mod wave;
 mod world_change;
 
 pub use crate::transport::Side;
@@ -35,7 +41,7 @@ pub use world_change::WorldChange;
 // The plane has certificates of its own.
 pub(crate) use certificate_tests::{CertificateTests, Moves};
 
-pub use update::{
-    Changes, CoarseLink, Edit, EventKind, Hierarchy, Judge, Judgement, LinkEvent, OutOfMemory,
-    Pairs, Record, Scope, Stale, Verdict, Work, update,
-};
+pub use changes::{Changes, CoarseLink, Edit, EventKind, LinkEvent, Record, Work};
+pub use space::{Hierarchy, Judge};
+pub use update::{OutOfMemory, Pairs, Scope, update};
+pub use verdict::{Judgement, Stale, Verdict};

@@ -6,7 +6,7 @@ use crate::transport::Shaft;
 
 use super::ends::{BoxShaft, LightPlace, body_of};
 use super::margin::{Growth, Shift};
-use super::update::Stale;
+use super::verdict::Stale;
 
 /// Motion of a node of the forest's fixed part: its bodies that moved, appeared or vanished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

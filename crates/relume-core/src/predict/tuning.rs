@@ -3,15 +3,13 @@
 //! `docs/tuning.md` is made of this file. Constants that are exact, guard a representation or stand for rounding stay where
 //! they are used.
 
-use super::ticks::Tick;
-
 /// Ticks ahead until which certificates may stand.
 ///
 /// - Unit: ticks
 /// - Tried: not varied
 /// - Larger: time for each certificate
 /// - Smaller: pairs are visited more often
-pub(super) const AHEAD: [Tick; 7] = [1, 2, 4, 8, 16, 32, 64];
+pub(super) const AHEAD: [u16; 7] = [1, 2, 4, 8, 16, 32, 64];
 
 /// Length of a step over that of a tick from which a new clock starts.
 ///

@@ -9,7 +9,8 @@ use crate::element::{ElementId, ElementKey};
 use crate::pair::{Carried, Gradients, PairHash, pair_key};
 
 use super::names::ElementName;
-use super::solution::{Solution, named_leaves};
+use super::solution::{Elements, named_leaves};
+use crate::follow::Follower;
 
 /// Single-precision roundings that a radiosity may differ by, in units of the last place: the
 /// links of a receiver may be summed in another order.
@@ -111,9 +112,9 @@ pub struct RadiosityGap {
 ///
 /// Links are compared by their hash first, computed anew from the links of both; only where it
 /// differs they are sorted. Cost: linear in links and n log n in elements where all is well.
-pub fn compare<S: Solution>(one: &S, two: &S) -> Option<Difference> {
+pub fn compare<S: Elements>(one: &Follower<S>, two: &Follower<S>) -> Option<Difference> {
     let both = Both { one, two };
-    if !one.is_of_the_scene_of(two) {
+    if !one.space.is_of_the_scene_of(&two.space) {
         return Some(Difference::Scene);
     }
     both.links().or_else(|| both.counts()).or_else(|| both.radiosities().err())
@@ -124,21 +125,28 @@ pub fn compare<S: Solution>(one: &S, two: &S) -> Option<Difference> {
 ///
 /// # Errors
 /// The first leaf that only one of them has, or whose radiosities are too far apart.
-pub fn radiosity_gap<S: Solution>(one: &S, two: &S) -> Result<RadiosityGap, Difference> {
+pub fn radiosity_gap<S: Elements>(
+    one: &Follower<S>,
+    two: &Follower<S>,
+) -> Result<RadiosityGap, Difference> {
     let both = Both { one, two };
-    if one.is_of_the_scene_of(two) { both.radiosities() } else { Err(Difference::Scene) }
+    if one.space.is_of_the_scene_of(&two.space) {
+        both.radiosities()
+    } else {
+        Err(Difference::Scene)
+    }
 }
 
 /// Two sessions side by side.
 struct Both<'a, S> {
-    one: &'a S,
-    two: &'a S,
+    one: &'a Follower<S>,
+    two: &'a Follower<S>,
 }
 
 /// A link by the names of its ends.
 type NamedLink = ((ElementKey, ElementKey), Carried);
 
-impl<S: Solution> Both<'_, S> {
+impl<S: Elements> Both<'_, S> {
     fn links(&self) -> Option<Difference> {
         let hashes = [self.one, self.two].map(hash_of);
         if hashes[0] != hashes[1] {
@@ -147,7 +155,7 @@ impl<S: Solution> Both<'_, S> {
         }
         let reports = [(Which::One, self.one), (Which::Two, self.two)];
         reports.into_iter().zip(hashes).find_map(|((which, solved), found)| {
-            let (reported, found) = (solved.report().hash.clone(), found.to_string());
+            let (reported, found) = (solved.report.hash.clone(), found.to_string());
             (reported != found).then_some(Difference::Hash { which, reported, found })
         })
     }
@@ -178,7 +186,7 @@ impl<S: Solution> Both<'_, S> {
     }
 
     fn counts(&self) -> Option<Difference> {
-        let (one, two) = (self.one.report(), self.two.report());
+        let (one, two) = (&self.one.report, &self.two.report);
         let counts = [
             ("links", one.links, two.links),
             ("elements", one.elements, two.elements),
@@ -196,7 +204,7 @@ impl<S: Solution> Both<'_, S> {
             if a.0 != b.0 {
                 break;
             }
-            let (x, y) = (self.one.radiosity(a.1), self.two.radiosity(b.1));
+            let (x, y) = (self.one.radiosity.radiosity(a.1.0), self.two.radiosity.radiosity(b.1.0));
             let gap = bound.gap(x, y);
             // So that what is no number counts as a difference.
             let within = gap.difference_w_m2 <= gap.bound_w_m2;
@@ -220,7 +228,7 @@ impl<S: Solution> Both<'_, S> {
     }
 
     fn name(&self, key: ElementKey) -> ElementName {
-        self.one.name_of(key)
+        self.one.space.name_of(key)
     }
 }
 
@@ -232,10 +240,10 @@ struct Bound {
 }
 
 impl Bound {
-    fn new(both: &Both<'_, impl Solution>) -> Bound {
-        let grows = 1.0 / (1.0 - both.one.reflectance_max());
+    fn new(both: &Both<'_, impl Elements>) -> Bound {
+        let grows = 1.0 / (1.0 - both.one.space.reflectance_max());
         let mean_w_m2 = mean_radiosity(both.one).max(mean_radiosity(both.two));
-        let residuals = both.one.report().residual + both.two.report().residual;
+        let residuals = both.one.report.residual + both.two.report.residual;
         Bound {
             by_residuals_w_m2: residuals * grows * mean_w_m2,
             mean_w_m2,
@@ -263,11 +271,11 @@ impl RadiosityGap {
 }
 
 /// Area-weighted mean over all surfaces and channels, W/m2.
-pub(super) fn mean_radiosity(solved: &impl Solution) -> f64 {
+pub(super) fn mean_radiosity(solved: &Follower<impl Elements>) -> f64 {
     let (mut flux, mut area) = (0.0, 0.0);
-    for &facet in solved.facets() {
-        let a = solved.area_m2(facet);
-        let b: f32 = solved.radiosity(facet).iter().sum();
+    for &facet in solved.space.facets() {
+        let a = solved.space.area_m2(facet);
+        let b: f32 = solved.radiosity.radiosity(facet.0).iter().sum();
         flux += a * f64::from(b) / 3.0;
         area += a;
     }
@@ -279,18 +287,18 @@ fn bits(carried: &Carried) -> (u32, u16, Gradients) {
     (carried.exchange_area_m2.to_bits(), carried.visibility, carried.gradients)
 }
 
-fn hash_of(solved: &impl Solution) -> PairHash {
+fn hash_of(solved: &Follower<impl Elements>) -> PairHash {
     let mut hash = PairHash::default();
-    for link in solved.tree().links() {
-        hash.add(pair_key(solved.key(link.a), solved.key(link.b)), &link.carried);
+    for link in solved.tree.links() {
+        hash.add(pair_key(solved.space.key(link.a), solved.space.key(link.b)), &link.carried);
     }
     hash
 }
 
-fn named_links(solved: &impl Solution) -> Vec<NamedLink> {
-    let key = |id| solved.key(id);
+fn named_links(solved: &Follower<impl Elements>) -> Vec<NamedLink> {
+    let key = |id| solved.space.key(id);
     let mut out: Vec<NamedLink> =
-        solved.tree().links().map(|l| ((key(l.a), key(l.b)), l.carried)).collect();
+        solved.tree.links().map(|l| ((key(l.a), key(l.b)), l.carried)).collect();
     out.sort_unstable_by_key(|link| link.0);
     out
 }

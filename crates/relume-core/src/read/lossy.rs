@@ -3,7 +3,8 @@
 use crate::element::{ElementId, ElementKey};
 use crate::pair::{PairId, PairTree, State};
 
-use super::solution::{Solution, named_leaves};
+use super::solution::{Elements, named_leaves};
+use crate::follow::Follower;
 
 /// Pairs that are in another state than they should be.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -17,8 +18,8 @@ pub struct Missed {
 
 /// The pairs of `reference` that `session` lacks or has in another state. Pairs below such a pair are
 /// not counted: they follow from it.
-pub fn missed<S: Solution>(session: &S, reference: &S) -> Missed {
-    let (one, two) = (session.tree(), reference.tree());
+pub fn missed<S: Elements>(session: &Follower<S>, reference: &Follower<S>) -> Missed {
+    let (one, two) = (&session.tree, &reference.tree);
     let mut out = Missed::default();
     // Both trees from the root: children of pairs in the same state have the same names in the same
     // order.
@@ -60,16 +61,19 @@ pub struct RadiosityError {
 
 /// Compares radiosities over the leaves of `reference`; where `session` has other leaves, the mean of
 /// its elements there, or the element that holds the leaf.
-pub fn radiosity_error<S: Solution>(session: &S, reference: &S) -> RadiosityError {
+pub fn radiosity_error<S: Elements>(
+    session: &Follower<S>,
+    reference: &Follower<S>,
+) -> RadiosityError {
     let known = Known::new(session);
     let (mut squares, mut area, mut sum, mut max) = (0.0, 0.0, 0.0, 0.0_f64);
     for (key, id) in named_leaves(reference) {
-        if !reference.is_present(id) {
+        if !reference.space.is_present(id) {
             continue;
         }
-        let a = reference.area_m2(id);
-        let found = session.radiosity(known.holding(key));
-        for (x, y) in found.into_iter().zip(reference.radiosity(id)) {
+        let a = reference.space.area_m2(id);
+        let found = session.radiosity.radiosity(known.holding(key).0);
+        for (x, y) in found.into_iter().zip(reference.radiosity.radiosity(id.0)) {
             let off = f64::from(x) - f64::from(y);
             squares += a * off * off / 3.0;
             sum += a * f64::from(y) / 3.0;
@@ -88,10 +92,10 @@ pub fn radiosity_error<S: Solution>(session: &S, reference: &S) -> RadiosityErro
 struct Known(Vec<(ElementKey, ElementId)>);
 
 impl Known {
-    fn new(solution: &impl Solution) -> Known {
-        let ids = (0..solution.id_limit()).map(ElementId);
-        let elements = ids.filter(|&id| solution.is_element(id));
-        let mut out: Vec<_> = elements.map(|id| (solution.key(id), id)).collect();
+    fn new(solution: &Follower<impl Elements>) -> Known {
+        let ids = (0..solution.space.id_limit()).map(ElementId);
+        let elements = ids.filter(|&id| solution.space.is_element(id));
+        let mut out: Vec<_> = elements.map(|id| (solution.space.key(id), id)).collect();
         out.sort_unstable_by_key(|e| e.0);
         Known(out)
     }

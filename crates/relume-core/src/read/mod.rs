@@ -28,7 +28,7 @@ pub use gather::Sensor;
 pub use lossy::{Missed, RadiosityError, missed, radiosity_error};
 pub use names::ElementName;
 pub use snapshot::{Leaf, Snapshot};
-pub use solution::Solution;
+pub use solution::Elements;
 
 // The plane names its events likewise.
 pub(crate) use events::with_names;

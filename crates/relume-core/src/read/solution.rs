@@ -1,21 +1,16 @@
-//! A solved state of either space as comparisons see it.
+//! The elements of a solved state, in space or in the plane, as comparisons see them.
 
 use std::ops::Range;
 
 use crate::element::{ElementId, ElementKey, Kind};
-use crate::follow::FrameReport;
-use crate::pair::PairTree;
-use crate::space::{Solved, SpaceState};
+use crate::follow::Follower;
+use crate::space::SpaceState;
 
 use super::names::{ElementName, name_of};
 
-/// What comparisons ask of a solution, in space or in the plane.
-pub trait Solution {
-    /// The pair tree.
-    fn tree(&self) -> &PairTree;
-    /// What the last step reported.
-    fn report(&self) -> &FrameReport;
-    /// What has parts, but is no part of anything, ascending.
+/// Elements of a solved state by id and by name.
+pub trait Elements {
+    /// Roots of the trees of elements, ascending.
     fn facets(&self) -> &[ElementId];
     /// Ids of elements are below this.
     fn id_limit(&self) -> u32;
@@ -25,84 +20,71 @@ pub trait Solution {
     fn children(&self, id: ElementId) -> Range<u32>;
     /// The name of an element or light, which does not depend on history.
     fn key(&self, id: ElementId) -> ElementKey;
-    /// The same for a user.
+    /// Name of an element or light for a user.
     fn name_of(&self, key: ElementKey) -> ElementName;
     /// Area of an element, m2.
     fn area_m2(&self, id: ElementId) -> f64;
     /// Whether the body of an element is there at present.
     fn is_present(&self, id: ElementId) -> bool;
-    /// Radiosity of an element, W/m2.
-    fn radiosity(&self, id: ElementId) -> [f32; 3];
     /// The largest reflectance of all materials and channels in use.
     fn reflectance_max(&self) -> f64;
-    /// Whether keys mean the same in another solution.
+    /// Whether keys have one meaning in both states.
     fn is_of_the_scene_of(&self, other: &Self) -> bool;
 }
 
 /// All leaves by name, ascending.
-pub(super) fn named_leaves(solution: &impl Solution) -> Vec<(ElementKey, ElementId)> {
-    let ids = (0..solution.id_limit()).map(ElementId);
-    let leaf = |id: &ElementId| solution.is_element(*id) && solution.children(*id).is_empty();
-    let mut out: Vec<_> = ids.filter(leaf).map(|id| (solution.key(id), id)).collect();
+pub(super) fn named_leaves<S: Elements>(solved: &Follower<S>) -> Vec<(ElementKey, ElementId)> {
+    let elements = &solved.space;
+    let ids = (0..elements.id_limit()).map(ElementId);
+    let leaf = |id: &ElementId| elements.is_element(*id) && elements.children(*id).is_empty();
+    let mut out: Vec<_> = ids.filter(leaf).map(|id| (elements.key(id), id)).collect();
     out.sort_unstable_by_key(|leaf| leaf.0);
     out
 }
 
-impl Solution for Solved {
-    fn tree(&self) -> &PairTree {
-        &self.tree
-    }
-
-    fn report(&self) -> &FrameReport {
-        &self.report
-    }
-
+impl Elements for SpaceState {
     fn facets(&self) -> &[ElementId] {
-        self.space.forest.facets()
+        self.forest.facets()
     }
 
     fn id_limit(&self) -> u32 {
-        self.space.forest.len() as u32
+        self.forest.len() as u32
     }
 
     fn is_element(&self, id: ElementId) -> bool {
-        self.space.forest.kind(id) == Kind::Element
+        self.forest.kind(id) == Kind::Element
     }
 
     fn children(&self, id: ElementId) -> Range<u32> {
-        self.space.forest.children(id)
+        self.forest.children(id)
     }
 
     fn key(&self, id: ElementId) -> ElementKey {
-        self.space.forest.key(id)
+        self.forest.key(id)
     }
 
     fn name_of(&self, key: ElementKey) -> ElementName {
-        name_of(&self.space.scene, &self.space.forest, key)
+        name_of(&self.scene, &self.forest, key)
     }
 
     fn area_m2(&self, id: ElementId) -> f64 {
-        self.space.forest.area_m2(id)
+        self.forest.area_m2(id)
     }
 
     fn is_present(&self, id: ElementId) -> bool {
-        let SpaceState { forest, view, .. } = &self.space;
+        let SpaceState { forest, view, .. } = self;
         forest.patch(id).is_some_and(|p| view.is_present(view.patch(p).body))
     }
 
-    fn radiosity(&self, id: ElementId) -> [f32; 3] {
-        self.radiosity.radiosity(id.0)
-    }
-
     fn reflectance_max(&self) -> f64 {
-        let SpaceState { scene, world, .. } = &self.space;
+        let SpaceState { scene, world, .. } = self;
         let all = scene.patches.iter().flat_map(|patch| world.reflectance(scene, patch));
         all.fold(0.0, f64::max)
     }
 
-    fn is_of_the_scene_of(&self, other: &Solved) -> bool {
-        let (a, b) = (&self.space.scene, &other.space.scene);
-        let (one, two) = (&self.space.forest, &other.space.forest);
+    fn is_of_the_scene_of(&self, other: &SpaceState) -> bool {
+        let (a, b) = (&self.scene, &other.scene);
+        let (one, two) = (&self.forest, &other.forest);
         let alike = a.patches.len() == b.patches.len() && a.lights.len() == b.lights.len();
         // The forest's fixed part is a function of the scene.
         alike && one.fixed_len() == two.fixed_len() && one.facets() == two.facets()

@@ -21,6 +21,16 @@ use super::{
 };
 use crate::geometry::Pose;
 
+impl Scene {
+    /// The scene of a draft: objects grouped into bodies, scales baked into corners, names made unique, everything checked.
+    ///
+    /// # Errors
+    /// [`SceneError`] for numbers of which no scene can be made, each with the node, surface or material and the remedy.
+    pub fn from_draft(draft: Draft) -> Result<Scene, SceneError> {
+        assemble(draft)
+    }
+}
+
 /// Checks the draft and makes the scene of it.
 pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
     let mut notes = std::mem::take(&mut draft.notes);

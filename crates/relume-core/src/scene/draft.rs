@@ -1,4 +1,4 @@
-//! A scene before it is checked: what readers of files hand over, and the builder too ([`Scene::from_draft`]).
+//! A scene before it is checked: what readers of files hand over, and the builder too ([`Scene::from_draft`](super::Scene::from_draft)).
 //!
 //! Nodes still carry scales, polygons are loops of points in their node's own frame, and names
 //! may repeat. Must not know where any of it came from.
@@ -7,11 +7,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::assemble::assemble;
-use super::{
-    Camera, Edits, Light, Material, MaterialId, Note, Print, RotationTrack, Scene, SceneError,
-    Tint, TintId, Track,
-};
+use super::{Camera, Light, Material, MaterialId, Note, Print, RotationTrack, Tint, TintId, Track};
 
 /// Everything of a scene, unchecked.
 #[derive(Default)]
@@ -36,6 +32,23 @@ pub struct Draft {
     pub notes: Vec<Note>,
     /// What is to be changed before anything is checked.
     pub edits: Edits,
+}
+
+/// Changes to a scene before it is built, in this order: nodes are hidden, then materials changed; of
+/// several changes to one thing the last counts.
+///
+/// Names are unique names of the scene; `*` stands for any number of characters, unless something has
+/// that very name.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Edits {
+    /// Nodes that are left out with all below them, lights and cameras too. Surfaces of a file of
+    /// View3D, which has no nodes, by their own names.
+    pub hide: Vec<String>,
+    /// Materials and the radiance that they emit from now on, W/m2/sr, linear RGB: in place of what the
+    /// file says, animated or not.
+    pub emit: Vec<(String, [f64; 3])>,
+    /// Materials and their diffuse reflectance from now on, linear RGB, each in [0, 1).
+    pub reflect: Vec<(String, [f64; 3])>,
 }
 
 /// A node with its scale and what hangs on it.
@@ -74,16 +87,6 @@ pub struct DraftSurface {
     pub tints: Vec<Option<TintId>>,
     /// Images on the polygons in the node's own frame, likewise.
     pub prints: Vec<Option<Arc<Print>>>,
-}
-
-impl Scene {
-    /// The scene of a draft: objects grouped into bodies, scales baked into corners, names made unique, everything checked.
-    ///
-    /// # Errors
-    /// [`SceneError`] for numbers of which no scene can be made, each with the node, surface or material and the remedy.
-    pub fn from_draft(draft: Draft) -> Result<Scene, SceneError> {
-        assemble(draft)
-    }
 }
 
 impl DraftNode {

@@ -7,26 +7,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use super::SceneError;
-use super::draft::Draft;
+use super::draft::{Draft, Edits};
 use super::limits::EMISSION_MAX;
 use super::{Tint, TintId};
-
-/// Changes to a scene before it is built, in this order: nodes are hidden, then materials changed; of
-/// several changes to one thing the last counts.
-///
-/// Names are unique names of the scene; `*` stands for any number of characters, unless something has
-/// that very name.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Edits {
-    /// Nodes that are left out with all below them, lights and cameras too. Surfaces of a file of
-    /// View3D, which has no nodes, by their own names.
-    pub hide: Vec<String>,
-    /// Materials and the radiance that they emit from now on, W/m2/sr, linear RGB: in place of what the
-    /// file says, animated or not.
-    pub emit: Vec<(String, [f64; 3])>,
-    /// Materials and their diffuse reflectance from now on, linear RGB, each in [0, 1).
-    pub reflect: Vec<(String, [f64; 3])>,
-}
 
 /// Most names that are listed where one is not found.
 const NEAR: usize = 5;

@@ -5,6 +5,7 @@
 
 /// Why there is no scene: a file that cannot be read, or content that cannot be lit.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// The file, or one that it refers to, cannot be opened or read.
     #[error("cannot read `{file}`: {source}; {remedy}")]
@@ -144,6 +145,27 @@ pub enum SceneError {
         /// What to do.
         remedy: String,
     },
+}
+
+impl SceneError {
+    /// What to do about it, as a sentence without capital or full stop; it ends the message too.
+    pub fn remedy(&self) -> &str {
+        match self {
+            SceneError::Read { remedy, .. }
+            | SceneError::Format { remedy, .. }
+            | SceneError::Outside { remedy, .. }
+            | SceneError::TooLarge { remedy, .. }
+            | SceneError::View3d { remedy, .. }
+            | SceneError::Mesh { remedy, .. }
+            | SceneError::Extension { remedy, .. }
+            | SceneError::Geometry { remedy, .. }
+            | SceneError::Material { remedy, .. }
+            | SceneError::Hierarchy { remedy, .. }
+            | SceneError::Animation { remedy, .. }
+            | SceneError::Edit { remedy, .. }
+            | SceneError::Empty { remedy, .. } => remedy,
+        }
+    }
 }
 
 fn at(line: usize) -> String {

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::follow::{Failed, Follower, Order, Why};
+use crate::follow::{Failed, Order, Why};
 use crate::scene::{BodyId, Held, Scene, World};
 use crate::space::{Bed, Goal, Solved, SpaceState, Tuning};
 use crate::transport::Simd;
@@ -20,12 +20,13 @@ pub use estimate::Estimate;
 pub use options::{Options, Oracle};
 
 pub use crate::follow::{
-    Accuracy, Energy, FrameReport, LinkKinds, Memory, PairCounts, RowSumError, Seconds, Update,
-    Watch,
+    Accuracy, Energy, Follower, FrameReport, LinkKinds, Memory, PairCounts, RowSumError, Seconds,
+    Update, Watch,
 };
+pub use crate::pair::Work;
 pub use crate::read::{
-    Closure, Difference, ElementName, Event, EventKind, Factors, Frame, Grouping, Hash, Leaf, Mesh,
-    Missed, Open, PartFactors, RadiosityError, RadiosityGap, Sensor, Snapshot, Solution, Which,
+    Closure, Difference, ElementName, Elements, Event, EventKind, Factors, Frame, Grouping, Hash,
+    Leaf, Mesh, Missed, Open, PartFactors, RadiosityError, RadiosityGap, Sensor, Snapshot, Which,
     compare, missed, radiosity_error, radiosity_gap,
 };
 
@@ -213,7 +214,7 @@ impl Session {
     }
 
     /// Says at which time the frame before the next step was, where that is not the last step:
-    /// [`FrameReport::moved`] and [`FrameReport::dynamic_links`] count from there. Nothing else
+    /// [`FrameReport::moved`] and [`Work::dynamic_links`](crate::pair::Work::dynamic_links) count from there. Nothing else
     /// depends on it.
     #[doc(hidden)]
     pub fn count_motion_from(&mut self, time_s: Option<f64>) {

@@ -14,6 +14,7 @@ mod kernel;
 mod point;
 mod prepared_view;
 mod segments;
+mod share;
 mod side;
 mod silhouette;
 mod spot;
@@ -32,9 +33,10 @@ pub use kernel::Simd;
 pub use point::form_factor_from_point;
 pub use prepared_view::{Clipping, FactorPast, PreparedView, form_factor_past};
 pub use segments::{SEGMENTS, SegmentBundle};
+pub use share::Visibility;
 pub use side::Side;
 pub use tuning::{CELLS_MAX, CLIPPED_MAX};
 pub use visibility::{
-    BlockerSizes, Candidates, InShaft, Shaft, Visibility, clipping, light_visibility, prepare_view,
+    BlockerSizes, Candidates, InShaft, Shaft, clipping, light_visibility, prepare_view,
     segment_is_clear, visibility,
 };

@@ -10,12 +10,12 @@ use glam::{DVec2, DVec3};
 use super::clip::{Cutter, FRAGMENTS_MAX, Occluders, keep_front};
 use super::kernel::{G, Simd};
 use super::point::{EdgeBundles, form_factor_from_point};
+use super::share::Visibility;
 use super::silhouette::Silhouette;
 use super::tuning::{
     CELLS_MAX, ERROR_KINKED, ERROR_SMOOTH, FACING, HALVINGS, MOTION_RATIO, OVERLOOKED, UNSEEN,
     UNSEEN_KINKED, UNSEEN_SMOOTH,
 };
-use super::visibility::Visibility;
 use crate::element::WorldElement;
 use crate::geometry::{Aabb, ConvexPolygon, Plane, Pose, no_smaller};
 use crate::scene::Solid;

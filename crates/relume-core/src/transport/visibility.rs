@@ -11,6 +11,7 @@ use super::exchange::{Meeting, meeting};
 use super::kernel::Simd;
 use super::prepared_view::{Between, Clipping, PlacedSolid, PreparedView, is_hidden};
 use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
+use super::share::Visibility;
 use super::side::Side;
 use super::spot::spot;
 use glam::{DVec2, DVec3};
@@ -18,35 +19,6 @@ use glam::{DVec2, DVec3};
 /// Candidate occluders of a pair: nodes of the forest's fixed part (clusters and patch roots) that may stand between its ends.
 /// Conservative: a patch below none of them blocks nothing.
 pub type Candidates = [u32];
-
-/// The visibility of a pair, kernel-weighted over its segments.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Visibility {
-    /// Unoccluded share, in [0, 1].
-    pub value: f64,
-    /// Contribution of occlusion to the relative gradient of the arriving light over the first end, 1/m.
-    pub gradient_a: DVec2,
-    /// Contribution of occlusion to the relative gradient over the second end, 1/m.
-    pub gradient_b: DVec2,
-    /// Standard deviation between the quadrants of the first end, absolute.
-    pub spread_a: f64,
-    /// Standard deviation between the quadrants of the second end, absolute.
-    pub spread_b: f64,
-    /// Segments traced; 0 where the shaft is empty, and then `value` is exactly 1.
-    pub segments: u32,
-}
-
-impl Visibility {
-    /// Visibility of a pair without occluders.
-    pub const CLEAR: Visibility = Visibility {
-        value: 1.0,
-        gradient_a: DVec2::ZERO,
-        gradient_b: DVec2::ZERO,
-        spread_a: 0.0,
-        spread_b: 0.0,
-        segments: 0,
-    };
-}
 
 /// A pair placed for visibility queries.
 #[derive(Clone, Copy, Debug)]
@@ -779,7 +751,7 @@ fn crosses(view: &WorldView, patch: PatchId, p: DVec3, q: DVec3, slack_m: f64) -
 mod tests {
     use super::*;
     use crate::element::Shape;
-    use crate::scene::SceneBuilder;
+    use crate::scene::{Scene, SceneBuilder};
     use crate::transport::CLIPPED_MAX;
     use glam::DQuat;
 
@@ -847,14 +819,11 @@ mod tests {
         assert!(floor_to_ceiling(false, |b| cuboid(b, 0.0, 1.0, [0.0, 1.0])) < 1e-4);
     }
 
-    /// What segments between two slivers cross is among their blockers, and among the candidates of every
-    /// pair above them; and the walk for both at once finds what either finds alone.
-    #[test]
-    fn no_sliver_that_segments_cross_is_left_out() {
+    /// Two twisted tubes of slivers through each other.
+    fn twisted_tubes() -> Scene {
         let mut b = SceneBuilder::new("slivers");
         let grey = b.double_sided_material("grey", [0.5; 3], [0.0; 3]);
         let node = b.node("slivers", None, DVec3::ZERO, DQuat::IDENTITY);
-        // Two twisted tubes through each other.
         let ring = |k: usize, x: f64, turned: bool| {
             let (sin, cos) = (k as f64 * std::f64::consts::TAU / 12.0 + x).sin_cos();
             let p = DVec3::new(x, 0.3 * sin, 0.3 * cos);
@@ -865,7 +834,14 @@ mod tests {
             b.polygon(node, &format!("{k} up"), grey, &[p(0, -1.0), p(1, -1.0), p(1, 1.0)]);
             b.polygon(node, &format!("{k} down"), grey, &[p(0, -1.0), p(1, 1.0), p(0, 1.0)]);
         }
-        let scene = b.build().unwrap();
+        b.build().unwrap()
+    }
+
+    /// What segments between two slivers cross is among their blockers, and among the candidates of every
+    /// pair above them; and the walk for both at once finds what either finds alone.
+    #[test]
+    fn no_sliver_that_segments_cross_is_left_out() {
+        let scene = twisted_tubes();
         let mut forest = Forest::new(&scene);
         let view = WorldView::new(&scene, &forest, &scene.at(0.0));
         let patches = || (0..scene.patches.len() as u32).map(PatchId);

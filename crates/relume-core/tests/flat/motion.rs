@@ -133,18 +133,22 @@ fn check_frames(seed: u64, bodies: usize, frames: u32, (pace, coarse): (f64, f64
             Missed::default(),
             "{place}"
         );
-        assert_eq!((one.changed, one.segments), (two.changed, two.segments), "{place}");
+        assert_eq!(
+            (one.work.changed, one.work.segments),
+            (two.work.changed, two.work.segments),
+            "{place}"
+        );
         for followed in [&certain, &warm] {
             radiosity_gap(followed.solved().unwrap(), cold.solved().unwrap())
                 .unwrap_or_else(|e| panic!("{place}: {e}"));
         }
         walk += Walk {
             events: warm.frame().unwrap().link_events().len() as u64,
-            reinspected: two.examined,
-            examined: one.examined,
-            reevaluated: one.reevaluated,
-            followed: one.followed,
-            certified: one.certified,
+            reinspected: two.work.examined,
+            examined: one.work.examined,
+            reevaluated: one.work.reevaluated,
+            followed: one.work.followed,
+            certified: one.work.certified,
         };
         if frame % 50 == 0 {
             audit(&certain);
@@ -220,8 +224,8 @@ fn follow(text: &str, epsilon: f64, times_s: impl Iterator<Item = f64>) -> Walk 
         }
         walk += Walk {
             events: certain.frame().unwrap().link_events().len() as u64,
-            reevaluated: one.reevaluated,
-            followed: one.followed,
+            reevaluated: one.work.reevaluated,
+            followed: one.work.followed,
             ..Walk::default()
         };
     }
@@ -333,11 +337,11 @@ fn what_comes_nearer_is_demoted_and_promoted_on_the_way_back() {
     let there = session.step(0, 0.0);
     assert!(session.frame().unwrap().link_events().is_empty());
     let near = session.step(1, 10.0);
-    assert!(near.demoted > 0 && near.elements > there.elements && near.links > there.links);
-    assert!(count(&session, EventKind::Demoted) == near.demoted);
-    assert!(near.occlusion_changed > 0 && near.visibility_only > 0);
+    assert!(near.work.demoted > 0 && near.elements > there.elements && near.links > there.links);
+    assert!(count(&session, EventKind::Demoted) == near.work.demoted);
+    assert!(near.work.occlusion_changed > 0 && near.work.visibility_only > 0);
     let back = session.step(2, 0.0);
-    assert!(back.promoted > 0 && count(&session, EventKind::Promoted) > 0);
+    assert!(back.work.promoted > 0 && count(&session, EventKind::Promoted) > 0);
     assert_eq!((back.hash, back.elements), (there.hash, there.elements));
 }
 
@@ -366,7 +370,7 @@ fn a_hidden_link_is_kept_and_restored() {
     let hidden = session.step(1, 1.0);
     assert_eq!(visibility(&session), 0.0);
     assert!(session.frame().unwrap().link_events().iter().any(|e| e.kind == EventKind::Occluded));
-    assert_eq!(hidden.visibility_only, 1, "the pair of the two walls, and no other");
+    assert_eq!(hidden.work.visibility_only, 1, "the pair of the two walls, and no other");
     session.step(2, 0.0);
     assert_eq!(visibility(&session), 1.0);
     assert!(session.frame().unwrap().link_events().iter().any(|e| e.kind == EventKind::Revealed));
@@ -381,7 +385,7 @@ fn pairs_within_a_body_that_moves_alone_are_left_alone() {
     let before = session.step(0, 0.0);
     let after = session.step(1, 0.7);
     assert_eq!(after.moved, ["gutter"]);
-    assert_eq!((after.examined, after.hash), (0, before.hash));
+    assert_eq!((after.work.examined, after.hash), (0, before.hash));
 }
 
 #[test]
@@ -392,7 +396,7 @@ fn extrapolated_links_stay_close() {
     for frame in 0..60 {
         let time_s = f64::from(frame) / 6.0;
         followed.step(frame, time_s);
-        extrapolated += line.step(frame, time_s).extrapolated;
+        extrapolated += line.step(frame, time_s).work.extrapolated;
         let sum = |s: &FlatSession| -> f64 {
             s.frame()
                 .unwrap()
@@ -417,7 +421,7 @@ fn what_was_extrapolated_does_not_outlast_a_rest_or_a_jump() {
     let goes = || {
         let mut session = session(Update::Extrapolate { frames: 7, error: None });
         let mut step = |frame: u32| session.step(frame, f64::from(frame) / 12.0);
-        let extrapolated = (0..=11).map(|frame| step(frame).extrapolated).sum::<u64>();
+        let extrapolated = (0..=11).map(|frame| step(frame).work.extrapolated).sum::<u64>();
         assert!(extrapolated > 100, "{extrapolated}");
         session
     };

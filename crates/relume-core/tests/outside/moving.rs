@@ -9,6 +9,7 @@ use crate::outside::case::{Case, Mover, chance, log_between, v, whole};
 use crate::outside::near::room;
 
 /// Double-sided, piercing, flush and coincident bodies in motion under a lamp.
+// Over 60 lines: one draw; the order of random numbers is its meaning.
 pub(crate) fn motion(r: &mut Random, case: &mut Case) {
     let size = room(r);
     case.room(size);

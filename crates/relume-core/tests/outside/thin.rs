@@ -10,6 +10,7 @@ use crate::outside::case::{Case, Known, chance, log_between, v, whole};
 use crate::outside::near::{box_above, room};
 
 /// A strip over a floor with nothing between: standing, leaning, facing it or lying the other way.
+// Over 60 lines: one draw; the order of random numbers is its meaning.
 pub(crate) fn strip(r: &mut Random, case: &mut Case) {
     let size = v(r.between(2.0, 5.0), r.between(2.0, 5.0), 0.0);
     let (length, slender) = (r.between(0.5, 1.8), log_between(r, 10.0, 1000.0));

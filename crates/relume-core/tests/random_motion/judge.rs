@@ -71,13 +71,13 @@ fn follow_unguarded(recipe: &Recipe) -> Result<Seen, String> {
         if k > 0 {
             seen += Seen {
                 motions: 1,
-                promoted: one.promoted,
-                demoted: one.demoted,
-                occluded: one.occlusion_changed,
+                promoted: one.work.promoted,
+                demoted: one.work.demoted,
+                occluded: one.work.occlusion_changed,
                 reaped: one.elements_reaped,
-                still: u64::from(one.visited == 0),
-                certified: one.certified,
-                followed: one.followed,
+                still: u64::from(one.work.visited == 0),
+                certified: one.work.certified,
+                followed: one.work.followed,
                 drift,
             };
         }

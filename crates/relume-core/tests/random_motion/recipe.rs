@@ -221,19 +221,7 @@ impl Thing {
         let name = format!("{:?} {k}", self.what);
         let parent = last.filter(|_| self.rides);
         let node = b.node(&name, parent, self.keys[0].0, self.keys[0].1);
-        let times_s: Vec<f64> = (0..self.keys.len()).map(|k| k as f64).collect();
-        let interpolation = Interpolation::Linear;
-        if self.slides {
-            let values = self.keys.iter().map(|k| k.0).collect();
-            b.animate_translation(node, Track { times_s: times_s.clone(), values, interpolation });
-        }
-        if self.turns {
-            let values = self.keys.iter().map(|k| k.1).collect();
-            b.animate_rotation(node, RotationTrack { times_s, values, interpolation });
-        }
-        if !self.presence.is_empty() {
-            b.animate_presence(node, self.presence.clone());
-        }
+        self.animate(b, node);
         let s = self.size;
         let corner = |k: i32, z: f64| {
             DQuat::from_rotation_z(f64::from(k) * TAU / 6.0) * v(s, 0., 0.) + v(0., 0., z)
@@ -276,6 +264,22 @@ impl Thing {
             What::Sun => b.light(&name, node, LightKind::Directional, [3.0 * light; 3]),
         }
         node
+    }
+
+    fn animate(&self, b: &mut SceneBuilder, node: NodeId) {
+        let times_s: Vec<f64> = (0..self.keys.len()).map(|k| k as f64).collect();
+        let interpolation = Interpolation::Linear;
+        if self.slides {
+            let values = self.keys.iter().map(|k| k.0).collect();
+            b.animate_translation(node, Track { times_s: times_s.clone(), values, interpolation });
+        }
+        if self.turns {
+            let values = self.keys.iter().map(|k| k.1).collect();
+            b.animate_rotation(node, RotationTrack { times_s, values, interpolation });
+        }
+        if !self.presence.is_empty() {
+            b.animate_presence(node, self.presence.clone());
+        }
     }
 
     /// Distance from its middle to its underside when upright.

@@ -169,8 +169,18 @@ pub(super) fn read(text: &str) -> Result<File, Wrong> {
                 .push((line, format!("`{}` says nothing known; it is ignored", said[0]))),
         }
     }
-    let count = file.surfaces.len();
-    for (k, (surface, numbers)) in file.surfaces.iter_mut().zip(corners).enumerate() {
+    refer(&mut file.surfaces, corners, &vertices)?;
+    Ok(file)
+}
+
+/// Gives surfaces the corners of which they say the numbers, and checks what surfaces they refer to.
+fn refer(
+    surfaces: &mut [RawSurface],
+    corners: Vec<Vec<usize>>,
+    vertices: &[DVec3],
+) -> Result<(), Wrong> {
+    let count = surfaces.len();
+    for (k, (surface, numbers)) in surfaces.iter_mut().zip(corners).enumerate() {
         for number in numbers {
             match number.checked_sub(1).and_then(|n| vertices.get(n)) {
                 Some(&vertex) => surface.corners.push(vertex),
@@ -195,7 +205,7 @@ pub(super) fn read(text: &str) -> Result<File, Wrong> {
             }
         }
     }
-    Ok(file)
+    Ok(())
 }
 
 /// `name=value` pairs, with or without spaces about the sign.

@@ -30,6 +30,49 @@ pub(super) fn of(node: Node<'_, '_>, world: &DAffine2) -> Result<Option<Moved>, 
     if animations.is_empty() {
         return Ok(None);
     }
+    let Tracks { slide, turn } = tracks(node, &animations)?;
+    let before = *world * transform::of(node)?;
+    let m = before.matrix2;
+    let (u, v) = (m.x_axis, m.y_axis);
+    let size = u.length_squared();
+    let alike = (v.length_squared() - size).abs() < 1e-9 * size && u.dot(v).abs() < 1e-9 * size;
+    if !alike {
+        return fault(
+            "it moves within a transform that changes its shape",
+            "scale both axes alike, and do not skew",
+        );
+    }
+    let centre = match &turn {
+        Some(track) => before.transform_point2(centre(track)?),
+        None => DVec2::ZERO,
+    };
+    // y of the plane is up, so what turns clockwise in SVG does so by a negative angle.
+    let sense = m.determinant().signum();
+    let times = |track: &Option<Track>| -> Vec<f64> {
+        track.iter().flat_map(|t| t.keys.iter().map(|key| key.0)).collect()
+    };
+    let mut times_s = [times(&slide), times(&turn)].concat();
+    times_s.sort_unstable_by(f64::total_cmp);
+    times_s.dedup();
+    let key = |time_s: f64| {
+        let shift =
+            slide.as_ref().map_or(DVec2::ZERO, |t| DVec2::new(t.at(time_s, 0), t.at(time_s, 1)));
+        let degrees = turn.as_ref().map_or(0.0, |t| t.at(time_s, 0));
+        let angle = sense * degrees.to_radians();
+        Key { time_s, place: centre + m * shift, angle }
+    };
+    let motion = Motion::new(times_s.into_iter().map(key).collect());
+    Ok(Some(Moved { motion, world: DAffine2::from_translation(-centre) * before }))
+}
+
+/// The animations of one group.
+struct Tracks {
+    slide: Option<Track>,
+    turn: Option<Track>,
+}
+
+/// The animations of a group by what they change, at most one of each, sliding first.
+fn tracks(node: Node<'_, '_>, animations: &[Node<'_, '_>]) -> Result<Tracks, Fault> {
     let (mut slide, mut turn) = (None, None);
     for (k, animation) in animations.iter().enumerate() {
         let sum = animation.attribute("additive") == Some("sum");
@@ -63,38 +106,7 @@ pub(super) fn of(node: Node<'_, '_>, world: &DAffine2) -> Result<Option<Moved>, 
         }
         *of = Some(track(*animation, &numbers)?);
     }
-    let before = *world * transform::of(node)?;
-    let m = before.matrix2;
-    let (u, v) = (m.x_axis, m.y_axis);
-    let size = u.length_squared();
-    let alike = (v.length_squared() - size).abs() < 1e-9 * size && u.dot(v).abs() < 1e-9 * size;
-    if !alike {
-        return fault(
-            "it moves within a transform that changes its shape",
-            "scale both axes alike, and do not skew",
-        );
-    }
-    let centre = match &turn {
-        Some(track) => before.transform_point2(centre(track)?),
-        None => DVec2::ZERO,
-    };
-    // y of the plane is up, so what turns clockwise in SVG does so by a negative angle.
-    let sense = m.determinant().signum();
-    let times = |track: &Option<Track>| -> Vec<f64> {
-        track.iter().flat_map(|t| t.keys.iter().map(|key| key.0)).collect()
-    };
-    let mut times_s = [times(&slide), times(&turn)].concat();
-    times_s.sort_unstable_by(f64::total_cmp);
-    times_s.dedup();
-    let key = |time_s: f64| {
-        let shift =
-            slide.as_ref().map_or(DVec2::ZERO, |t| DVec2::new(t.at(time_s, 0), t.at(time_s, 1)));
-        let degrees = turn.as_ref().map_or(0.0, |t| t.at(time_s, 0));
-        let angle = sense * degrees.to_radians();
-        Key { time_s, place: centre + m * shift, angle }
-    };
-    let motion = Motion::new(times_s.into_iter().map(key).collect());
-    Ok(Some(Moved { motion, world: DAffine2::from_translation(-centre) * before }))
+    Ok(Tracks { slide, turn })
 }
 
 /// What a rotation turns about, which must stay where it is.

@@ -104,6 +104,7 @@ fn groups_slide_and_turn_as_a_browser_shows_them() {
     assert_eq!(at(&scene, 1.0)[0], (1e9 * half).round() / 1e9);
 }
 
+// Over 60 lines: one table of errors.
 #[test]
 fn errors_name_the_element_its_line_and_what_helps() {
     let moves = "<animateTransform type='translate' values='0 0;1 0' dur='1'/>";

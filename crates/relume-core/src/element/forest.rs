@@ -116,6 +116,9 @@ const SLACK: usize = 32;
 /// Elements of which a smaller share is exposed count as covered wholly.
 const EXPOSED_LEAST: f64 = 1.0 / 16.0;
 
+/// Side over distance of a square from which a part of the sky is wide: six discs of the sun, less than two degrees.
+const WIDE: f64 = 0.03;
+
 /// Levels that a path has room for.
 const LEVELS_MAX: u32 = 15;
 
@@ -171,6 +174,8 @@ struct Fixed {
     connected_m2: Vec<f64>,
     /// Whether a node stands for light from outside, by id; empty if none does.
     distant: Vec<bool>,
+    /// Whether it is a wide part of the sky, by id; empty if nothing is distant.
+    wide: Vec<bool>,
     /// How many facets receive light: they come before those that are distant.
     near_facets: usize,
     /// Clusters that may be ends of links.
@@ -309,6 +314,7 @@ impl Forest {
             distant[rows.after_lights as usize] = true;
             distant[first..].fill(true);
             forest.fixed_mut().distant = distant;
+            forest.fixed_mut().wide = forest.wide_parts(scene, first);
         }
         if !beds.is_empty() {
             forest.fixed_mut().names = names_in(forest.nodes.len() as u32, &beds);
@@ -342,6 +348,16 @@ impl Forest {
             (twins.facet, twins.path) = (id, 1);
         }
         Rows { near, far, after_lights, first_inserted: made_children + 1 }
+    }
+
+    /// Which nodes are wide parts of the sky; those from `first` on are distant.
+    fn wide_parts(&self, scene: &Scene, first: usize) -> Vec<bool> {
+        let is_wide = |id: usize| {
+            let id = ElementId(id as u32);
+            let wide_m2 = (WIDE * scene.outside_m).powi(2);
+            self.kind(id) == Kind::Element && self.shape(id).area() > wide_m2
+        };
+        (0..self.nodes.len()).map(|id| id >= first && is_wide(id)).collect()
     }
 
     /// Works out what is known of the fixed part once all of it is there.
@@ -910,6 +926,13 @@ impl Forest {
     #[inline]
     pub fn is_distant(&self, id: ElementId) -> bool {
         self.fixed.distant.get(id.0 as usize).is_some_and(|&distant| distant)
+    }
+
+    /// Whether a node is a part of the sky so wide that no shadow has an edge in its light: groups are linked with it as
+    /// they are. Of the sun and of the brightest parts of pictures each patch sees its own share.
+    #[inline]
+    pub fn is_wide(&self, id: ElementId) -> bool {
+        self.fixed.wide.get(id.0 as usize).is_some_and(|&wide| wide)
     }
 
     /// Whether light is gathered there: an element that is not distant.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::common;
 use crate::common::{Random, at_tolerance, leaf_area, shipped, sliding, still, turn, v};
 use glam::{DQuat, DVec3};
-use relume_core::scene::outside::{Outside, Sky, Sun, SunPlace};
+use relume_core::scene::outside::{Day, Outside, Sky, Sun, SunPlace};
 use relume_core::scene::{LightKind, MaterialId, NodeId, PatchId, Scene, SceneBuilder};
 use relume_core::session::{FrameReport, Options, Session, Snapshot, radiosity_gap};
 
@@ -164,7 +164,10 @@ fn heap(seed: u64) -> Scene {
 const TIMES_S: [f64; 7] = [0.0, 0.01, 0.02, 0.6, 0.59, 1.0, 0.3];
 
 fn follow(seed: u64) {
-    let scene = Arc::new(heap(seed));
+    follow_in(Arc::new(heap(seed)), seed);
+}
+
+fn follow_in(scene: Arc<Scene>, seed: u64) {
     let options = at_tolerance(0.4);
     let mut warm = Session::new(Arc::clone(&scene), options.clone()).unwrap();
     for (k, time_s) in TIMES_S.into_iter().enumerate() {
@@ -183,6 +186,21 @@ fn follow(seed: u64) {
 #[test]
 fn heaps_under_lamps_bulbs_and_skies_equal_cold_builds() {
     (0..3).for_each(follow);
+}
+
+#[test]
+fn a_heap_under_a_sky_that_changes_over_the_day_equals_cold_builds() {
+    // From 5 to 15 o'clock at the meridian.
+    let place = SunPlace::Earth { latitude: 48.0, longitude: 0.0, unix_s: 1_781_995_200.0 };
+    let outside = Outside {
+        sky: Some(Sky::Turbid { turbidity: 3.0 }),
+        sun: Some(Sun { place, irradiance: None, diameter_deg: 0.53 }),
+        day: Some(Day { from_s: 5.0 * 3600.0, to_s: 15.0 * 3600.0, over_s: 1.0 }),
+        fineness: 0.3,
+        ground: 0.2,
+    };
+    let scene = heap(2).without_outside().with_outside(outside).unwrap();
+    follow_in(Arc::new(scene), 2);
 }
 
 #[test]

@@ -46,6 +46,8 @@ pub(crate) struct Clip {
     pub(crate) tolerance: f64,
     /// How its pictures are shaded, unless the user says.
     pub(crate) shading: Shading,
+    /// What light it has beside the scene's own, as on the command line: asked for, or chosen for pictures.
+    pub(crate) light: Option<String>,
     flags: ClipFlags,
 }
 
@@ -125,6 +127,7 @@ impl Clip {
             threads,
             tolerance,
             shading: Shading::Gouraud,
+            light: flags.outside.describe(),
             flags: flags.clone(),
         })
     }
@@ -137,7 +140,8 @@ impl Clip {
     /// The same clip in the light of a default sky too, and of a sun where its azimuth is known, degrees.
     pub(crate) fn under_sky(&self, azimuth: Option<f64>) -> Result<Clip, Failure> {
         let scene = Arc::new(outside::lit_by_default(&self.scene, azimuth, self.tolerance)?);
-        Ok(self.with_scene(scene))
+        let light = Some(outside::default_light(azimuth));
+        Ok(Clip { light, ..self.with_scene(scene) })
     }
 
     /// The same clip with a lamp at a place in the world (metres): what is half the scene's extent away gets
@@ -146,11 +150,14 @@ impl Clip {
         let extent =
             self.scene.bounds(self.time_of(self.frames[0])).map_or(1.0, |(a, b)| a.distance(b));
         let intensity = extent * extent / 4.0;
-        self.with_scene(Arc::new(self.scene.with_point_light(at, [intensity; 3])))
+        let light = Some(format!("a lamp at {:.4},{:.4},{:.4}", at.x, at.y, at.z));
+        let scene = Arc::new(self.scene.with_point_light(at, [intensity; 3]));
+        Clip { light, ..self.with_scene(scene) }
     }
 
     fn with_scene(&self, scene: Arc<Scene>) -> Clip {
-        Clip { scene, frames: self.frames.clone(), flags: self.flags.clone(), ..*self }
+        let (frames, flags) = (self.frames.clone(), self.flags.clone());
+        Clip { scene, frames, flags, light: self.light.clone(), ..*self }
     }
 
     /// Says a line on stderr, unless the user wants quiet.

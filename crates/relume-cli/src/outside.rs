@@ -181,11 +181,17 @@ pub(crate) fn lit_by_default(
     scene.clone().with_outside(outside).map_err(scene_file::failure)
 }
 
+/// That light as on the command line.
+pub(crate) fn default_light(azimuth: Option<f64>) -> String {
+    let sun = azimuth.map_or(String::new(), |azimuth| {
+        format!(" --sun {azimuth},{DEFAULT_ELEVATION},{DEFAULT_SUN_W_M2}")
+    });
+    format!("--sky overcast={DEFAULT_SKY_W_M2}{sun} --ground {DEFAULT_GROUND}")
+}
+
 /// What is said of that light.
 pub(crate) fn said_of_default(name: &str, azimuth: f64, why: &Unlit) -> String {
-    let light = format!(
-        "--sky overcast={DEFAULT_SKY_W_M2} --sun {azimuth},{DEFAULT_ELEVATION},{DEFAULT_SUN_W_M2} --ground {DEFAULT_GROUND}"
-    );
+    let light = default_light(Some(azimuth));
     match why {
         Unlit::Dark => format!(
             "note: nothing emits light in `{name}`: lit by {light}; choose with --sky, --sun or --environment"

@@ -87,7 +87,7 @@ pub(crate) struct RunOptions {
     pub(crate) threads: usize,
     /// Limit on the memory of the process.
     pub(crate) max_memory_bytes: Option<u64>,
-    /// Light from outside asked for, as on the command line.
+    /// Light beside the scene's own, as on the command line: asked for, or chosen for pictures.
     #[serde(default)]
     pub(crate) outside: Option<String>,
     /// How pictures were drawn, if they were.

@@ -300,7 +300,7 @@ impl Job {
             update: self.solve.update.name(),
             threads: clip.threads,
             max_memory_bytes: memory::limit_bytes(),
-            outside: flags.outside.describe(),
+            outside: clip.light.clone(),
             picture,
         }
     }

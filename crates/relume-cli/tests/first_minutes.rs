@@ -111,6 +111,13 @@ fn a_sky_is_added_where_what_emits_lights_little_of_what_is_seen() {
     let (said, with_sky) = emitted(&[]);
     assert!(said.contains("% of what the view shows: --sky overcast=3 --sun"), "{said}");
     assert!(said.contains("--sky none leaves it out"), "{said}");
+    // The report knows the light, and so does a run that goes on.
+    let chosen = |out: &Path| json(&out.join("report.json"))["options"]["outside"].clone();
+    let light = chosen(&out);
+    assert!(said.contains(light.as_str().expect("a light was chosen")), "{light} of {said}");
+    let other = ["--resume", "--eye=-3,1,-3", "--look-at=0.5,1,0.5"];
+    let again = [&["render", text(&scene), "-o", text(&out)], &SMALL[..], &other].concat();
+    relume(&again).fails(1, &["outside was --sky overcast=3 --sun"]);
     let (said, without) = emitted(&["--sky", "none"]);
     assert!(!said.contains("--sky"), "{said}");
     assert!(with_sky > 10.0 * without, "{with_sky} {without}");

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::common;
 use crate::common::{Random, at_tolerance, leaf_area, shipped, sliding, still, turn, v};
 use glam::{DQuat, DVec3};
-use relume_core::scene::outside::{Outside, Sky, Sun, SunPlace};
+use relume_core::scene::outside::{Day, Outside, Sky, Sun, SunPlace};
 use relume_core::scene::{LightKind, MaterialId, NodeId, PatchId, Scene, SceneBuilder};
 use relume_core::session::{FrameReport, Options, Session, Snapshot, radiosity_gap};
 
@@ -164,7 +164,10 @@ fn heap(seed: u64) -> Scene {
 const TIMES_S: [f64; 7] = [0.0, 0.01, 0.02, 0.6, 0.59, 1.0, 0.3];
 
 fn follow(seed: u64) {
-    let scene = Arc::new(heap(seed));
+    follow_in(Arc::new(heap(seed)), seed);
+}
+
+fn follow_in(scene: Arc<Scene>, seed: u64) {
     let options = at_tolerance(0.4);
     let mut warm = Session::new(Arc::clone(&scene), options.clone()).unwrap();
     for (k, time_s) in TIMES_S.into_iter().enumerate() {
@@ -183,6 +186,21 @@ fn follow(seed: u64) {
 #[test]
 fn heaps_under_lamps_bulbs_and_skies_equal_cold_builds() {
     (0..3).for_each(follow);
+}
+
+#[test]
+fn a_heap_under_a_sky_that_changes_over_the_day_equals_cold_builds() {
+    // From 5 to 15 o'clock at the meridian.
+    let place = SunPlace::Earth { latitude: 48.0, longitude: 0.0, unix_s: 1_781_995_200.0 };
+    let outside = Outside {
+        sky: Some(Sky::Turbid { turbidity: 3.0 }),
+        sun: Some(Sun { place, irradiance: None, diameter_deg: 0.53 }),
+        day: Some(Day { from_s: 5.0 * 3600.0, to_s: 15.0 * 3600.0, over_s: 1.0 }),
+        fineness: 0.3,
+        ground: 0.2,
+    };
+    let scene = heap(2).without_outside().with_outside(outside).unwrap();
+    follow_in(Arc::new(scene), 2);
 }
 
 #[test]
@@ -252,6 +270,81 @@ fn a_lumpy_body_receives_what_it_does_over_links_of_its_patches() {
     // Found: 0.0042 and 0.038.
     assert!(by_area < 0.03 && by_patch < 0.06, "{by_area} {by_patch}");
     assert!(2 * grouped.pairs.active < plain.pairs.active);
+}
+
+/// A black ball; so fine that all of its patches are small where there are 96 around.
+fn ball(around: u32) -> Scene {
+    let mut b = SceneBuilder::new("ball");
+    let black = b.material("black", [0.0; 3], [0.0; 3]);
+    let node = still(&mut b, "ball");
+    let at = |i: u32, k: u32| {
+        let turn = 2.0 * std::f64::consts::PI / f64::from(around);
+        let (a, c) = (turn * f64::from(i % around), turn * f64::from(k));
+        v(libm::sin(c) * libm::cos(a), libm::cos(c), libm::sin(c) * libm::sin(a))
+    };
+    for (i, k) in (0..around).flat_map(|i| (0..around / 2).map(move |k| (i, k))) {
+        if k + 1 < around / 2 {
+            b.polygon(node, "ball", black, &[at(i, k), at(i + 1, k + 1), at(i, k + 1)]);
+        }
+        if k > 0 {
+            b.polygon(node, "ball", black, &[at(i, k), at(i + 1, k), at(i + 1, k + 1)]);
+        }
+    }
+    b.build().unwrap()
+}
+
+#[test]
+fn facets_of_a_ball_see_their_share_of_the_sky_over_links_of_groups() {
+    let radiance = 2.0;
+    let sky = Outside { sky: Some(Sky::Uniform([radiance; 3])), ..Outside::default() };
+    let scene = Arc::new(ball(96).with_outside(sky).unwrap());
+    let (session, report) = built(&scene, &at_tolerance(0.1), 0.0);
+    let found = patch_means(&session.frame().unwrap().solution());
+    let most = std::f64::consts::PI * radiance;
+    let mut worst = 0.0_f64;
+    for (patch, (_, irradiance)) in scene.patches.iter().zip(&found) {
+        if !scene.is_distant(patch.body) {
+            // A plane at an angle to the horizon sees (1 + cos) / 2 of the sky.
+            let exact = 0.5 * most * (1.0 + patch.frame.normal.y);
+            worst = worst.max((irradiance - exact).abs() / most);
+        }
+    }
+    println!("{worst:.1e} of what a horizontal surface receives; {} links", report.links);
+    assert!(worst < 1e-3, "{worst}");
+    // No patch is linked with the sky by itself.
+    assert_eq!(report.link_kinds.unwrap().element_element, 0);
+    assert!(report.energy.unwrap().unbalanced() < 1e-4);
+}
+
+#[test]
+fn a_lumpy_body_under_a_sky_receives_what_it_does_over_links_of_its_patches() {
+    let mut b = SceneBuilder::new("torus on a lawn");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let node = still(&mut b, "lawn");
+    let lawn = [v(-6.0, 0.0, 6.0), v(6.0, 0.0, 6.0), v(6.0, 0.0, -6.0), v(-6.0, 0.0, -6.0)];
+    b.polygon(node, "lawn", grey, &lawn);
+    let node = b.node("torus", None, v(0.0, 1.2, 0.0), DQuat::from_rotation_x(1.1));
+    torus(&mut b, node, grey, 24, 0.9);
+    let sky =
+        Outside { sky: Some(Sky::Overcast { irradiance: 3.0 }), ground: 0.2, ..Outside::default() };
+    let scene =
+        Arc::new(b.build().unwrap().with_outside(Outside { fineness: 0.1, ..sky }).unwrap());
+    let solve = |options: Options| {
+        let (session, report) = built(&scene, &options, 0.0);
+        (patch_means(&session.frame().unwrap().solution()), report)
+    };
+    let (want, plain) = solve(Options { groups: false, ..at_tolerance(0.05) });
+    let (found, grouped) = solve(at_tolerance(0.1));
+    let (by_area, by_patch) = difference(&found, &want);
+    println!(
+        "{by_area:.4} by area, {by_patch:.4} by patch; {} of {} links",
+        grouped.links, plain.links
+    );
+    assert!(by_area < 0.03 && by_patch < 0.06, "{by_area} {by_patch}");
+    assert!(4 * grouped.links < plain.links, "{} of {}", grouped.links, plain.links);
+    assert!(grouped.energy.unwrap().unbalanced() < 1e-3);
+    let off = grouped.energy.unwrap().emitted_w / plain.energy.unwrap().emitted_w - 1.0;
+    assert!(off.abs() < 0.01, "{off}");
 }
 
 /// A room with tables on legs, boxes under and on them and a shelf of boxes, in which a small box slides.

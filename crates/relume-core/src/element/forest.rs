@@ -138,6 +138,8 @@ struct Fixed {
     connected_m2: Vec<f64>,
     /// Whether a node stands for light from outside, by id; empty if none does.
     distant: Vec<bool>,
+    /// Whether it is a wide part of the sky, by id; empty if nothing is distant.
+    wide: Vec<bool>,
     /// How many facets receive light: they come before those that are distant.
     near_facets: usize,
     /// Clusters that may be ends of links.
@@ -532,6 +534,13 @@ impl Forest {
     #[inline]
     pub fn is_distant(&self, id: ElementId) -> bool {
         self.fixed.distant.get(id.0 as usize).is_some_and(|&distant| distant)
+    }
+
+    /// Whether a node is a part of the sky so wide that no shadow has an edge in its light: groups are linked with it as
+    /// they are. Of the sun and of the brightest parts of pictures each patch sees its own share.
+    #[inline]
+    pub fn is_wide(&self, id: ElementId) -> bool {
+        self.fixed.wide.get(id.0 as usize).is_some_and(|&wide| wide)
     }
 
     /// Whether light is gathered there: an element that is not distant.

@@ -98,3 +98,12 @@ pub(super) const AREA_SHARE: f64 = 1.0 / 128.0;
 /// - Larger: errors of the coarse solution
 /// - Smaller: more pairs
 pub(super) const ACROSS_SHARE: f64 = 1.0 / 8.0;
+
+/// Side over distance of a square from which a part of the sky is wide, so that groups link with it: six discs of the sun, less
+/// than two degrees.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: more patches link with the sky one by one
+/// - Smaller: groups link with the sun, whose shadows have edges
+pub(super) const WIDE: f64 = 0.03;

@@ -10,7 +10,7 @@ pub(crate) fn balance_of(
     surfaces: &impl Surfaces,
     (links, radiosity): (&Links, &Radiosity),
     facets: impl Iterator<Item = ElementId>,
-    is_surface: &dyn Fn(u32) -> bool,
+    is_surface: &(dyn Fn(u32) -> bool + Sync),
 ) -> (RowSumError, Energy) {
     let mut rows = RowSumError::default();
     let mut energy = Energy::default();

@@ -31,15 +31,16 @@ impl SpaceJudge<'_> {
     }
 
     /// Whether a pair of which an end is a group is decided as one: both ends are at or below the coarse level, and what is
-    /// distant meets groups in the coarse solution only.
+    /// distant and narrow, as the sun is, meets groups in the coarse solution only.
     pub(super) fn is_group_pair(&self, a: ElementId, b: ElementId) -> bool {
         let is_end = |id| {
             self.forest.coarse(id).is_some()
                 && (self.is_group(id) || self.forest.kind(id) == Kind::Element)
         };
         let coarse = matches!(self.stage, Stage::Coarse);
-        let distant = self.forest.is_distant(a) || self.forest.is_distant(b);
-        (self.is_group(a) || self.is_group(b)) && is_end(a) && is_end(b) && (coarse || !distant)
+        let is_narrow = |id| self.forest.is_distant(id) && !self.forest.is_wide(id);
+        let narrow = is_narrow(a) || is_narrow(b);
+        (self.is_group(a) || self.is_group(b)) && is_end(a) && is_end(b) && (coarse || !narrow)
     }
 
     /// Judges a pair of a group with a group or an element.
@@ -154,12 +155,19 @@ impl SpaceJudge<'_> {
         (source, shows_m2): (ElementId, f64),
         (apart, x, v): (f64, &GroupExchange, f64),
     ) -> f64 {
+        if self.forest.is_distant(receiver) {
+            return 0.0;
+        }
         let light = brightness.of(self.forest, receiver);
         let sent = brightness.of(self.forest, source).radiosity;
         let reference_m2 = self.group_reference_m2(brightness, receiver);
         let weight = (area_m2 / reference_m2).sqrt();
         let arrives = sent * shows_m2 / (std::f64::consts::PI * apart * apart);
-        let place = PLACE * v * (x.size.0 * x.size.0 + x.size.1 * x.size.1);
+        // What a facet shows a part of the sky is known exactly.
+        let place = match self.forest.is_distant(source) {
+            true => 0.0,
+            false => PLACE * v * (x.size.0 * x.size.0 + x.size.1 * x.size.1),
+        };
         let shared = if self.is_group(receiver) { SHARED_BY_FACETS } else { SHARED };
         let hidden = if v < 1.0 { shared * shared * v * (1.0 - v) + MISSED / 16.0 } else { 0.0 };
         weight * arrives / light.irradiance * (place * place + hidden).sqrt()

@@ -72,6 +72,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
         cameras: draft.cameras,
         motion,
         outside: None,
+        outside_m: 0.0,
         notes,
         edited: super::Edited::default(),
     })

@@ -118,6 +118,8 @@ pub struct Scene {
     pub motion: Motion,
     /// The light from outside that distant bodies stand for ([`Scene::with_outside`]).
     pub outside: Option<Arc<outside::Outside>>,
+    /// How far away these bodies are, metres; 0 where there are none.
+    pub outside_m: f64,
     /// What was noticed while reading, for `info` and `check`.
     pub notes: Vec<Note>,
     /// Bodies that came or went since it was made: none by default.
@@ -362,7 +364,7 @@ impl Scene {
     /// The same scene without the bodies that stand for light from outside, which come last, and without those that were
     /// inserted after them.
     pub fn without_outside(&self) -> Scene {
-        let mut near = Scene { outside: None, ..self.clone() };
+        let mut near = Scene { outside: None, outside_m: 0.0, ..self.clone() };
         let made = near.bodies.iter().position(|body| body.distant).unwrap_or(near.bodies.len());
         near.bodies.truncate(made);
         let (bodies, patches) =

@@ -175,6 +175,19 @@ impl GroupLinks {
         Some(&self.links[self.by_ids[place] as usize])
     }
 
+    /// What both ends of one of these exchange, m2.
+    pub fn exchange_area_m2(&self, link: &GroupLink) -> f64 {
+        let projected = |end: &GroupEnd| match end {
+            GroupEnd::Group { facets, first } => {
+                let own = &self.facets[facets.start as usize..facets.end as usize];
+                let factors = &self.factors[*first as usize..*first as usize + own.len()];
+                own.iter().zip(factors).map(|(&(_, area), &f)| f64::from(area) * f64::from(f)).sum()
+            }
+            GroupEnd::Element { area_m2, mean, .. } => f64::from(*area_m2) * f64::from(*mean),
+        };
+        f64::from(link.coupling) * link.ends.iter().map(projected).product::<f64>()
+    }
+
     /// Adds a link of these to others.
     pub fn copy(&self, link: &GroupLink, ids: [u32; 2], to: &mut PlacedLinks) {
         let mut link = link.clone();
@@ -308,9 +321,18 @@ impl GroupLinks {
         h
     }
 
-    /// The sum of form factors from one element over its group links: in the first channel.
-    pub(super) fn row(&self, id: u32, linear: bool) -> Linear {
-        let ones = |_: u32| Linear { mean: [1.0, 0.0, 0.0], ..Linear::default() };
+    /// The sum of form factors from one element over its group links with sources that `counts` says, the same for all: in the
+    /// first channel.
+    pub(super) fn row(
+        &self,
+        id: u32,
+        linear: bool,
+        counts: &(dyn Fn(u32) -> bool + Sync),
+    ) -> Linear {
+        let ones = |id: u32| {
+            let mean = [f32::from(u8::from(counts(id))), 0.0, 0.0];
+            Linear { mean, ..Linear::default() }
+        };
         let rows = self.rows.get_or_init(|| self.arriving(&ones, self.moment));
         let row = self.at(rows, id);
         if linear { row } else { Linear { mean: row.mean, ..Linear::default() } }
@@ -400,7 +422,7 @@ mod tests {
             for c in 0..3 {
                 assert!((found.mean[c] - want[c]).abs() < 1e-6, "{id}: {found:?} {want:?}");
             }
-            let row = links.row(id, true).mean[0];
+            let row = links.row(id, true, &|_| true).mean[0];
             assert!((row - 2.0 * want[2]).abs() < 1e-6, "{id}: {row} {want:?}");
         }
     }

@@ -10,7 +10,7 @@ use super::surfaces::Surfaces;
 pub fn row_sums(
     surfaces: &impl Surfaces,
     (links, linear): (&Links, bool),
-    counts: &dyn Fn(u32) -> bool,
+    counts: &(dyn Fn(u32) -> bool + Sync),
     facet: u32,
     visit: &mut dyn FnMut(u32, f32),
 ) {
@@ -31,7 +31,7 @@ pub fn row_sums(
             sum.gradient.iter_mut().for_each(|g| g[0] *= per_radius);
         }
         match surfaces.groups() {
-            Some(groups) => sum.plus(&groups.row(id, linear)),
+            Some(groups) => sum.plus(&groups.row(id, linear, counts)),
             None => sum,
         }
     };

@@ -38,11 +38,15 @@ fn flux(solved: &Solved) -> (RowSumError, Energy) {
 
 /// Flux that arrives from what is distant, W: it emits what arrives.
 fn from_outside_w(surfaces: &LitForest<'_>, solved: &Solved) -> f64 {
-    let forest = &solved.space.forest;
+    let SpaceState { forest, groups, .. } = &solved.space;
     let mut sum = 0.0;
     for link in solved.tree.links() {
-        let exchange = f64::from(link.carried.exchange_area_past_occluders_m2());
         for end in [link.a, link.b].into_iter().filter(|&end| forest.is_distant(end)) {
+            let exchange = match groups.between([link.a.0, link.b.0]) {
+                Some(over_group) => groups.exchange_area_m2(over_group),
+                None if [link.a, link.b].iter().any(|&id| forest.group(id).is_some()) => 0.0,
+                None => f64::from(link.carried.exchange_area_past_occluders_m2()),
+            };
             let exitance = surfaces.material(surfaces.facet_of(end.0)).exitance;
             sum += exchange * exitance.iter().copied().map(f64::from).sum::<f64>();
         }

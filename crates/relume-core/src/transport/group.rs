@@ -8,15 +8,17 @@
 //!
 //! where d_i leads from the middle of facet i to the middle of the other end: every facet is read at its own place and with its
 //! own normal, and each facet i of a exchanges V A_i f_i A_j f_j / (pi R^2) with facet j of b. So whole and parts agree, both ways.
-//! Error: of the second order in size over distance. For an element four points stand in place of facets.
+//! Error: of the second order in size over distance. For an element four points stand in place of facets. Of a part of the sky, which
+//! is wide, each facet's f is such that A_i f_i P_b / (pi R^2) is its exchange area: exact but for the facet's own size.
 
 use glam::{DVec2, DVec3};
 
 use crate::element::{
     ElementId, Forest, GroupLeaf, Kind, WorldElement, WorldView, bilinear, bilinear_area,
 };
-use crate::geometry::Pose;
+use crate::geometry::{Pose, part_in_front};
 use crate::scene::BodyId;
+use crate::transport::point::form_factor_from_point;
 
 mod sight;
 
@@ -32,6 +34,8 @@ pub struct Spread<'a> {
     pub radius: f64,
     /// Area, m2.
     pub area_m2: f64,
+    /// Whether it stands for light from outside.
+    is_distant: bool,
     points: Points<'a>,
 }
 
@@ -94,21 +98,23 @@ impl<'a> Spread<'a> {
                 centre: pose.point(group.centre),
                 radius: group.radius,
                 area_m2: forest.area_m2(id),
+                is_distant: false,
                 points: Points::Group(forest.groups().leaves_of(group), pose),
             };
         }
         assert!(forest.kind(id) == Kind::Element, "an end is a group or an element");
         let e = WorldElement::new(view, forest, id, common.is_some());
         let (centre, radius, area_m2) = (e.centre, e.radius, e.area);
-        Spread { id, centre, radius, area_m2, points: Points::Element(e) }
+        let is_distant = forest.is_distant(id);
+        Spread { id, centre, radius, area_m2, is_distant, points: Points::Element(e) }
     }
 
     /// Projected area towards the middle of another end, each point at its own place: P, m2.
     pub fn projected_m2(&self, other: &Spread<'_>) -> f64 {
         match &self.points {
             Points::Group(leaves, pose) => {
-                let (to, r2) = seen_from(pose, self, other);
-                leaves.iter().map(|l| l.area_m2 * factor(l.centre, l.normal, to, r2)).sum()
+                let towards = Towards::new(pose, self, other);
+                leaves.iter().map(|l| l.area_m2 * towards.factor(l)).sum()
             }
             Points::Element(_) => self.area_m2 * self.slope(other).mean,
         }
@@ -129,8 +135,8 @@ impl<'a> Spread<'a> {
     /// Calls `visit` with f of each facet of a group, in their order.
     pub fn factors(&self, other: &Spread<'_>, visit: &mut dyn FnMut(f64)) {
         if let Points::Group(leaves, pose) = &self.points {
-            let (to, r2) = seen_from(pose, self, other);
-            leaves.iter().for_each(|l| visit(factor(l.centre, l.normal, to, r2)));
+            let towards = Towards::new(pose, self, other);
+            leaves.iter().for_each(|l| visit(towards.factor(l)));
         }
     }
 
@@ -195,8 +201,8 @@ impl<'a> Spread<'a> {
                 out.normals = [e.plane.normal; 16];
             }
             Points::Group(leaves, pose) => {
-                let (to, r2) = seen_from(pose, self, other);
-                let of = |l: &GroupLeaf| l.area_m2 * factor(l.centre, l.normal, to, r2);
+                let towards = Towards::new(pose, self, other);
+                let of = |l: &GroupLeaf| l.area_m2 * towards.factor(l);
                 let total: f64 = leaves.iter().map(of).sum();
                 if total <= 0.0 {
                     return out;
@@ -224,9 +230,41 @@ impl<'a> Spread<'a> {
     }
 }
 
-/// Middle of the other end in the frame of a group, and the square of its distance.
-fn seen_from(pose: &Pose, own: &Spread<'_>, other: &Spread<'_>) -> (DVec3, f64) {
-    (pose.inverse_point(other.centre), own.centre.distance_squared(other.centre))
+/// The other end of a pair as the facets of a group see it, in their frame.
+enum Towards {
+    /// Its middle, and the square of its distance.
+    Middle(DVec3, f64),
+    /// Corners of a part of the sky, how many, and pi R^2 / P.
+    Sky([DVec3; 4], usize, f64),
+}
+
+impl Towards {
+    fn new(pose: &Pose, own: &Spread<'_>, other: &Spread<'_>) -> Towards {
+        let r2 = own.centre.distance_squared(other.centre);
+        match &other.points {
+            Points::Element(e) if other.is_distant => {
+                let scale = std::f64::consts::PI * r2 / other.projected_m2(own);
+                let corners = e.corners.map(|corner| pose.inverse_point(corner));
+                Towards::Sky(corners, e.len, if scale.is_finite() { scale } else { 0.0 })
+            }
+            _ => Towards::Middle(pose.inverse_point(other.centre), r2),
+        }
+    }
+
+    /// f of a facet.
+    fn factor(&self, leaf: &GroupLeaf) -> f64 {
+        match self {
+            Towards::Middle(to, r2) => factor(leaf.centre, leaf.normal, *to, *r2),
+            Towards::Sky(corners, len, scale) => {
+                let height = |corner: DVec3| leaf.normal.dot(corner - leaf.centre);
+                let seen = part_in_front(&corners[..*len], height);
+                match seen.len() < 3 {
+                    true => 0.0,
+                    false => form_factor_from_point(leaf.centre, leaf.normal, &seen) * scale,
+                }
+            }
+        }
+    }
 }
 
 /// f of a point.

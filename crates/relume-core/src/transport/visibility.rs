@@ -870,7 +870,7 @@ mod tests {
                 shaft(&above.0, &above.1).narrow(&[Forest::ROOT.0], &mut handed);
                 let pair = shaft(&a, &b);
                 let blockers = pair.blockers(&[Forest::ROOT.0]);
-                assert_eq!(pair.narrow_to_blockers(&handed, &mut both), blockers);
+                assert_eq!(pair.narrow_to_blockers(&handed, &mut both).blockers, blockers);
                 let mut alone = Vec::new();
                 pair.narrow(&handed, &mut alone);
                 assert_eq!(both, alone);

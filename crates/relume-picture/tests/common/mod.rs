@@ -41,6 +41,7 @@ pub(crate) fn empty() -> Scene {
         cameras: Vec::new(),
         motion: Motion::default(),
         outside: None,
+        outside_m: 0.0,
         notes: Vec::new(),
         edited: Default::default(),
     }

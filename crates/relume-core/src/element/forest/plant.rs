@@ -16,7 +16,9 @@ use crate::element::exposed::exposed_m2;
 use crate::element::groups::{Layout, Sort};
 use crate::element::ids::{ElementId, Kind};
 use crate::element::split::{Chart, Place, Shape};
-use crate::element::tuning::{CROSSED_PART, CROSSED_SHARE, CROSSED_TIMES, CUT_LEAST, CUT_SHARE};
+use crate::element::tuning::{
+    CROSSED_PART, CROSSED_SHARE, CROSSED_TIMES, CUT_LEAST, CUT_SHARE, WIDE,
+};
 use crate::geometry::{Aabb, cut_along, polygon_area, split_convex};
 use crate::scene::{BodyId, Lines, Scene};
 
@@ -109,6 +111,7 @@ impl Forest {
             distant[rows.after_lights as usize] = true;
             distant[first..].fill(true);
             forest.fixed_mut().distant = distant;
+            forest.fixed_mut().wide = forest.wide_parts(scene, first);
         }
         if !beds.is_empty() {
             forest.fixed_mut().names = names_in(forest.nodes.len() as u32, &beds);
@@ -142,6 +145,16 @@ impl Forest {
             (siblings.facet, siblings.path) = (id, 1);
         }
         Rows { near, far, after_lights, first_inserted: made_children + 1 }
+    }
+
+    /// Which nodes are wide parts of the sky; those from `first` on are distant.
+    fn wide_parts(&self, scene: &Scene, first: usize) -> Vec<bool> {
+        let is_wide = |id: usize| {
+            let id = ElementId(id as u32);
+            let wide_m2 = (WIDE * scene.outside_m).powi(2);
+            self.kind(id) == Kind::Element && self.shape(id).area() > wide_m2
+        };
+        (0..self.nodes.len()).map(|id| id >= first && is_wide(id)).collect()
     }
 
     /// Works out what is known of the fixed part once all of it is there.

@@ -47,7 +47,7 @@ impl Scene {
         if let Some(day) = outside.day {
             self.motion.duration_s = self.motion.duration_s.max(day.over_s);
         }
-        self.outside = Some(Arc::new(outside));
+        (self.outside, self.outside_m) = (Some(Arc::new(outside)), far_m);
         Ok(self)
     }
 

@@ -7,7 +7,7 @@ use crate::transport::segments::EDGE_OVERLAP;
 use glam::DVec3;
 
 use super::super::tuning::FACET_RAYS;
-use super::{GROUP_SEGMENTS, Points, Spread, factor, point_of, scrambled, seen_from};
+use super::{GROUP_SEGMENTS, Points, Spread, Towards, factor, point_of, scrambled};
 
 /// Query for the occluders between two ends of which one is a group.
 pub struct GroupSight<'a> {
@@ -140,10 +140,10 @@ impl Aims {
         let Points::Group(leaves, pose) = &own.points else {
             return Some(Aims { facets: vec![0], sums: vec![1.0], weights: vec![1.0] });
         };
-        let (to, r2) = seen_from(pose, own, other);
+        let towards = Towards::new(pose, own, other);
         let (mut facets, mut weights, mut sums, mut sum) = (vec![], vec![], vec![], 0.0);
         for (k, leaf) in leaves.iter().enumerate() {
-            let weight = leaf.area_m2 * factor(leaf.centre, leaf.normal, to, r2);
+            let weight = leaf.area_m2 * towards.factor(leaf);
             if weight > 0.0 {
                 sum += weight;
                 facets.push(k as u32);

@@ -121,13 +121,13 @@ a_few! {
     pipes_near_a_floor: "pipe", 0..3;
     edges_of_plates: "edge", 0..3;
     skirting_boards: "skirting", 0..3;
-    lamps_under_a_ceiling: "cove", 1..3;
+    lamps_under_a_ceiling: "cove", 0..4;
     egg_crate_louvres: "louvre", 0..2;
     blades_in_a_row: "blades", 0..3;
     crates_on_a_floor: "standing", 0..4;
     crates_that_land: "landing", 0..2;
     rugs_on_a_floor: "rug", 0..4;
-    sensors_in_gaps: "sensor-in-gap", 2..4;
+    sensors_in_gaps: "sensor-in-gap", 0..8;
     furnaces_with_gaps: "furnace", 0..3;
     bodies_through_each_other_in_motion: "motion", 0..3;
     white_closets: "closet", 2..4;

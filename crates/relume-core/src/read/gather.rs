@@ -89,8 +89,23 @@ pub(super) struct Gathered {
     pub(super) near: Vec<Near>,
     /// Form factor to what is far enough.
     factor: f64,
-    /// Distance of all that is seen, metres, with its form factor; of the sensor itself.
-    pub(super) seen: Vec<(f64, f64)>,
+    /// Distance of what is far enough, metres, with its form factor; of the sensor itself.
+    seen: Vec<(f64, f64)>,
+}
+
+impl Gathered {
+    /// Distance within which half of the hemisphere is seen, metres; infinite where more than that is open.
+    pub(super) fn half_seen_m(&self) -> f64 {
+        let near = self.parts.iter().map(|part| (part.nearest_m, part.factor));
+        let mut seen: Vec<(f64, f64)> = self.seen.iter().copied().chain(near).collect();
+        seen.sort_by(|one, other| one.0.total_cmp(&other.0));
+        let mut left = 0.5;
+        let found = seen.iter().find(|(_, factor)| {
+            left -= factor;
+            left < 0.0
+        });
+        found.map_or(f64::INFINITY, |&(distance_m, _)| distance_m)
+    }
 }
 
 /// A part of a leaf, as large as it is far.
@@ -99,6 +114,8 @@ pub(super) struct Part {
     pub(super) leaf: ElementId,
     /// The middle of the visible portion, metres.
     pub(super) at: DVec3,
+    /// Distance of its nearest point, metres.
+    nearest_m: f64,
     pub(super) factor: f64,
 }
 
@@ -253,11 +270,7 @@ impl<'a> Look<'a> {
         let way_m = e.bounds.distance(&Aabb::of([self.point]));
         let is_near = e.radius > way_m || way_m < self.reach_m;
         if self.purpose == Purpose::Sensor && is_near {
-            let from = out.parts.len();
-            self.add_parts(id, &seen, (&in_the_way, SPLITS), &mut out.parts);
-            let way = |part: &Part| (part.at.distance(self.point), part.factor);
-            out.seen.extend(out.parts[from..].iter().map(way));
-            return;
+            return self.add_parts(id, &seen, (&in_the_way, SPLITS), &mut out.parts);
         }
         let (factor, b) = if in_the_way.is_empty() && !is_near {
             let factor = form_factor_from_point(self.point, self.normal, &seen);
@@ -349,7 +362,13 @@ impl<'a> Look<'a> {
     ) {
         let middle = part.iter().sum::<DVec3>() / part.len() as f64;
         let radius = part.iter().map(|c| c.distance(middle)).fold(0.0, f64::max);
-        if splits > 0 && radius > (middle - self.point).length() {
+        let nearest_m = Aabb::of(part.iter().copied()).distance(&Aabb::of([self.point]));
+        // In a gap a part reaches no nearer than it is large: what arrives changes within the gap's width.
+        let way_m = match self.reach_m > 0.0 {
+            true => nearest_m,
+            false => (middle - self.point).length(),
+        };
+        if splits > 0 && radius > way_m {
             for k in 0..part.len() {
                 let part = towards(part, k, middle);
                 let pyramid = pyramid(self.point, &part);
@@ -361,7 +380,7 @@ impl<'a> Look<'a> {
         }
         let (factor, moment) = self.factor_past(part, occluders, SPLITS);
         if factor > 0.0 {
-            out.push(Part { leaf, at: moment / factor, factor });
+            out.push(Part { leaf, at: moment / factor, nearest_m, factor });
         }
     }
 

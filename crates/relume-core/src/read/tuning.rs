@@ -123,13 +123,15 @@ pub(super) const IN_A_GAP: f64 = 0.5;
 /// - Smaller: sensors in gaps are as wrong as leaves there, by a tenth
 pub(super) const GAP_NARROW: f64 = 0.25;
 
-/// Distance up to which leaves are not taken at their line in a gap, over its width.
+/// Distance up to which leaves are not taken at their line in a gap, over its width: at least, and at most where that is less than
+/// the length at which an element weighs 1 in the error norm.
 ///
 /// - Unit: 1
-/// - Tried: 0, 4, 8, 16
+/// - Tried: 0, 4, 8, 16 without and with 64
 /// - Larger: time of sensors and scatter of walks
-/// - Smaller: sensors in gaps are as wrong as leaves there (0: by up to 16 %; 4: by 3 %)
-pub(super) const GAP_REACH: f64 = 8.0;
+/// - Smaller: sensors in gaps are as wrong as leaves there (0: by up to 16 %; 4: by 3 %; 60 widths deep 16 alone is ten times too
+///   bright)
+pub(super) const GAP_REACH: (f64, f64) = (16.0, 64.0);
 
 /// Radius of an element over its distance up to which it sends its mean radiosity into a gap.
 ///
@@ -138,6 +140,14 @@ pub(super) const GAP_REACH: f64 = 8.0;
 /// - Larger: errors of uneven surfaces that are seen out of a gap
 /// - Smaller: time of sensors
 pub(super) const GAP_FAR: f64 = 1.0 / 8.0;
+
+/// Irradiance in a gap by what arrives from far along walks, over that by lines, below which lines are of no use.
+///
+/// - Unit: 1
+/// - Tried: 0, 1/4
+/// - Larger: scatter of readings in gaps
+/// - Smaller: readings deep in gaps are too bright: ten times, 60 widths deep
+pub(super) const GAP_DARK: f64 = 0.25;
 
 /// Walks from a sensor in a gap.
 ///
@@ -153,7 +163,7 @@ pub(super) const GAP_WALKS: usize = 64;
 /// - Tried: 1e-3, 1e-2, 3e-2
 /// - Larger: errors of leaves in gaps show
 /// - Smaller: time of sensors
-pub(super) const GAP_FOLLOWED: (f64, usize) = (1e-2, 24);
+pub(super) const GAP_FOLLOWED: (f64, usize) = (1e-3, 24);
 
 /// Error of a solution in dark places, in tolerances of the mean irradiance: where automatic exposure stops.
 ///

@@ -50,14 +50,14 @@ impl Gap {
     pub(super) fn irradiance(&self, solved: &Solved, sensor: &Sensor) -> [f64; 3] {
         let look = Look::new(solved, sensor, Purpose::Sensor).reaching(self.reach_m);
         let Gathered { mut sum, parts, .. } = look.gather();
-        let look_far = sum;
+        let far = sum;
         let lines: Vec<[f64; 3]> = parts.iter().map(|part| part.line(solved)).collect();
         for (part, line) in parts.iter().zip(&lines) {
             (0..3).for_each(|c| sum[c] += part.factor * line[c]);
         }
         let factors = || parts.iter().map(|part| part.factor);
         let weight = factors().sum::<f64>() / GAP_WALKS as f64;
-        let (by_lines, mut absorbed) = (sum, look_far);
+        let (by_lines, mut absorbed) = (sum, far);
         for walk in 0..GAP_WALKS {
             let share = (walk as f64 + 0.5) / GAP_WALKS as f64;
             let Some(k) = at_share(factors(), share) else { break };

@@ -17,6 +17,7 @@ use crate::space::Solved;
 use super::choice::spread;
 use super::gather::{Look, Purpose, Sensor};
 use super::rays::{Hit, Rays};
+use super::sensors::irradiance;
 use super::snapshot::{self, Leaf};
 use super::tuning::{ACCURACY_RAYS, BRIGHT, DARK, LAMPS, STEPS, WALK_LEAST, WALKS};
 
@@ -43,7 +44,7 @@ pub(super) fn accuracy(solved: &Solved, points: usize) -> Accuracy {
 pub(super) fn accuracy_at(solved: &Solved, sensors: &[Sensor]) -> Accuracy {
     let meter = Meter::new(solved, &Leaves::new(solved));
     let read = |&sensor: &Sensor| {
-        let said = all(Look::new(solved, &sensor, Purpose::Sensor).irradiance());
+        let said = all(irradiance(solved, &sensor));
         Place { sensor, said }
     };
     let places: Vec<Place> = sensors.par_iter().map(read).collect();

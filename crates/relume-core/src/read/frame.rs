@@ -10,7 +10,8 @@ use crate::space::{Solved, row_sums_of};
 
 use super::events::{self, Event};
 use super::factors::{Factors, Grouping};
-use super::gather::{self, Sensor};
+use super::gather::Sensor;
+use super::sensors;
 use super::snapshot::{self, Snapshot};
 use super::{accuracy, reconstruct};
 
@@ -71,7 +72,7 @@ impl<'a> Frame<'a> {
     /// Irradiances at many sensors in parallel, W/m2, linear RGB, in their order. Cost: some 0.1 us for each element
     /// that is neither far from a sensor nor hidden, more where something is partly in the way.
     pub fn irradiances_at(&self, sensors: &[Sensor]) -> Vec<[f64; 3]> {
-        gather::irradiances_at(self.solved, sensors)
+        sensors::irradiances_at(self.solved, sensors)
     }
 
     /// Errors of what the mesh says, estimated at so many points along rays; each point costs some 2,000 rays.

@@ -4,7 +4,6 @@
 //! down to the elements below it, most of which find nothing in the way.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::element::{ElementId, Forest, Kind, WorldElement};
 use crate::geometry::{Aabb, Plane, shaft_meets_box};
@@ -18,8 +17,7 @@ use crate::transport::{
 use crate::space::{Solved, place_of};
 
 use super::choice::at_share;
-use super::gap::Gap;
-use super::tuning::{GAP_FAR, GATHER_FAR, GATHER_LITTLE};
+use super::tuning::{GAP_FAR, GATHER_FAR};
 
 /// A place and a direction at which irradiance is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,20 +26,6 @@ pub struct Sensor {
     pub at: DVec3,
     /// Unit vector that it faces along.
     pub normal: DVec3,
-}
-
-/// Sensors that one task handles.
-const SENSORS_AT_ONCE: usize = 8;
-
-/// Irradiances at sensors in parallel, W/m2, linear RGB, in their order: gathered from all elements and punctual lights,
-/// each with visibility of its own from the sensor; the same bits for any number of threads.
-///
-/// Visibility is exact up to rounding, except where an element falls into more than some hundred visible pieces; what an
-/// element sends errs by its radiosity's variation within it. What an emitter emits is exact. Cost: proportional to sensors
-/// times the elements that are neither far away nor hidden, some 0.1 us each, more where something is partly in the way.
-pub(super) fn irradiances_at(solved: &Solved, sensors: &[Sensor]) -> Vec<[f64; 3]> {
-    let one = |sensor: &Sensor| Look::new(solved, sensor, Purpose::Sensor).irradiance();
-    sensors.par_chunks(SENSORS_AT_ONCE).flat_map_iter(|some| some.iter().map(one)).collect()
 }
 
 /// How far a sensor may be off the surface it lies on, relative to the scene's diagonal: what files
@@ -145,23 +129,6 @@ impl<'a> Look<'a> {
     /// The same look, that takes no leaf at its word up to a distance.
     pub(super) fn reaching(self, reach_m: f64) -> Look<'a> {
         Look { reach_m, ..self }
-    }
-
-    /// Irradiance at the sensor, W/m2.
-    pub(super) fn irradiance(&self) -> [f64; 3] {
-        let found = self.gather();
-        if let Some(gap) = Gap::around(self.solved, &found) {
-            return gap.irradiance(self.solved, &Sensor { at: self.point, normal: self.normal });
-        }
-        let Gathered { mut sum, parts, .. } = found;
-        for (k, part) in parts.iter().enumerate() {
-            let b = match part.factor > GATHER_LITTLE {
-                true => Gap::NONE.radiosity_of(self.solved, part, k),
-                false => part.line(self.solved),
-            };
-            (0..3).for_each(|c| sum[c] += part.factor * b[c]);
-        }
-        sum
     }
 
     /// What the point sees.

@@ -16,6 +16,7 @@ mod names;
 mod pieces;
 mod rays;
 mod reconstruct;
+mod sensors;
 mod snapshot;
 mod solution;
 mod tuning;

@@ -56,7 +56,7 @@ pub struct InShaft {
 /// Sizes of the blockers between two ends; infinite where there are none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BlockerSizes {
-    /// For each end how unevenly lamps in the shaft light it ([`spot`]): 1.
+    /// For each end how unevenly lamps in the shaft light it (`spot`): 1.
     pub spots: (f64, f64),
     /// Area of the smallest blocker, m2.
     pub least_m2: f64,
@@ -232,7 +232,7 @@ impl<'a> Shaft<'a> {
         !behind.0 && !behind.1 && reach(&occluder.plane, a, b) > slack
     }
 
-    /// For each end the largest [`spot`] of some lamps that shine on it, 1; what surrounds the ends has the areas `around_m2`.
+    /// For each end the largest `spot` of some lamps that shine on it, 1; what surrounds the ends has the areas `around_m2`.
     fn spots(&self, lamps: &[PatchId], around_m2: (f64, f64)) -> (f64, f64) {
         let mut most = (0.0_f64, 0.0_f64);
         for &patch in lamps {

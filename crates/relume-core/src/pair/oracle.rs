@@ -173,7 +173,7 @@ struct Uneven {
     edge: f64,
     /// Standard deviation of both with the gradient, by which uneven radiosity of the source is weighed.
     sends: f64,
-    /// Of what is reflected from a lamp close by, over the mean around: 1.
+    /// Standard deviation of the radiosity reflected from lamps close by, weighted by `SPOT`, over the mean around: 1.
     spot: f64,
 }
 

@@ -192,6 +192,39 @@ fn sensors_keep_the_default_tolerance_with_those_in_the_gap() {
     assert!(worst < 0.07, "in the gap: {worst}");
 }
 
+/// Two rooms, light in the first, and a door between them that opens by 22, 45 and 90 degrees, 5 mm above the floor: light
+/// leaked into the second room past the hinge and under the door, from elements that lie on both sides.
+/// References: 16,000 x 64 paths a sensor (`examples/path_traced.rs`).
+#[test]
+fn a_room_behind_a_door_is_as_bright_as_it_is() {
+    let mut session =
+        Session::new(Arc::new(shipped("door_opens.glb")), at_tolerance(0.02)).unwrap();
+    let rows = rows("door_opens.csv");
+    for frame in [0_u32, 24, 48] {
+        let report = session.step(frame, f64::from(frame) / 24.0).unwrap();
+        let solved = session.frame().unwrap();
+        let off = |r: &&Vec<f64>| {
+            let three = |k: usize| v(r[k], r[k + 1], r[k + 2]);
+            (solved.irradiance_at(three(2), three(5))[0] / r[8] - 1.0, r[11] / r[8])
+        };
+        let here = || rows.iter().filter(|r| r[0] == f64::from(frame));
+        let (dark, lit): (Vec<&Vec<f64>>, Vec<_>) = here().partition(|r| r[2] > 4.1);
+        for (room, at, most) in [("dark", dark, 0.02), ("lit", lit, 0.004)] {
+            let errors: Vec<(f64, f64)> = at.iter().map(off).collect();
+            let mean = |f: &dyn Fn(&(f64, f64)) -> f64| {
+                errors.iter().map(f).sum::<f64>() / errors.len() as f64
+            };
+            let (bias, square) = (mean(&|e| e.0), mean(&|e| e.0 * e.0 - e.1 * e.1).max(0.0));
+            println!(
+                "frame {frame}, {room}: RMS {:.4}, bias {bias:+.4}; {} links",
+                square.sqrt(),
+                report.links
+            );
+            assert!(square.sqrt() <= most && bias.abs() <= 0.9 * most, "{frame} {room}: {bias}");
+        }
+    }
+}
+
 /// RMS and mean relative error of the patch means of the static room.
 fn patch_means(snapshot: &Snapshot) -> (f64, f64) {
     // Where a penumbra is, 8 x 8 points alone make an error of 0.6 %.

@@ -29,7 +29,11 @@ fn constants(text: &str) -> Result<Vec<Constant>, String> {
     let mut doc: Vec<String> = Vec::new();
     for line in joined(text) {
         if let Some(words) = line.strip_prefix("///") {
-            doc.push(words.trim().to_owned());
+            // What is further in continues the item above.
+            match doc.last_mut().filter(|last| last.starts_with("- ") && words.starts_with("   ")) {
+                Some(item) => *item = format!("{item} {}", words.trim()),
+                None => doc.push(words.trim().to_owned()),
+            }
             continue;
         }
         let Some((_, declared)) = line.split_once("const ") else {
@@ -132,11 +136,11 @@ fn the_page_of_constants_is_that_of_the_source() {
 
 #[test]
 fn a_constant_without_its_range_is_refused() {
-    let whole = "/// Weight of noise.\n///\n/// - Unit: 1\n/// - Tried: not varied\n/// - Larger: a\n/// - Smaller: b\n";
+    let whole = "/// Weight of noise.\n///\n/// - Unit: 1\n/// - Tried: not varied\n/// - Larger: a\n///   and c\n/// - Smaller: b\n";
     let declared = "pub(super) const NOISE: f64 =\n    0.2;\n";
     let found = constants(&format!("{whole}{declared}")).unwrap();
     assert_eq!((found.len(), &*found[0].name, &*found[0].value), (1, "NOISE", "0.2"));
-    assert_eq!(found[0].fields[3], "b");
+    assert_eq!(found[0].fields[2..], ["a and c", "b"]);
     for field in FIELDS {
         let start = format!("/// - {field}");
         let without: Vec<&str> = whole.lines().filter(|line| !line.starts_with(&start)).collect();

@@ -27,29 +27,29 @@ pub(super) const CUT_SHARE: f64 = 0.25;
 /// - Smaller: more elements than light needs
 pub(super) const CUT_LEAST: f64 = 1.0 / 64.0;
 
-/// Share of the chord of a smaller polygon that a crossing patch must cover for it to be cut there.
+/// Share of the chord of a smaller polygon that lines of contact must cover for it to be cut there.
 ///
 /// - Unit: 1
 /// - Tried: not varied
-/// - Larger: light leaks through walls that furniture pierces
+/// - Larger: light leaks through walls that furniture pierces, and past hinges
 /// - Smaller: polygons are cut where little crosses them
-pub(super) const CROSSED_SHARE: f64 = 0.9;
+pub(super) const SMALL_CUT_SHARE: f64 = 0.9;
 
-/// Area of a part, over that of a smaller polygon that is cut by what crosses it.
+/// Area of a part, over that of a smaller polygon that is cut.
 ///
 /// - Unit: 1
 /// - Tried: not varied
 /// - Larger: light leaks through walls that furniture pierces
 /// - Smaller: slivers
-pub(super) const CROSSED_PART: f64 = 1.0 / 64.0;
+pub(super) const SMALL_CUT_PART: f64 = 1.0 / 64.0;
 
-/// Cuts of a smaller polygon by what crosses it.
+/// Cuts of a smaller polygon.
 ///
 /// - Unit: cuts
 /// - Tried: not varied
 /// - Larger: more elements
 /// - Smaller: light leaks through the other walls
-pub(super) const CROSSED_TIMES: u32 = 2;
+pub(super) const SMALL_CUT_TIMES: u32 = 2;
 
 /// Ratio of the sides from which an element is halved across its long side, not quartered.
 ///

@@ -6,8 +6,8 @@ use crate::transport::{BlockerSizes, Exchange, SEGMENTS, Variation, Visibility};
 use super::brightness::Brightness;
 use super::margin::Margin;
 use super::tuning::{
-    ALIKE_FACTOR, ALIKE_SHARE, BENT, EDGE, EDGE_REFLECTED, NOISE, PREFERENCE, SEEN, SHADOW_AREAS,
-    SOURCE_VARIATION, SPOT, STEEP,
+    ALIKE_FACTOR, ALIKE_SHARE, BENT, EDGE, EDGE_REFLECTED, JUMP, NOISE, PREFERENCE, SEEN,
+    SHADOW_AREAS, SOURCE_VARIATION, SPOT, STEEP,
 };
 use crate::transport::Side;
 
@@ -82,7 +82,7 @@ impl Estimate {
 /// The irradiance on a from b is B_b X V / A_a, with a gradient over a and one over b. It errs by
 /// (1) what the gradient does not catch of its variation over the receiver, of the kernel and of
 /// the visibility; (2) the variation of the source's reflected radiosity beyond its gradient, as
-/// far as the kernel weighs it unevenly; (3) the sampling of V. All three are standard deviations
+/// far as the kernel weighs it unevenly, with jumps where something stands on it; (3) the sampling of V. All three are standard deviations
 /// and add in quadrature. Small receivers weigh by the root of their area: equal shares of the
 /// total squared error.
 pub(super) fn estimate(
@@ -99,19 +99,20 @@ pub(super) fn estimate(
         ((v.value * (1.0 - v.value) + 0.02) / f64::from(v.segments)).sqrt() * NOISE
     };
     let sends = |over: &Variation, spread: f64| length(v.value * (over.slope + over.bend), spread);
-    let over = |over: &Variation, edge: f64, spot: f64| Uneven {
+    let over = |over: &Variation, edge: f64, (spot, near): (f64, f64)| Uneven {
         bend: BENT * v.value * over.bend,
         edge,
         sends: sends(over, edge),
         spot: SPOT * spot,
+        jump: JUMP * near,
     };
     // The points that V is found from tell no more than those of the kernel.
     let least = match x.is_steep && v.segments > 0 {
         true => STEEP * (v.value / SEEN).min(1.0),
         false => 0.0,
     };
-    let over_a = over(&x.over_a, v.spread_a.max(least), blockers.spots.0);
-    let over_b = over(&x.over_b, v.spread_b.max(least), blockers.spots.1);
+    let over_a = over(&x.over_a, v.spread_a.max(least), (blockers.spots.0, blockers.near.0));
+    let over_b = over(&x.over_b, v.spread_b.max(least), (blockers.spots.1, blockers.near.1));
     let link = LinkSize {
         exchange: x.area_m2,
         noise,
@@ -175,6 +176,8 @@ struct Uneven {
     sends: f64,
     /// Standard deviation of the radiosity reflected from lamps close by, weighted by `SPOT`, over the mean around: 1.
     spot: f64,
+    /// Standard deviation of the reflected radiosity where what stands on the end hides light from it, over its mean: 1.
+    jump: f64,
 }
 
 /// Error on the receiver, and the parts of it that splitting receiver and source would mend.
@@ -202,8 +205,9 @@ fn one_way(
     let uneven = length(radiosity * over_receiver.bend * whole, edge * over_receiver.edge * finer);
     let by_receiver = per_radiosity * uneven;
     // The edges of what is hidden run through as many sources as it is long: all err in the same sense.
-    let spot = over_source.spot * whole.sqrt();
-    let sends = over_source.sends * varies.max(spot);
+    let along = whole.sqrt();
+    let (spot, jump) = (over_source.spot * along, over_source.edge * over_source.jump * along);
+    let sends = length(over_source.sends * varies.max(spot), jump);
     let by_source = per_radiosity * reflected * sends;
     let by_noise = per_radiosity * radiosity * link.noise;
     // Relative to what the link itself brings, which no light changes: close to a lamp that is the most of what arrives.

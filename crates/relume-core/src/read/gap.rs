@@ -79,6 +79,7 @@ impl Gap {
     }
 
     fn follow(&self, solved: &Solved, part: &Part, k: usize) -> Followed {
+        let least_share = GAP_FOLLOWED.0 * solved.space.tuning.tolerance;
         let scene = &solved.space.scene;
         let now = &solved.space.world;
         let (mut b, mut share, mut part) = (Followed::default(), [1.0; 3], *part);
@@ -101,7 +102,7 @@ impl Gap {
                 share[c] *= rho[c] * seen;
             }
             let left = share.iter().fold(0.0, |most: f64, s| most.max(*s));
-            if !goes_on || left <= GAP_FOLLOWED.0 || step == GAP_FOLLOWED.1 {
+            if !goes_on || left <= least_share || step == GAP_FOLLOWED.1 {
                 return b;
             }
             match look.choose(&near, [spread(k, 2 * step), spread(k, 2 * step + 1)]) {

@@ -165,7 +165,7 @@ impl<'a> Look<'a> {
         let polygon = view.occluder(patch);
         let rounding_m = view.patch(patch).rounding_m;
         let before = polygon.plane.distance(self.point) > rounding_m;
-        if !before || polygon.corners.iter().all(|&c| self.tangent.distance(c) <= 0.0) {
+        if !before || polygon.corners.iter().all(|&c| self.tangent.distance(c) <= self.slack_m) {
             return;
         }
         let occluders = self.between(patch, rounding_m);

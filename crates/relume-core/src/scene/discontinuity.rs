@@ -5,38 +5,83 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{BodyId, PatchId, Scene};
-use crate::geometry::{Aabb, Plane, Segment, segment_within};
+use super::{BodyId, Patch, PatchId, Scene};
+use crate::geometry::{Aabb, Plane, Pose, Segment, segment_within};
 
 /// What lies this close to a plane, as a share of the largest coordinate, lies in it: a few roundings of 32-bit numbers.
 const IN_PLANE: f64 = 1e-6;
 
-/// Lines within a patch along which others meet it, in its frame, metres.
-#[derive(Clone, Debug, Default)]
-pub struct Lines {
-    /// Where others stand on its plane or cross it.
-    pub all: Vec<Segment>,
-    /// Of these, where others have parts on both sides of it.
-    pub crossing: Vec<Segment>,
-}
+/// Instants of an animation at which an edge must be in one place to count as at rest.
+const INSTANTS: u32 = 64;
 
 impl Scene {
-    /// For each patch, where others meet its plane within it. Bodies that never move meet each other, a body that moves
-    /// or was inserted only itself: lines of contact that move are not found. Outer edges of the patch are left out. In the patch's frame,
-    /// metres; exact to a millionth of the largest coordinate. Cost: pairs of patches whose boxes meet along x.
-    pub fn discontinuities(&self) -> Vec<Lines> {
-        let mut out = vec![Lines::default(); self.patches.len()];
+    /// For each patch, lines along which others meet its plane within it. Bodies that never move meet each other, a body that
+    /// moves or was inserted itself; edges that stay in place while their body turns about them (hinges) meet what never moves.
+    /// Other lines of contact that move are not found. Outer edges of the patch are left out. In the patch's frame, metres;
+    /// exact to a millionth of the largest coordinate. Cost: pairs of patches whose boxes meet along x.
+    pub fn discontinuities(&self) -> Vec<Vec<Segment>> {
+        let mut out = vec![Vec::new(); self.patches.len()];
         let bodies = (0..self.bodies.len() as u32).map(BodyId);
         let alone = |body: &BodyId| self.moves(*body) || self.is_inserted(*body);
         let (moving, at_rest): (Vec<BodyId>, Vec<BodyId>) =
             bodies.filter(|&body| !self.is_distant(body)).partition(alone);
         self.meet(&at_rest, &mut out);
-        moving.into_iter().for_each(|body| self.meet(&[body], &mut out));
+        for body in moving {
+            self.meet(&[body], &mut out);
+            self.stand(&at_rest, &self.hinges(body), &mut out);
+        }
         out
     }
 
+    /// Edges of a body that stay where they are while it turns, in the world; none of one that is at rest or inserted.
+    fn hinges(&self, body: BodyId) -> Vec<[DVec3; 2]> {
+        let node = self.bodies[body.0 as usize].node;
+        let [from_s, to_s] = self.motion.span_s();
+        if self.is_inserted(body) || from_s >= to_s {
+            return Vec::new();
+        }
+        let at = |k: u32| from_s + (to_s - from_s) * f64::from(k) / f64::from(INSTANTS);
+        let poses: Vec<Pose> = (0..=INSTANTS).map(|k| self.motion.place(node, at(k))).collect();
+        let corners: Vec<Vec<DVec3>> =
+            self.patches_of(body).map(|(_, patch)| patch.corners_in_body().collect()).collect();
+        let first = poses[0];
+        let all = || corners.iter().flatten();
+        let reach = all().map(|&c| first.point(c).abs().max_element()).fold(0.0, f64::max);
+        let rests = |&c: &DVec3| {
+            let is_there = |pose: &Pose| pose.point(c).distance(first.point(c)) <= IN_PLANE * reach;
+            poses.iter().all(is_there)
+        };
+        if all().all(rests) {
+            return Vec::new();
+        }
+        let edges = corners.iter().flat_map(|c| (0..c.len()).map(|k| [c[k], c[(k + 1) % c.len()]]));
+        edges
+            .filter(|edge| edge.iter().all(rests))
+            .map(|edge| edge.map(|c| first.point(c)))
+            .collect()
+    }
+
+    /// Adds where edges, in the world, lie in patches of bodies at rest.
+    fn stand(&self, at_rest: &[BodyId], edges: &[[DVec3; 2]], out: &mut [Vec<Segment>]) {
+        if edges.is_empty() {
+            return;
+        }
+        for id in at_rest.iter().flat_map(|&body| self.patches_of(body)).map(|(id, _)| id) {
+            let placed = Placed::new(self, id);
+            let slack_m =
+                IN_PLANE * placed.bounds.lo.abs().max(placed.bounds.hi.abs()).max_element();
+            let patch = &self.patches[id.0 as usize];
+            let plane = Plane::through(patch.frame.origin, patch.frame.normal);
+            let lies =
+                |edge: &&[DVec3; 2]| edge.iter().all(|&p| plane.distance(p).abs() <= slack_m);
+            let lines = edges.iter().filter(lies).map(|edge| edge.map(|p| in_frame(patch, p)));
+            let within = lines.filter_map(|line| segment_within(&patch.corners, line, slack_m));
+            out[id.0 as usize].extend(within);
+        }
+    }
+
     /// Adds where patches of some bodies that share a frame meet.
-    fn meet(&self, bodies: &[BodyId], out: &mut [Lines]) {
+    fn meet(&self, bodies: &[BodyId], out: &mut [Vec<Segment>]) {
         let mut placed: Vec<Placed> = bodies
             .iter()
             .flat_map(|&body| self.patches_of(body))
@@ -62,14 +107,11 @@ impl Scene {
     }
 
     /// Adds where the polygon `by` meets the plane of `of` within that patch.
-    fn met(&self, (of, by): (&Placed, &Placed), slack_m: f64, out: &mut Lines) {
+    fn met(&self, (of, by): (&Placed, &Placed), slack_m: f64, out: &mut Vec<Segment>) {
         let patch = &self.patches[of.id.0 as usize];
         let frame = patch.frame;
         let plane = Plane::through(frame.origin, frame.normal);
-        let in_frame = |p: DVec3| {
-            let d = p - frame.origin;
-            DVec2::new(d.dot(frame.u), d.dot(frame.v))
-        };
+        let in_frame = |p: DVec3| in_frame(patch, p);
         let n = by.corners.len();
         let above: Vec<f64> = by.corners.iter().map(|&c| plane.distance(c)).collect();
         let is_on = |k: usize| above[k].abs() <= slack_m;
@@ -87,12 +129,14 @@ impl Scene {
             farthest(&points).into_iter().collect()
         };
         let within = lines.iter().filter_map(|&line| segment_within(&patch.corners, line, slack_m));
-        let first = out.all.len();
-        out.all.extend(within);
-        if above.iter().any(|&d| d > slack_m) && above.iter().any(|&d| d < -slack_m) {
-            out.crossing.extend_from_slice(&out.all[first..]);
-        }
+        out.extend(within);
     }
+}
+
+/// A point in a patch's frame, metres.
+fn in_frame(patch: &Patch, p: DVec3) -> DVec2 {
+    let d = p - patch.frame.origin;
+    DVec2::new(d.dot(patch.frame.u), d.dot(patch.frame.v))
 }
 
 /// The two points farthest from each other, if there are two.
@@ -121,11 +165,11 @@ impl Placed {
 mod tests {
     use glam::{DQuat, DVec2, DVec3};
 
-    use super::Lines;
-    use crate::scene::{Interpolation, SceneBuilder, Track};
+    use crate::geometry::Segment;
+    use crate::scene::{Interpolation, RotationTrack, SceneBuilder, Track};
 
     /// A floor of 4 x 4 m with a wall across it, on a body of its own; where the wall is, and whether it moves.
-    fn lines(at: DVec3, moves: bool) -> Vec<Lines> {
+    fn lines(at: DVec3, moves: bool) -> Vec<Vec<Segment>> {
         let mut b = SceneBuilder::new("floor and wall");
         let grey = b.material("grey", [0.5; 3], [0.0; 3]);
         let floor = b.node("floor", None, DVec3::ZERO, DQuat::IDENTITY);
@@ -147,19 +191,42 @@ mod tests {
         for depth in [0.0, 0.5] {
             let found = lines(DVec3::Z * -depth, false);
             let length = |s: &[DVec2; 2]| s[0].distance(s[1]);
-            assert_eq!(found[0].all.len(), 1, "{depth}: {found:?}");
-            assert!((length(&found[0].all[0]) - 2.0).abs() < 1e-12);
+            assert_eq!(found[0].len(), 1, "{depth}: {found:?}");
+            assert!((length(&found[0][0]) - 2.0).abs() < 1e-12);
             // Along the wall's own lower edge nothing is cut; where the floor crosses the wall, it is.
             let crosses = usize::from(depth > 0.0);
-            assert_eq!(found[1].all.len(), crosses);
-            assert_eq!([0, 1].map(|k| found[k].crossing.len()), [crosses; 2]);
+            assert_eq!(found[1].len(), crosses);
         }
     }
 
     #[test]
     fn what_moves_or_stays_above_meets_nothing() {
-        let none = |found: Vec<Lines>| found.iter().all(|lines| lines.all.is_empty());
+        let none = |found: Vec<Vec<Segment>>| found.iter().all(|lines| lines.is_empty());
         assert!(none(lines(DVec3::Z * 0.01, false)));
         assert!(none(lines(DVec3::ZERO, true)));
+    }
+
+    /// A wall with a door that turns by a right angle about the line x = 1, y = 1.5 upwards, and so far off it.
+    fn door(off_m: f64) -> Vec<Vec<Segment>> {
+        let mut b = SceneBuilder::new("wall and door");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let wall = b.node("wall", None, DVec3::ZERO, DQuat::IDENTITY);
+        let corners = [(1.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 2.0)];
+        b.polygon(wall, "jamb", grey, &corners.map(|(y, z)| DVec3::new(1.0, y, z)));
+        let hinge = b.node("door", None, DVec3::new(1.0, 1.5, 0.0), DQuat::IDENTITY);
+        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)];
+        b.polygon(hinge, "leaf", grey, &corners.map(|(x, z)| DVec3::new(x + off_m, 0.0, z)));
+        let values = vec![DQuat::IDENTITY, DQuat::from_rotation_z(1.5)];
+        let interpolation = Interpolation::Linear;
+        b.animate_rotation(hinge, RotationTrack { times_s: vec![0.0, 1.0], values, interpolation });
+        b.build().unwrap().discontinuities()
+    }
+
+    #[test]
+    fn a_door_meets_the_wall_along_its_hinge_though_it_turns() {
+        let found = door(0.0);
+        assert_eq!(found[0].len(), 1, "{found:?}");
+        assert!((found[0][0][0].distance(found[0][0][1]) - 2.0).abs() < 1e-9);
+        assert!(door(0.01)[0].is_empty());
     }
 }

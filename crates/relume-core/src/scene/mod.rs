@@ -50,7 +50,6 @@ mod world;
 pub use builder::SceneBuilder;
 pub use check::check;
 pub use covered::Covered;
-pub use discontinuity::Lines;
 pub use draft::Edits;
 pub use drift::Drift;
 pub use edited::Edited;

@@ -65,6 +65,9 @@ pub struct BlockerSizes {
     /// For each end, how far an edge of a blocker moves over the other end, at most, in units of how far the point on
     /// this one moves that it is seen from: the ratio of the blocker's distances from the two centres.
     pub leverage: (f64, f64),
+    /// For each end, how near a blocker is for its size: the square of its radius over the distance of its centre from the
+    /// nearest blocker, at most 1. Where one stands on an end, light that arrives there stops at a line: 1.
+    pub near: (f64, f64),
 }
 
 impl BlockerSizes {
@@ -74,6 +77,7 @@ impl BlockerSizes {
         least_m2: f64::INFINITY,
         all_m2: f64::INFINITY,
         leverage: (0.0, 0.0),
+        near: (0.0, 0.0),
     };
 }
 
@@ -263,28 +267,31 @@ impl<'a> Shaft<'a> {
             return BlockerSizes { spots, ..BlockerSizes::NOTHING };
         }
         let area = |&patch: &PatchId| self.forest.area_m2(self.forest.patch_root(patch));
-        BlockerSizes {
+        let mut sizes = BlockerSizes {
             spots,
             least_m2: blockers.iter().map(area).fold(f64::INFINITY, f64::min),
             all_m2: blockers.iter().map(area).sum(),
-            leverage: self.leverage(blockers),
+            ..BlockerSizes::NOTHING
+        };
+        for &patch in blockers {
+            self.place(patch, &mut sizes);
         }
+        sizes
     }
 
-    /// For each end the largest ratio of a blocker's distance from the other end's centre to that from its own.
-    fn leverage(&self, blockers: &[PatchId]) -> (f64, f64) {
-        let mut most = (0.0_f64, 0.0_f64);
-        for &patch in blockers {
-            let (own, a, b) = self.seen_by(Some(self.view.patch(patch).body));
-            let polygon = match own {
-                true => self.view.occluder_in_body(patch),
-                false => self.view.occluder(patch),
-            };
-            let from = |e: &WorldElement| polygon.distance(e.centre).max(f64::MIN_POSITIVE);
-            let (from_a, from_b) = (from(a), from(b));
-            most = (most.0.max(from_b / from_a), most.1.max(from_a / from_b));
-        }
-        most
+    /// Adds where a blocker is: how far from each end.
+    fn place(&self, blocker: PatchId, BlockerSizes { leverage, near, .. }: &mut BlockerSizes) {
+        let (own, a, b) = self.seen_by(Some(self.view.patch(blocker).body));
+        let polygon = match own {
+            true => self.view.occluder_in_body(blocker),
+            false => self.view.occluder(blocker),
+        };
+        let from = |e: &WorldElement| polygon.distance(e.centre).max(f64::MIN_POSITIVE);
+        let (from_a, from_b) = (from(a), from(b));
+        let most = |one: (f64, f64), other: (f64, f64)| (one.0.max(other.0), one.1.max(other.1));
+        *leverage = most(*leverage, (from_b / from_a, from_a / from_b));
+        let (by_a, by_b) = ((a.radius / from_a).min(1.0), (b.radius / from_b).min(1.0));
+        *near = most(*near, (by_a * by_a, by_b * by_b));
     }
 
     /// Whether both ends lie in one plane and touch.

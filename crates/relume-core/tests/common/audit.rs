@@ -119,5 +119,5 @@ const DEEP: f64 = 2e-5;
 const FACTOR_SLACK: f64 = 3e-3;
 
 /// How far the row sum of one leaf may lie outside [0, 1]: gradients reach beyond it, and what
-/// touches is counted twice. Found: -0.05 to 1.98.
-const LEAF_SLACK: f64 = 1.2;
+/// touches is counted twice. Found: -0.57 to 2.26, on a leaf of a five-hundredth of the reference area.
+const LEAF_SLACK: f64 = 1.4;

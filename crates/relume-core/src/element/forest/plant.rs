@@ -17,10 +17,10 @@ use crate::element::groups::{Layout, Sort};
 use crate::element::ids::{ElementId, Kind};
 use crate::element::split::{Chart, Place, Shape};
 use crate::element::tuning::{
-    CROSSED_PART, CROSSED_SHARE, CROSSED_TIMES, CUT_LEAST, CUT_SHARE, WIDE,
+    CUT_LEAST, CUT_SHARE, SMALL_CUT_PART, SMALL_CUT_SHARE, SMALL_CUT_TIMES, WIDE,
 };
-use crate::geometry::{Aabb, cut_along, polygon_area, split_convex};
-use crate::scene::{BodyId, Lines, Scene};
+use crate::geometry::{Aabb, Segment, cut_along, polygon_area, split_convex};
+use crate::scene::{BodyId, Scene};
 
 /// Input of planting: the scene, the lines that its patches are cut along, and the order of its bodies.
 #[derive(Clone, Copy)]
@@ -350,15 +350,15 @@ impl Forest {
 
 /// The lines that patches are cut along before anything else, so that no element lies on both sides of a wall's foot.
 struct Cuts {
-    lines: Vec<Lines>,
-    /// Smaller polygons are left whole, m2.
+    lines: Vec<Vec<Segment>>,
+    /// Smaller polygons are cut where lines run from edge to edge only, m2.
     least_m2: f64,
 }
 
 /// Lines that one patch is cut along.
 struct PatchCuts<'a> {
     patch: u32,
-    lines: &'a Lines,
+    lines: &'a [Segment],
     least_m2: f64,
     slack_m: f64,
 }
@@ -370,7 +370,7 @@ impl Cuts {
 
     fn of(&self, patch: u32) -> PatchCuts<'_> {
         let lines = &self.lines[patch as usize];
-        let ends = lines.all.iter().flatten();
+        let ends = lines.iter().flatten();
         let reach = ends.fold(0.0_f64, |reach, p| reach.max(p.abs().max_element()));
         PatchCuts { patch, lines, least_m2: self.least_m2, slack_m: 1e-6 * reach }
     }
@@ -381,13 +381,13 @@ impl PatchCuts<'_> {
     fn apply(&self, corners: &[DVec2], cut: u32) -> Option<(Vec<DVec2>, Vec<DVec2>)> {
         let area = polygon_area(corners);
         if area >= self.least_m2 {
-            return cut_along(corners, &self.lines.all, CUT_SHARE, self.slack_m);
+            return cut_along(corners, self.lines, CUT_SHARE, self.slack_m);
         }
-        if cut >= CROSSED_TIMES {
+        if cut >= SMALL_CUT_TIMES {
             return None;
         }
-        let is_part = |part: &[DVec2]| polygon_area(part) >= CROSSED_PART * area;
-        cut_along(corners, &self.lines.crossing, CROSSED_SHARE, self.slack_m)
+        let is_part = |part: &[DVec2]| polygon_area(part) >= SMALL_CUT_PART * area;
+        cut_along(corners, self.lines, SMALL_CUT_SHARE, self.slack_m)
             .filter(|(one, two)| is_part(one) && is_part(two))
     }
 }

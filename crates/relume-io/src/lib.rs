@@ -11,10 +11,12 @@ pub mod export;
 pub mod flat;
 mod folder;
 mod gltf;
+mod guard;
 mod import;
 mod log;
 mod mesh_file;
 mod options;
+mod surface;
 mod view3d;
 
 pub use environment::read_environment;

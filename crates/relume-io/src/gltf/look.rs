@@ -2,17 +2,18 @@
 //!
 //! Reads what it needs of the file; must not know nodes or placements.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
 use super::document::Document;
-use super::facet::{Facet, Layer, Look};
 use super::images::{Images, Key};
 use super::material::{Paint, REFLECTANCE_MAX};
-use super::pieces::{Pieces, blocking, pieces};
 use super::{json, note};
+use crate::surface::facet::{Facet, Layer, Look};
+use crate::surface::pieces::{Pieces, blocking, pieces};
+use crate::surface::{Mesh, Tints, resolution};
 use relume_core::scene::coverage::Wrap;
 use relume_core::scene::merge::{Merged, merge};
 use relume_core::scene::{Note, Print, SceneError, Severity, Tint, TintId};
@@ -49,8 +50,7 @@ pub(super) struct Looks<'a> {
     /// By material; the last one is for primitives without any.
     paints: Vec<Paint>,
     images: Images<'a>,
-    tints: Vec<Tint>,
-    numbers: BTreeMap<[u64; 6], TintId>,
+    tints: Tints,
     /// Materials that were lowered to [`REFLECTANCE_MAX`], and the highest that was.
     lowered: (BTreeSet<usize>, f64),
     /// Materials with textures or vertex colours.
@@ -70,11 +70,6 @@ struct SeenThrough {
     left_out: usize,
 }
 
-/// Steps across a triangle for its means ([`relume_core::scene::coverage::Cover::resolution`]), at most and at least, and how many all
-/// triangles of a primitive share.
-const STEPS: (f64, f64) = (32.0, 4096.0);
-const STEPS_SHARED: f64 = 4e6;
-
 impl<'a> Looks<'a> {
     pub(super) fn new(document: &'a Document, paints: Vec<Paint>, pictures: bool) -> Looks<'a> {
         Looks {
@@ -82,8 +77,7 @@ impl<'a> Looks<'a> {
             pictures,
             paints,
             images: Images::new(document),
-            tints: Vec::new(),
-            numbers: BTreeMap::new(),
+            tints: Tints::default(),
             lowered: Default::default(),
             varied: BTreeSet::new(),
             see_through: SeenThrough::default(),
@@ -107,7 +101,8 @@ impl<'a> Looks<'a> {
             return Ok(self.plain(material, of));
         }
         self.varied.insert(material);
-        let pieces = pieces(&look, of, self.paints[material].see_through.is_some());
+        let mesh = Mesh { points: of.points, triangles: of.triangles };
+        let pieces = pieces(&look, &mesh, self.paints[material].see_through.is_some());
         Ok(self.finished(material, pieces))
     }
 
@@ -154,14 +149,7 @@ impl<'a> Looks<'a> {
         self.lower(material, reflectance);
         let reflectance = reflectance.map(|r| r.clamp(0.0, REFLECTANCE_MAX));
         let emission = facet.emission.map(|e| e.clamp(0.0, 1.0));
-        let bits = |k: usize| if k < 3 { reflectance[k] } else { emission[k - 3] }.to_bits();
-        let key = [0, 1, 2, 3, 4, 5].map(bits);
-        let next = TintId(self.tints.len() as u32);
-        let id = *self.numbers.entry(key).or_insert(next);
-        if id == next {
-            self.tints.push(Tint { reflectance, emission });
-        }
-        id
+        self.tints.number(Tint { reflectance, emission })
     }
 
     fn lower(&mut self, material: usize, reflectance: [f64; 3]) {
@@ -244,8 +232,7 @@ impl<'a> Looks<'a> {
         }
         let sampler = entry.sampler.and_then(|s| root.samplers.get(s));
         let wrap = [sampler.and_then(|s| s.wrap_s), sampler.and_then(|s| s.wrap_t)].map(wrap);
-        let steps = STEPS_SHARED / of.triangles.len().max(1) as f64;
-        let resolution = steps.clamp(STEPS.0, STEPS.1);
+        let resolution = resolution(of.triangles.len());
         Ok(Some(Layer { pyramid, wrap, places, resolution }))
     }
 
@@ -354,7 +341,7 @@ impl<'a> Looks<'a> {
                 names(materials)
             ),
         );
-        self.tints
+        self.tints.finish()
     }
 }
 

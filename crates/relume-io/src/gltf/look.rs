@@ -168,7 +168,14 @@ impl<'a> Looks<'a> {
         notes: &mut Vec<Note>,
     ) -> Result<Look, SceneError> {
         let paint = self.paints[material].clone();
-        let colours = self.colours(of)?;
+        let is_opaque = paint.see_through.is_none();
+        let colours = match self.colours(of)? {
+            Some(colours) if is_opaque && is_mask(&colours) => {
+                self.note_mask(material, notes);
+                None
+            }
+            colours => colours,
+        };
         let mut least_alpha = 0;
         let mut least_vertex_alpha = None;
         if let Some(see) = paint.see_through {
@@ -272,6 +279,18 @@ impl<'a> Looks<'a> {
         Ok(colours.filter(|colours| colours.iter().any(|c| *c != [1.0; 4])))
     }
 
+    /// Says once of a material that vertex colours of what has it are left out.
+    fn note_mask(&mut self, material: usize, notes: &mut Vec<Note>) {
+        if self.said.insert((material, "vertex colours")) {
+            let message =
+                "its vertex colours are black with an alpha of 0 at more than half of the vertices, as what is not painted is \
+                 written: they are taken for a mask and left out"
+                    .to_owned();
+            let name = &self.paints[material].name;
+            notes.push(note(Severity::Warning, "vertex-colours", name, 1, message));
+        }
+    }
+
     /// An attribute with a value for each vertex, if the primitive has it.
     fn attribute<const N: usize>(
         &self,
@@ -350,6 +369,11 @@ impl SeenThrough {
         self.materials.insert(material);
         *(if is_open { &mut self.left_out } else { &mut self.opaque }) += polygons;
     }
+}
+
+/// Whether more than half of vertex colours are zero, alpha and all: of what is opaque that is no colour.
+fn is_mask(colours: &[[f64; 4]]) -> bool {
+    2 * colours.iter().filter(|c| **c == [0.0; 4]).count() > colours.len()
 }
 
 fn wrap(code: Option<u32>) -> Wrap {

@@ -163,8 +163,9 @@ fn draft(
             let (surface, degenerate) = paint::surface(&part, id, &paint, (&mut tints, pictures));
             if degenerate > 0 {
                 let all = part.triangles.len();
-                let message =
-                    format!("{degenerate} of {all} triangles have no area and were left out");
+                let message = format!(
+                    "{degenerate} of {all} triangles have no area or repeat another and were left out"
+                );
                 notes.push(info("degenerate", &object.name, degenerate, message));
             }
             node.surfaces.push(surface);

@@ -87,3 +87,68 @@ fn basis(bytes: &[u8], fits: Fits<'_>) -> Result<Result<RgbaImage, String>, Scen
         None => Err(format!("its KTX2 file is damaged; {REMEDY}")),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(words: &[u32]) -> Vec<u8> {
+        words.iter().flat_map(|w| w.to_le_bytes()).collect()
+    }
+
+    /// A KTX2 file of 4 x 4 texels of one colour: a block of UASTC without supercompression (KTX 2.0; UASTC, solid colour).
+    fn ktx2(colour: [u8; 4]) -> Vec<u8> {
+        // From the start: identifier, header, index, the one level's index, data format descriptor.
+        let (dfd, level) = (104_u32, 148_u32);
+        let mut file = KTX2.to_vec();
+        // Format (none of Vulkan's), size of its type, width, height, depth, layers, faces, levels, supercompression.
+        file.extend(words(&[0, 1, 4, 4, 0, 0, 1, 1, 0]));
+        // Descriptor, key values, global data (64-bit words).
+        file.extend(words(&[dfd, 44, 0, 0, 0, 0, 0, 0]));
+        file.extend(words(&[level + 4, 0, 16, 0, 16, 0]));
+        // A basic block: UASTC (166), BT.709, sRGB; texel blocks of 4 x 4 in one plane of 16 bytes, one sample with alpha.
+        file.extend(words(&[44, 0, 2 | 40 << 16, 166 | 1 << 8 | 2 << 16, 3 | 3 << 8, 16, 0]));
+        file.extend(words(&[127 << 16 | 3 << 24, 0, 0, u32::MAX]));
+        file.extend([0; 4]);
+        // Five bits of the mode, then the colour, 8 bits a channel.
+        let packed = u128::from(SOLID) | u128::from(u32::from_le_bytes(colour)) << 5;
+        file.extend(packed.to_le_bytes());
+        file
+    }
+
+    /// The code of the mode for blocks of one colour.
+    const SOLID: u32 = 0b10111;
+
+    fn read(bytes: &[u8]) -> Result<RgbaImage, String> {
+        texels(bytes, "", &|_| Ok(())).unwrap()
+    }
+
+    #[test]
+    fn basis_universal_in_ktx2_is_read() {
+        let colour = [200, 100, 50, 255];
+        let image = read(&ktx2(colour)).unwrap();
+        assert_eq!(image.dimensions(), (4, 4));
+        assert!(image.pixels().all(|texel| texel.0 == colour), "{:?}", image.get_pixel(0, 0));
+    }
+
+    #[test]
+    fn damaged_ktx2_is_said_and_asks_for_no_memory() {
+        let whole = ktx2([1, 2, 3, 4]);
+        for place in 12..whole.len() {
+            for flip in [1, 0x40, 0xff] {
+                let mut damaged = whole.clone();
+                damaged[place] ^= flip;
+                // Whatever it says.
+                let _ = texels(&damaged, "", &|bytes| {
+                    assert!(bytes < 1 << 24, "{bytes}");
+                    Ok(())
+                });
+            }
+            let _ = read(&whole[..place]);
+        }
+        // 2^20 x 2^20 texels.
+        let mut large = whole;
+        (large[22], large[26]) = (16, 16);
+        assert!(read(&large).unwrap_err().contains("declares"));
+    }
+}

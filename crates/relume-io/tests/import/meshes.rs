@@ -415,3 +415,15 @@ fn damage_anywhere_never_panics() {
         }
     }
 }
+
+/// A face that goes round several times, and one that is there twice.
+#[test]
+fn triangles_that_repeat_others_count_once() {
+    let places = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\n";
+    let round = "f 1 2 3 4 1 2 3 4 1 2 3 4\nf 3 4 1 2\n";
+    let scene = scene_of("a.obj", format!("{places}{round}").as_bytes()).unwrap();
+    assert_eq!(scene.patches.len(), 2, "a square, from both sides");
+    // One that faces the other way is another surface.
+    let back = scene_of("a.obj", format!("{places}f 1 2 3 4\nf 4 3 2 1\n").as_bytes()).unwrap();
+    assert_eq!(back.patches.len(), 4);
+}

@@ -22,4 +22,4 @@ mod view3d;
 pub use environment::read_environment;
 pub use import::import;
 pub use log::{Log, LogError};
-pub use options::ImportOptions;
+pub use options::{FrameRange, ImportOptions, Instants};

@@ -31,15 +31,18 @@ pub(super) fn with_values(text: &str) -> String {
     text.lines().filter(has_value).flat_map(|line| [line, "\n"]).collect()
 }
 
-/// What a material reflects, or what the image of that is multiplied with: an image that stands alone, or with black, is meant as
-/// it is.
+/// What a material reflects, or what the image of that is multiplied with.
 pub(super) fn factor(material: &tobj::Material) -> [f64; 3] {
-    let alone = material.diffuse_texture.is_some();
-    let unset = if alone { 1.0 } else { REFLECTANCE };
-    match finite(material.diffuse.unwrap_or([unset; 3])) {
-        [0.0, 0.0, 0.0] if alone => [1.0; 3],
-        stated => stated,
+    match is_image_alone(material) {
+        true => [1.0; 3],
+        false => finite(material.diffuse.unwrap_or([REFLECTANCE; 3])),
     }
+}
+
+/// Whether a material's reflectance is an image without a factor, or with black, which is meant as it is.
+pub(super) fn is_image_alone(material: &tobj::Material) -> bool {
+    let stated = finite(material.diffuse.unwrap_or_default());
+    material.diffuse_texture.is_some() && stated == [0.0; 3]
 }
 
 /// Without what is no number or negative.
@@ -198,7 +201,7 @@ impl<'a> Textures<'a> {
             Ok(pyramid) => Some(Sheet { pyramid, wrap, scale, offset }),
             Err(why) => {
                 let message = format!(
-                    "its texture {name} cannot be read ({why}) and is taken as white; put the image in place"
+                    "its texture {name} cannot be read ({why}): Kd counts alone, or grey where that is black; put the image in place"
                 );
                 notes.push(warning("texture", material, 1, message));
                 None

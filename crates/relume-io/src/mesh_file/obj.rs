@@ -40,8 +40,12 @@ pub(super) fn read(bytes: &[u8], stem: &str, folder: &Folder) -> Result<Contents
     let mut order: Vec<usize> = (0..materials.len()).filter(|&m| numbers[m].is_some()).collect();
     order.sort_by_key(|&m| numbers[m]);
     for material in order.into_iter().map(|m| &materials[m]) {
-        let translated = translated(material, &mut contents.notes);
+        let mut translated = translated(material, &mut contents.notes);
         let paint = textures.paint(material, &translated, &mut contents.notes)?;
+        if paint.as_ref().is_none_or(|paint| paint.base.is_none()) && mtl::is_image_alone(material)
+        {
+            translated.reflectance = [super::REFLECTANCE; 3];
+        }
         contents.materials.push(translated);
         contents.paints.push(paint);
     }

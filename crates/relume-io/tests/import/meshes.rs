@@ -416,6 +416,37 @@ fn damage_anywhere_never_panics() {
     }
 }
 
+#[test]
+fn damage_to_materials_and_images_never_panics() {
+    let folder = tempfile::tempdir().unwrap();
+    let texels = image::RgbaImage::from_raw(2, 2, [WHITE, BLACK, BLACK, WHITE].concat()).unwrap();
+    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
+    for name in ["wood.png", "wood.tga", "wood.bmp"] {
+        let path = folder.path().join(name);
+        texels.save(&path).unwrap();
+        files.push((name.to_owned(), std::fs::read(path).unwrap()));
+        let text = format!(
+            "newmtl m\nKd 0.5 0.5 0.5\nKe 1 1 1\nd 0.9\nmap_Kd -s 2 2 -o 0.5 {name}\nmap_Ke {name}\nmap_d {name}\n"
+        );
+        std::fs::write(folder.path().join("a.mtl"), &text).unwrap();
+        files.push(("a.mtl".to_owned(), text.into_bytes()));
+        let path = folder.path().join("a.obj");
+        std::fs::write(&path, format!("{SQUARE}{FACE}\n")).unwrap();
+        for (name, whole) in files.drain(..) {
+            for place in 0..whole.len() {
+                let mut damaged = whole.clone();
+                damaged[place] ^= [1, 0x10, 0x80, 0xff][place % 4];
+                std::fs::write(folder.path().join(&name), &damaged).unwrap();
+                // Whatever it says, within bounds.
+                let limit = Some(1 << 26);
+                let _ =
+                    import(&path, &ImportOptions { max_memory_bytes: limit, ..Default::default() });
+            }
+            std::fs::write(folder.path().join(&name), &whole).unwrap();
+        }
+    }
+}
+
 /// A face that goes round several times, and one that is there twice.
 #[test]
 fn triangles_that_repeat_others_count_once() {

@@ -2,7 +2,7 @@
 
 use std::cmp::Reverse;
 
-use relume::scene::{self, Note, Scene, Severity};
+use relume::scene::{self, Instants, Note, Scene, Severity};
 
 use crate::args::CheckArgs;
 use crate::failure::Failure;
@@ -12,7 +12,12 @@ use crate::scene_file;
 
 /// Runs the command. An error among the findings is a failure; warnings are not.
 pub(crate) fn check(args: &CheckArgs) -> Result<(), Failure> {
-    let scene = scene_file::load(&args.scene, &args.animation, false)?;
+    let scene = scene_file::load(
+        &args.scene,
+        &args.animation,
+        false,
+        Instants { fps: 24.0, frames: Vec::new() },
+    )?;
     let mut notes = findings(&scene);
     if args.scene.extension().is_some_and(|e| e.eq_ignore_ascii_case("vs3")) {
         // Files of View3D have no light; they are there for their form factors.

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use indicatif::HumanBytes;
-use relume::scene::Scene;
+use relume::scene::{Instants, Scene};
 use relume::session::{Frame, Options, Oracle, Session, SessionError, Snapshot};
 use relume_picture::picture::{self, Exposure, Settings};
 
@@ -16,7 +16,7 @@ use crate::args::{
 };
 use crate::demo;
 use crate::failure::Failure;
-use crate::frames;
+use crate::frames::{self, FrameSpec};
 use crate::memory;
 use crate::output::{self, count, counted};
 use crate::outside;
@@ -76,7 +76,7 @@ impl Clip {
         pictures: bool,
     ) -> Result<Clip, Failure> {
         let threads = use_threads(flags.threads)?;
-        let scene = scene_file::load(path, &flags.animation, pictures)?;
+        let scene = scene_file::load(path, &flags.animation, pictures, instants(flags))?;
         Clip::of_scene(scene, flags, threads, tolerance_and_frames)
     }
 
@@ -256,6 +256,12 @@ impl Clip {
     pub(crate) fn session_with(&self, options: Options) -> Result<Session, Failure> {
         Session::new(Arc::clone(&self.scene), options).map_err(Failure::new)
     }
+}
+
+/// The frames that flags ask for.
+fn instants(flags: &ClipFlags) -> Instants {
+    let frames = flags.frames.as_ref().map_or(Vec::new(), FrameSpec::ranges);
+    Instants { fps: flags.fps, frames }
 }
 
 /// The message of a step that failed; `kept` says what stays of the frames before it, if anything.

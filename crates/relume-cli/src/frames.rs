@@ -6,6 +6,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use relume::scene::FrameRange;
+
 /// Shortfall forgiven when the duration is turned into frames, in frames: key times are stored
 /// as 32-bit floats, so 19/24 s reads back a little short of frame 19.
 const FRAME_SLACK: f64 = 1e-3;
@@ -58,6 +60,14 @@ impl FromStr for FrameSpec {
         let parts =
             text.split(',').map(|part| Part::parse(part.trim())).collect::<Result<_, _>>()?;
         Ok(FrameSpec { parts })
+    }
+}
+
+impl FrameSpec {
+    /// The same as ranges.
+    pub(crate) fn ranges(&self) -> Vec<FrameRange> {
+        let range = |&Part { first, last, step }: &Part| FrameRange { first, last, step };
+        self.parts.iter().map(range).collect()
     }
 }
 

@@ -2,7 +2,9 @@
 
 use std::fmt::{self, Write};
 
-use relume::scene::{BodyId, Light, LightKind, Material, MaterialId, Projection, Scene, Tint};
+use relume::scene::{
+    BodyId, Instants, Light, LightKind, Material, MaterialId, Projection, Scene, Tint,
+};
 
 use crate::args::InfoArgs;
 use crate::clip::TOLERANCE;
@@ -14,7 +16,12 @@ use crate::scene_file;
 
 /// Runs the command.
 pub(crate) fn info(args: &InfoArgs) -> Result<(), Failure> {
-    let scene = scene_file::load(&args.scene, &args.animation, false)?;
+    let scene = scene_file::load(
+        &args.scene,
+        &args.animation,
+        false,
+        Instants { fps: args.fps, frames: Vec::new() },
+    )?;
     // Of what was read; light from outside is a section of its own.
     let lit = args.outside.light(scene.clone(), args.fps, TOLERANCE)?;
     let scene = Scene { motion: lit.motion.clone(), ..scene };

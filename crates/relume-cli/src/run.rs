@@ -294,7 +294,7 @@ impl Job {
             frames: flags.frames.as_ref().map_or("all".into(), ToString::to_string),
             fps: flags.fps,
             animation: flags.animation.name.clone(),
-            edits: flags.animation.edits.described(),
+            edits: flags.animation.described(),
             tolerance: clip.tolerance,
             oracle: flags.oracle.to_string(),
             update: self.solve.update.name(),

@@ -3,26 +3,35 @@
 use std::path::Path;
 
 use indicatif::HumanBytes;
-use relume::scene::{ImportOptions, Note, Scene, SceneError, Severity, check, import};
+use relume::scene::{ImportOptions, Instants, Note, Scene, SceneError, Severity, check, import};
 
-use crate::args::AnimationFlag;
+use crate::args::{AnimationFlag, DeformFlag};
 use crate::failure::Failure;
 use crate::memory;
 use crate::notes;
 use crate::output;
 
-/// Reads a scene; with its images, if it is for pictures.
+/// Reads a scene; with its images, if it is for pictures. Meshes that change their shape are read at these instants, if they
+/// are to be rebuilt.
 pub(crate) fn load(
     path: &Path,
     animation: &AnimationFlag,
     pictures: bool,
+    instants: Instants,
 ) -> Result<Scene, Failure> {
-    let AnimationFlag { name, allow_outside, edits } = animation.clone();
+    let AnimationFlag { name, allow_outside, deform, edits } = animation.clone();
+    let rebuild = (deform == DeformFlag::Rebuild).then_some(instants);
     memory::at(format_args!("reading {}", path.display()));
     let max_memory_bytes = memory::limit_bytes();
     let edits = edits.edits();
-    let options =
-        ImportOptions { animation: name, allow_outside, pictures, max_memory_bytes, edits };
+    let options = ImportOptions {
+        animation: name,
+        allow_outside,
+        pictures,
+        max_memory_bytes,
+        rebuild,
+        edits,
+    };
     let scene = import(path, &options).map_err(failure)?;
     memory::at(format_args!("preparing {}", path.display()));
     Ok(scene)

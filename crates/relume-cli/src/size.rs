@@ -60,10 +60,10 @@ impl Size {
             true => "a coarser --tolerance takes less",
             false => "fewer polygons take less: --hide NODE, or simplify the meshes",
         };
-        let [few, many] = pairs.map(round);
-        let [short, long] =
-            seconds.map(|s| HumanDuration(Duration::from_secs_f64(s.clamp(1.0, 1e9))).to_string());
-        let [little, much] = bytes.map(HumanBytes);
+        let [few, many] = likely(pairs.map(|p| p as f64)).map(|p| round(p as u64));
+        let [short, long] = likely(seconds)
+            .map(|s| HumanDuration(Duration::from_secs_f64(s.clamp(1.0, 1e9))).to_string());
+        let [little, much] = likely(bytes.map(|b| b as f64)).map(|b| HumanBytes(b as u64));
         Some(format!(
             "warning: {} patches make {few} to {many} pairs to look at: the first frame takes an estimated {short} to \
              {long} and {little} to {much} of memory{fits}; {remedy}",
@@ -75,6 +75,15 @@ impl Size {
 /// Geometric mean.
 fn middle([low, high]: [f64; 2]) -> f64 {
     (low * high).sqrt()
+}
+
+/// By what factor measured numbers of pairs are off the middle of what is estimated, at most (docs/performance.md).
+const OFF: f64 = 3.0;
+
+/// The part of a range that is likely.
+fn likely([low, high]: [f64; 2]) -> [f64; 2] {
+    let middle = middle([low, high]);
+    [low.max(middle / OFF), high.min(middle * OFF)]
 }
 
 /// Two digits, in words where there are many.
@@ -126,7 +135,7 @@ mod tests {
         assert_eq!(
             much.warning(2, None).unwrap(),
             "warning: 33,000 patches make 430 million to 1.2 billion pairs to look at: the first frame takes an estimated \
-             30 minutes to 10 hours and 20.00 GiB to 200.00 GiB of memory; fewer polygons take less: --hide NODE, or \
+             45 minutes to 7 hours and 21.08 GiB to 189.74 GiB of memory; fewer polygons take less: --hide NODE, or \
              simplify the meshes"
         );
         // More threads, less time.

@@ -83,7 +83,7 @@ fn a_horizontal_surface_sees_the_whole_sky() {
     for (sky, exact) in skies {
         let outside = Outside { sun: sun(), ..under(sky.clone()) };
         let session = solved(floor(2.0, |_| ()), outside, 0.01);
-        let share = if matches!(sky, Sky::Uniform(_) | Sky::Overcast { .. }) { 1e-3 } else { 2e-3 };
+        let share = if matches!(sky, Sky::AllWeather { .. }) { 2e-3 } else { 1e-3 };
         close(mean_of(&session, "floor"), exact, share);
         close(session.frame().unwrap().irradiance_at(v(0.3, 0.0, 0.1), UP)[0], exact, share);
     }
@@ -102,7 +102,7 @@ fn a_wall_sees_half_of_a_uniform_sky_and_the_ground() {
     close(mean_of(&session, "wall"), 1.5 * PI, 1e-3);
     // Under an overcast sky of zenith radiance 1: 1/3 (pi / 2 + 4 / 3) = 0.9680.
     let overcast = under(Sky::Overcast { irradiance: 7.0 * PI / 9.0 });
-    close(mean_of(&solved(scene(), overcast, 0.01), "wall"), (PI / 2.0 + 4.0 / 3.0) / 3.0, 2e-3);
+    close(mean_of(&solved(scene(), overcast, 0.01), "wall"), (PI / 2.0 + 4.0 / 3.0) / 3.0, 1e-3);
     // Ground of reflectance 0.4 under a sky of radiance 3.
     let grounded = Outside { ground: 0.4, ..under(Sky::Uniform([3.0; 3])) };
     close(mean_of(&solved(scene(), grounded, 0.01), "wall"), 1.5 * PI * 1.4, 1e-3);
@@ -214,8 +214,14 @@ fn path_traced(scene: &Scene, outside: &Outside, sensor: &Sensor, paths: u32) ->
     let batch = |k: u64| {
         let mut random = Random::of_part(7, k);
         let mut sum = 0.0;
-        for _ in 0..paths / batches as u32 {
+        let count = paths / batches as u32;
+        let turned = random.unit();
+        for n in 0..count {
             let (mut at, mut normal, mut weight, mut on) = (sensor.at, sensor.normal, 1.0, None);
+            // The first directions are spread evenly: a window is a small part of what a place sees.
+            let n = f64::from(n);
+            let mut even =
+                Some(((n + random.unit()) / f64::from(count), (n * GOLDEN + turned).fract()));
             loop {
                 let from = at + normal * 1e-7;
                 if let Some((towards, irradiance)) = lit {
@@ -227,7 +233,8 @@ fn path_traced(scene: &Scene, outside: &Outside, sensor: &Sensor, paths: u32) ->
                     }
                 }
                 let (side, up) = axes(normal);
-                let (r2, turn) = (random.unit(), 2.0 * PI * random.unit());
+                let (r2, turn) = even.take().unwrap_or_else(|| (random.unit(), random.unit()));
+                let turn = 2.0 * PI * turn;
                 let d =
                     normal * (1.0 - r2).sqrt() + (side * turn.cos() + up * turn.sin()) * r2.sqrt();
                 let Some(hit) = world.first_hit(from, d, on) else {
@@ -250,7 +257,7 @@ fn path_traced(scene: &Scene, outside: &Outside, sensor: &Sensor, paths: u32) ->
                     (from + d * hit.distance, world.normal(hit.polygon), Some(hit.polygon));
             }
         }
-        sum / f64::from(paths / batches as u32)
+        sum / f64::from(count)
     };
     let found: Vec<f64> = (0..batches).into_par_iter().map(batch).collect();
     let n = batches as f64;
@@ -258,6 +265,9 @@ fn path_traced(scene: &Scene, outside: &Outside, sensor: &Sensor, paths: u32) ->
     let spread = found.iter().map(|e| (e - mean).powi(2)).sum::<f64>();
     (mean, (spread / (n * (n - 1.0))).sqrt())
 }
+
+/// The fractional part of the golden ratio: multiples of it are spread evenly over the unit interval.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Two unit vectors at right angles to another.
 fn axes(normal: DVec3) -> (DVec3, DVec3) {
@@ -280,10 +290,13 @@ fn places() -> Vec<Sensor> {
     out
 }
 
+/// Paths from each place.
+const PATHS: u32 = 240_000;
+
 /// The root mean square of relative errors at some places, against path tracing.
 fn error_of(name: &str, scene: &Scene, outside: &Outside, places: &[Sensor], tolerances: &[f64]) {
     let exact: Vec<(f64, f64)> =
-        places.iter().map(|s| path_traced(scene, outside, s, 120_000)).collect();
+        places.iter().map(|s| path_traced(scene, outside, s, PATHS)).collect();
     let noise = exact.iter().map(|(e, s)| (s / e).powi(2)).sum::<f64>() / exact.len() as f64;
     for &tolerance in tolerances {
         let outside = Outside { fineness: tolerance, ..outside.clone() };
@@ -311,10 +324,10 @@ fn error_of(name: &str, scene: &Scene, outside: &Outside, places: &[Sensor], tol
 fn light_comes_through_a_window() {
     let scene = room_with_a_window(|_| ());
     let outside = under(Sky::Uniform([10.0; 3]));
-    error_of("window", &scene, &outside, &places(), &[0.05, 0.02]);
+    error_of("window", &scene, &outside, &places(), &[0.05, 0.02, 0.01]);
     let sky = Sky::Clear { irradiance: 100.0 };
     let outside = Outside { sun: Some(sun_at(100.0, 30.0, 600.0)), ..under(sky) };
-    error_of("sun patch", &scene, &outside, &places(), &[0.05, 0.02]);
+    error_of("sun patch", &scene, &outside, &places(), &[0.05, 0.02, 0.01]);
 }
 
 #[test]
@@ -349,7 +362,7 @@ fn a_street_of_boxes_stands_under_a_clear_sky() {
     places.extend([1.0, 3.0, 5.0].map(|y| sensor(v(5.0, y, 6.0), -DVec3::X)));
     let sun = Some(sun_at(150.0, 40.0, 600.0));
     let outside = Outside { sun, ..under(Sky::Clear { irradiance: 100.0 }) };
-    error_of("street", &scene, &outside, &places, &[0.05, 0.02]);
+    error_of("street", &scene, &outside, &places, &[0.05, 0.02, 0.01]);
 }
 
 #[test]

@@ -14,7 +14,8 @@ use relume_core::scene::{Scene, SceneError};
 /// of View3D, or an .obj, .stl or .ply file.
 ///
 /// Of the last three: a body at rest for each object or group, in metres as the numbers are. Materials of OBJ have Kd
-/// as reflectance and Ke as radiance in W/m2/sr; what has none is a middle grey; all but what emits is double-sided.
+/// as reflectance and Ke as radiance in W/m2/sr, times their images; what has none is a middle grey, or has the colours of its
+/// vertices; all but what emits is double-sided.
 /// Of View3D: one body at rest with a surface for each of the file's, in its order and by its name;
 /// reflectance is 1 minus emittance, subsurfaces and null surfaces are cut out of their base, combined
 /// surfaces are one, obstructions are in [`Scene::obstructions`]. Of glTF:
@@ -24,7 +25,8 @@ use relume_core::scene::{Scene, SceneError};
 /// (KHR_animation_pointer). Extensions without effect on diffuse light are
 /// ignored; what is read otherwise than the file says is in [`Scene::notes`]. Skins whose triangles hang on one
 /// joint each move with their joints; other skins are held in their pose at the start, moving morph targets in their
-/// rest shape, and scales that change at their first size, each with a warning that names the node. Only files in the scene's own folder and below are opened,
+/// rest shape, unless [`ImportOptions::rebuild`] reads them anew for each frame, and scales that change at their first size, each
+/// with a warning that names the node. Only files in the scene's own folder and below are opened,
 /// unless [`ImportOptions::allow_outside`] says otherwise.
 ///
 /// # Errors

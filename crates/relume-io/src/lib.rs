@@ -11,13 +11,15 @@ pub mod export;
 pub mod flat;
 mod folder;
 mod gltf;
+mod guard;
 mod import;
 mod log;
 mod mesh_file;
 mod options;
+mod surface;
 mod view3d;
 
 pub use environment::read_environment;
 pub use import::import;
 pub use log::{Log, LogError};
-pub use options::ImportOptions;
+pub use options::{FrameRange, ImportOptions, Instants};

@@ -8,7 +8,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::ids::ElementId;
-use super::tuning::{PATCHES_MIN, SMALL_SHARE};
+use super::tuning::{PATCHES_MIN, SMALL_SHARE, WIDE};
 use crate::scene::{BodyId, Scene};
 
 /// Sorts of patches that are planted apart.
@@ -102,6 +102,16 @@ impl Layout {
 /// the patches.
 pub fn grouped_patches(scene: &Scene) -> usize {
     Layout::of(scene, &|_| false).small_count()
+}
+
+/// Parts of what is distant that groups are linked with ([`Forest::is_wide`](super::Forest::is_wide)), and those that meet each patch.
+pub fn distant_parts(scene: &Scene) -> [u64; 2] {
+    let wide_m2 = (WIDE * scene.outside_m).powi(2);
+    let distant = scene.patches.iter().filter(|p| scene.is_distant(p.body));
+    distant.fold([0, 0], |[wide, narrow], patch| match patch.area_m2() > wide_m2 {
+        true => [wide + 1, narrow],
+        false => [wide, narrow + 1],
+    })
 }
 
 /// A facet of a group, as a point that radiates.

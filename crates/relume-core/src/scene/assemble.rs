@@ -186,8 +186,9 @@ impl Parts {
         }
         let patches = Range { start: first, end: self.patches.len() as u32 };
         if !patches.is_empty() {
-            let name = draft.nodes[node].name.clone();
-            self.bodies.push(Body { name, node: NodeId(node as u32), patches, distant: false });
+            let DraftNode { name, again, .. } = &draft.nodes[node];
+            let (name, again, node) = (name.clone(), *again, NodeId(node as u32));
+            self.bodies.push(Body { name, node, patches, distant: false, again });
         }
         Ok(())
     }

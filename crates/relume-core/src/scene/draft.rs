@@ -71,6 +71,8 @@ pub struct DraftNode {
     pub presence: Vec<(f64, bool)>,
     /// What hangs on it.
     pub surfaces: Vec<DraftSurface>,
+    /// It is another shape of what a node of its own shows at other times ([`Body::again`](super::Body::again)).
+    pub again: bool,
     /// Its number among the bodies that were declared as such: they come first in the scene, in this order.
     pub body: Option<u32>,
 }
@@ -107,6 +109,7 @@ impl DraftNode {
             rotation_track: None,
             presence: Vec::new(),
             surfaces: Vec::new(),
+            again: false,
             body: None,
         }
     }

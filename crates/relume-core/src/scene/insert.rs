@@ -158,6 +158,7 @@ impl Scene {
             node: NodeId(scene.motion.nodes.len() as u32 - 1),
             patches: first..scene.patches.len() as u32,
             distant: false,
+            again: false,
         });
         Ok((scene, id))
     }

@@ -7,13 +7,13 @@ use glam::DVec3;
 
 use super::flatten::{FLATNESS, area_vector, flatten};
 
-/// The polygons of a triangle mesh, and how many triangles had no area.
+/// The polygons of a triangle mesh, and how many triangles were left out.
 pub struct Merged {
     /// Convex loops, counter-clockwise from the front, in the order of their first triangles.
     pub polygons: Vec<Vec<DVec3>>,
     /// The polygon that each triangle is in; `None` for those left out.
     pub polygon_of: Vec<Option<u32>>,
-    /// Triangles left out because they have no area relative to their longest side.
+    /// Triangles left out because they have no area relative to their longest side, or repeat an earlier one.
     pub degenerate: usize,
 }
 
@@ -21,8 +21,8 @@ pub struct Merged {
 ///
 /// Vertices are welded where their positions are equal, which is how exporters split them. A
 /// coplanar region with a convex outline becomes one polygon; any other is cut into convex ones by
-/// removing the longest sides first (Hertel and Mehlhorn 1983: at most four times the fewest).
-/// O(n log n).
+/// removing the longest sides first (Hertel and Mehlhorn 1983: at most four times the fewest). Of
+/// triangles on the same corners that face the same way the first counts. O(n log n).
 pub fn merge(points: &[DVec3], triangles: &[[u32; 3]]) -> Merged {
     merge_alike(points, triangles, &|_, _| true)
 }
@@ -35,8 +35,9 @@ pub fn merge_alike(
     alike: &dyn Fn(usize, usize) -> bool,
 ) -> Merged {
     let welded = weld(points);
-    let is_flat = |t: &&[u32; 3]| has_area(t.map(|v| points[v as usize]));
-    let numbers: Vec<usize> = (0..triangles.len()).filter(|&k| is_flat(&&triangles[k])).collect();
+    let has_area = |k: &usize| has_area(triangles[*k].map(|v| points[v as usize]));
+    let numbers: Vec<usize> = (0..triangles.len()).filter(has_area).collect();
+    let numbers = firsts(numbers, &|k| triangles[k].map(|v| welded[v as usize]));
     let kept: Vec<[u32; 3]> =
         numbers.iter().map(|&k| triangles[k].map(|v| welded[v as usize])).collect();
     let degenerate = triangles.len() - kept.len();
@@ -57,13 +58,25 @@ pub fn merge_alike(
     let firsts: Vec<u32> = polygons.iter().map(|p| mesh.joined_with(p.0)).collect();
     let mut number = vec![NONE; kept.len()];
     (0..).zip(&firsts).for_each(|(k, &first)| number[first as usize] = k);
-    let mut next = 0..kept.len() as u32;
-    let of_kept = |t: &[u32; 3]| {
-        let t = is_flat(&t).then(|| next.next().expect("as many as were kept"))?;
-        Some(number[mesh.joined_with(t) as usize])
-    };
-    let polygon_of = triangles.iter().map(of_kept).collect();
+    let mut polygon_of = vec![None; triangles.len()];
+    for (t, &k) in numbers.iter().enumerate() {
+        polygon_of[k] = Some(number[mesh.joined_with(t as u32) as usize]);
+    }
     Merged { polygons: polygons.into_iter().map(|p| p.1).collect(), polygon_of, degenerate }
+}
+
+/// The first of those triangles, ascending, that have the same corners in the same order, whichever of them comes first.
+fn firsts(mut triangles: Vec<usize>, corners: &dyn Fn(usize) -> [u32; 3]) -> Vec<usize> {
+    let key = |&k: &usize| {
+        let mut corners = corners(k);
+        let least = (0..3).min_by_key(|&c| corners[c]).expect("it has three");
+        corners.rotate_left(least);
+        (corners, k)
+    };
+    triangles.sort_unstable_by_key(key);
+    triangles.dedup_by_key(|k| key(k).0);
+    triangles.sort_unstable();
+    triangles
 }
 
 /// For each point the first index with the same position (0 and -0 are the same).

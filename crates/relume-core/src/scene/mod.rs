@@ -139,6 +139,9 @@ pub struct Body {
     /// It stands for light from outside, the sky or the sun: so far away that it has no place in the scene. It shines,
     /// and what reaches it has escaped; it has no share in the scene's extent and area, hides nothing, is lit by nothing.
     pub distant: bool,
+    /// It is another shape of what is there as a body of its own at other times, and has no share in the scale that sizes are
+    /// measured by.
+    pub again: bool,
 }
 
 /// A named part of a body: one mesh primitive of one object (node with a mesh).
@@ -393,7 +396,9 @@ impl Scene {
     /// The same of the bodies that the scene was made with, removed ones among them, m2: the scale that sizes are measured
     /// by, so that none of them changes when a body comes or goes.
     pub fn made_area_m2(&self) -> f64 {
-        let is_made = |p: &&Patch| !self.is_distant(p.body) && !self.is_inserted(p.body);
+        let is_again = |p: &Patch| self.bodies[p.body.0 as usize].again;
+        let is_made =
+            |p: &&Patch| !self.is_distant(p.body) && !self.is_inserted(p.body) && !is_again(p);
         self.patches.iter().filter(is_made).map(Patch::area_m2).sum()
     }
 }

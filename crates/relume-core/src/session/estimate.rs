@@ -1,8 +1,8 @@
 //! Estimate of pairs, memory and time of a frame before it is solved.
 //!
 //! The estimate follows from the number of pairs of patches face each other that are in no group: all of them are judged, whatever the
-//! tolerance, and most of them become links. What refinement adds is small for many patches, and large for few. Patches of groups
-//! cost a number of pairs each. The numbers were fitted to scenes measured (docs/performance.md). Nothing that is solved depends on an
+//! tolerance, and most of them become links. Half of them meet each part of what is distant, or their groups do. What refinement adds
+//! is small for many patches, and large for few. Patches of groups cost a number of pairs each. The numbers were fitted to scenes measured (docs/performance.md). Nothing that is solved depends on an
 //! estimate.
 
 use glam::DVec3;
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::scene::{BodyId, Scene};
 
-use crate::element::grouped_patches;
+use crate::element::{distant_parts, grouped_patches};
 
 use super::{Options, Oracle};
 
@@ -32,6 +32,13 @@ pub struct Estimate {
     pub core_seconds: [f64; 2],
     /// Whether refinement makes most of it, at worst: then a coarser tolerance helps.
     pub by_refinement: bool,
+}
+
+/// What there is but for what is distant: patches, how many of them groups are made of, and pairs that face each other.
+struct Near {
+    patches: u64,
+    grouped: u64,
+    facing: u64,
 }
 
 /// A patch in the world: its plane and its corners.
@@ -92,16 +99,22 @@ impl Estimate {
             Oracle::Error if options.groups => (grouped_patches(scene) as u64).min(patches),
             _ => 0,
         };
-        Estimate::from_counts(facing, (patches, grouped), options.tolerance)
+        let near = Near { patches, grouped, facing };
+        Estimate::from_counts(&near, distant_parts(scene), options.tolerance)
     }
 
     /// See [`PAIRS_OF_PATCHES`] and what follows it.
-    fn from_counts(facing_of_all: u64, (patches, grouped): (u64, u64), tolerance: f64) -> Estimate {
+    fn from_counts(near: &Near, distant: [u64; 2], tolerance: f64) -> Estimate {
+        let Near { patches, grouped, facing: facing_of_all } = *near;
         let all = (patches as f64).max(1.0);
+        let [wide, narrow] = distant.map(|parts| parts as f64);
         let of = |k: usize| {
             // Those that groups are not made of, and some groups.
             let n = (patches - grouped) as f64 + if grouped > 0 { GROUPS[k] } else { 0.0 };
-            let facing = facing_of_all as f64 * (n / all).min(1.0).powi(2);
+            let of_near = facing_of_all as f64 * (n / all).min(1.0).powi(2);
+            // What is distant is met by half of all that faces any way.
+            let of_sky = (n * wide + patches as f64 * narrow) / 2.0;
+            let facing = of_near + of_sky;
             let base = n * (n - 1.0).max(0.0) / 2.0 + PAIRS_OF_FACING * facing;
             let (fixed, of_patch) = REFINED[k];
             let refined = (fixed + of_patch * n) * FITTED_AT / tolerance;
@@ -147,6 +160,7 @@ const SECONDS: [f64; 2] = [8e-6, 45e-6];
 mod tests {
     use super::*;
     use crate::scene::SceneBuilder;
+    use crate::scene::outside::{Outside, Sky};
     use crate::session::Session;
 
     use std::sync::Arc;
@@ -193,6 +207,28 @@ mod tests {
         }
     }
 
+    /// Things in the open make pairs with the sky above all.
+    #[test]
+    fn pairs_with_a_sky_count() {
+        let mut b = SceneBuilder::new("open");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let node = b.node("street", None, DVec3::ZERO, DQuat::IDENTITY);
+        for k in 0..12 {
+            let low = DVec3::new(f64::from(k % 4) * 3.0, 0.0, f64::from(k / 4) * 3.0);
+            b.cuboid(node, &format!("house {k}"), grey, low, low + DVec3::new(1.0, 2.0, 1.0));
+        }
+        let sky = Some(Sky::Overcast { irradiance: 3.0 });
+        let outside = Outside { sky, fineness: 0.1, ..Outside::default() };
+        let scene = b.build().unwrap().with_outside(outside).unwrap();
+        let options = Options { tolerance: 0.1, ..Options::default() };
+        let estimate = Estimate::of(&scene, 0.0, &options);
+        let mut session = Session::new(Arc::new(scene), options).unwrap();
+        let found = session.step(0, 0.0).unwrap().pairs;
+        let found = (found.active + found.refined + found.culled) as f64;
+        let middle = (estimate.pairs[0] as f64 * estimate.pairs[1] as f64).sqrt();
+        assert!((1.0 / 3.0..3.0).contains(&(middle / found)), "{found} {estimate:?}");
+    }
+
     #[test]
     fn an_even_share_of_many_pairs_stands_for_all() {
         let placed = placed(&crates(6), 0.0);
@@ -205,12 +241,13 @@ mod tests {
 
     #[test]
     fn halls_of_thousands_of_polygons_are_no_matter_of_tolerance() {
-        let estimate = Estimate::from_counts(90_000_000, (33_000, 0), 0.1);
+        let hall = |patches, grouped, facing| Near { patches, grouped, facing };
+        let estimate = Estimate::from_counts(&hall(33_000, 0, 90_000_000), [0, 0], 0.1);
         assert!(estimate.pairs[0] > 400_000_000 && !estimate.by_refinement, "{estimate:?}");
         // The same of small patches in groups.
-        let grouped = Estimate::from_counts(90_000_000, (33_000, 32_000), 0.1);
+        let grouped = Estimate::from_counts(&hall(33_000, 32_000, 90_000_000), [0, 0], 0.1);
         assert!(grouped.pairs[1] < 40_000_000 && grouped.by_refinement, "{grouped:?}");
-        assert!(Estimate::from_counts(40, (16, 0), 0.005).by_refinement);
-        assert_eq!(Estimate::from_counts(0, (1, 0), 0.02).pairs, [0, 0]);
+        assert!(Estimate::from_counts(&hall(16, 0, 40), [0, 0], 0.005).by_refinement);
+        assert_eq!(Estimate::from_counts(&hall(1, 0, 0), [0, 0], 0.02).pairs, [0, 0]);
     }
 }

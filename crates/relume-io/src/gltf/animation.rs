@@ -28,8 +28,8 @@ pub(super) struct Moves {
     pub(super) growth: Option<String>,
     /// The weights of its mesh's morph targets, where keys say that they never change.
     pub(super) weights: Option<Vec<f64>>,
-    /// Whether its mesh's morph targets are moved by weights that do change.
-    pub(super) morphs: bool,
+    /// The weights of its mesh's morph targets one by one, where they do change.
+    pub(super) morphs: Vec<Track>,
     pub(super) presence: Vec<(f64, bool)>,
     pub(super) visibility: Vec<(f64, bool)>,
 }
@@ -247,7 +247,7 @@ impl Reader<'_> {
             "translation" => of_node.translation.is_some(),
             "rotation" => of_node.rotation.is_some(),
             "scale" => of_node.scale.is_some(),
-            "weights" => of_node.weights.is_some() || of_node.morphs,
+            "weights" => of_node.weights.is_some() || !of_node.morphs.is_empty(),
             other => {
                 let what = format!("node `{name}` has an unknown animated property `{other}`");
                 return Err(self.malformed(&what));
@@ -287,11 +287,8 @@ impl Reader<'_> {
                 let read = self.document.numbers::<1>(output, &self.owner(name))?;
                 let values: Vec<f64> = read.into_iter().map(|[v]| v).collect();
                 of_node.weights = constant_weights(&keys, &values);
-                of_node.morphs = of_node.weights.is_none();
-                if of_node.morphs {
-                    let message =
-                        "its morph target animation is ignored: it keeps its shape at rest";
-                    notes.push(note(Severity::Warning, "morph", name, 1, message.to_owned()));
+                if of_node.weights.is_none() {
+                    of_node.morphs = weight_tracks(name, &keys, &values)?;
                 }
             }
             _ => {
@@ -466,6 +463,23 @@ fn emission(pointer: &str) -> Option<(Emitter, Property)> {
         _ => return None,
     };
     Some((Emitter::Light(index), property))
+}
+
+/// Keys of each weight by itself, in each of the three coordinates.
+fn weight_tracks(name: &str, keys: &Keys, values: &[f64]) -> Result<Vec<Track>, SceneError> {
+    let (times_s, interpolation) = (&keys.times_s, keys.interpolation);
+    let rows = if interpolation == Interpolation::CubicSpline { 3 } else { 1 } * times_s.len();
+    let count = values.len() / rows.max(1);
+    // Of each key one value of every target, or so many rows of them.
+    let of_target = |target: usize| -> Vec<DVec3> {
+        values.chunks_exact(count).map(|row| DVec3::splat(row[target])).collect()
+    };
+    let track = |target: usize| {
+        let values = of_target(target);
+        check_track(name, times_s, values.len(), interpolation)?;
+        Ok(Track { times_s: times_s.clone(), values, interpolation })
+    };
+    (0..count).map(track).collect()
 }
 
 /// The one set of weights of all keys, if it is one.

@@ -14,8 +14,8 @@ use draco_core::{
 
 use super::accessor::Component;
 use super::document::Document;
-use super::guard::guarded;
 use super::json;
+use crate::guard::guarded;
 use relume_core::scene::SceneError;
 
 /// Triangles and vertices of one stream at most: above any mesh that can be solved, and few bytes can stand for

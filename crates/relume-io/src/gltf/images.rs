@@ -2,17 +2,12 @@
 //!
 //! Must not know what an image is used for.
 
-use std::io::Cursor;
 use std::sync::Arc;
 
-use image::{DynamicImage, ImageDecoder};
-
 use super::document::Document;
+use crate::surface::image_file::{IMAGE_MAX, texels};
 use relume_core::scene::SceneError;
-use relume_core::scene::pyramid::{BYTES_A_PIXEL, Pyramid};
-
-/// Bytes of the largest image file that is read.
-const IMAGE_MAX: usize = 1 << 28;
+use relume_core::scene::pyramid::Pyramid;
 
 /// Bytes of decoded images that are kept beside the one in use.
 const KEPT_MAX: usize = 128 << 20;
@@ -99,34 +94,11 @@ impl<'a> Images<'a> {
         owner: &str,
         least_alpha: u16,
     ) -> Result<Result<Pyramid, String>, SceneError> {
-        if bytes.starts_with(KTX2) {
-            return Ok(Err(
-                "it is a KTX2 file; convert it to PNG, for example with `ktx extract --transcode rgba8`".to_owned()
-            ));
-        }
-        let format = match image::guess_format(bytes) {
-            Ok(format) => format,
-            Err(error) => return Ok(Err(error.to_string())),
-        };
-        let reader = image::ImageReader::with_format(Cursor::new(bytes), format);
-        let decoder = match reader.into_decoder() {
-            Ok(decoder) => decoder,
-            Err(error) => return Ok(Err(error.to_string())),
-        };
-        // As it is decoded, and as it is kept.
-        let ((width, height), as_decoded) = (decoder.dimensions(), decoder.total_bytes());
-        let kept = BYTES_A_PIXEL.saturating_mul(u64::from(width) * u64::from(height));
-        self.document.fits(owner, as_decoded.saturating_add(kept))?;
-        Ok(match DynamicImage::from_decoder(decoder) {
-            Ok(pixels) => {
-                let rgba = pixels.into_rgba8().into_raw();
-                Pyramid::new([width as usize, height as usize], rgba, least_alpha)
-                    .ok_or_else(|| "the image is empty".to_owned())
-            }
-            Err(error) => Err(error.to_string()),
-        })
+        let found = texels(bytes, "", &|needs_bytes| self.document.fits(owner, needs_bytes))?;
+        Ok(found.and_then(|image| {
+            let size = [image.width() as usize, image.height() as usize];
+            Pyramid::new(size, image.into_raw(), least_alpha)
+                .ok_or_else(|| "the image is empty".to_owned())
+        }))
     }
 }
-
-/// The first bytes of a KTX2 file.
-const KTX2: &[u8] = b"\xABKTX 20\xBB\r\n\x1A\n";

@@ -2,17 +2,18 @@
 //!
 //! Reads what it needs of the file; must not know nodes or placements.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
 use super::document::Document;
-use super::facet::{Facet, Layer, Look};
 use super::images::{Images, Key};
 use super::material::{Paint, REFLECTANCE_MAX};
-use super::pieces::{Pieces, blocking, pieces};
 use super::{json, note};
+use crate::surface::facet::{Facet, Layer, Look};
+use crate::surface::pieces::{Pieces, blocking, pieces};
+use crate::surface::{Mesh, Tints, resolution};
 use relume_core::scene::coverage::Wrap;
 use relume_core::scene::merge::{Merged, merge};
 use relume_core::scene::{Note, Print, SceneError, Severity, Tint, TintId};
@@ -49,8 +50,7 @@ pub(super) struct Looks<'a> {
     /// By material; the last one is for primitives without any.
     paints: Vec<Paint>,
     images: Images<'a>,
-    tints: Vec<Tint>,
-    numbers: BTreeMap<[u64; 6], TintId>,
+    tints: Tints,
     /// Materials that were lowered to [`REFLECTANCE_MAX`], and the highest that was.
     lowered: (BTreeSet<usize>, f64),
     /// Materials with textures or vertex colours.
@@ -70,11 +70,6 @@ struct SeenThrough {
     left_out: usize,
 }
 
-/// Steps across a triangle for its means ([`relume_core::scene::coverage::Cover::resolution`]), at most and at least, and how many all
-/// triangles of a primitive share.
-const STEPS: (f64, f64) = (32.0, 4096.0);
-const STEPS_SHARED: f64 = 4e6;
-
 impl<'a> Looks<'a> {
     pub(super) fn new(document: &'a Document, paints: Vec<Paint>, pictures: bool) -> Looks<'a> {
         Looks {
@@ -82,8 +77,7 @@ impl<'a> Looks<'a> {
             pictures,
             paints,
             images: Images::new(document),
-            tints: Vec::new(),
-            numbers: BTreeMap::new(),
+            tints: Tints::default(),
             lowered: Default::default(),
             varied: BTreeSet::new(),
             see_through: SeenThrough::default(),
@@ -107,7 +101,8 @@ impl<'a> Looks<'a> {
             return Ok(self.plain(material, of));
         }
         self.varied.insert(material);
-        let pieces = pieces(&look, of, self.paints[material].see_through.is_some());
+        let mesh = Mesh { points: of.points, triangles: of.triangles };
+        let pieces = pieces(&look, &mesh, self.paints[material].see_through.is_some());
         Ok(self.finished(material, pieces))
     }
 
@@ -154,14 +149,7 @@ impl<'a> Looks<'a> {
         self.lower(material, reflectance);
         let reflectance = reflectance.map(|r| r.clamp(0.0, REFLECTANCE_MAX));
         let emission = facet.emission.map(|e| e.clamp(0.0, 1.0));
-        let bits = |k: usize| if k < 3 { reflectance[k] } else { emission[k - 3] }.to_bits();
-        let key = [0, 1, 2, 3, 4, 5].map(bits);
-        let next = TintId(self.tints.len() as u32);
-        let id = *self.numbers.entry(key).or_insert(next);
-        if id == next {
-            self.tints.push(Tint { reflectance, emission });
-        }
-        id
+        self.tints.number(Tint { reflectance, emission })
     }
 
     fn lower(&mut self, material: usize, reflectance: [f64; 3]) {
@@ -180,7 +168,14 @@ impl<'a> Looks<'a> {
         notes: &mut Vec<Note>,
     ) -> Result<Look, SceneError> {
         let paint = self.paints[material].clone();
-        let colours = self.colours(of)?;
+        let is_opaque = paint.see_through.is_none();
+        let colours = match self.colours(of)? {
+            Some(colours) if is_opaque && is_mask(&colours) => {
+                self.note_mask(material, notes);
+                None
+            }
+            colours => colours,
+        };
         let mut least_alpha = 0;
         let mut least_vertex_alpha = None;
         if let Some(see) = paint.see_through {
@@ -244,8 +239,7 @@ impl<'a> Looks<'a> {
         }
         let sampler = entry.sampler.and_then(|s| root.samplers.get(s));
         let wrap = [sampler.and_then(|s| s.wrap_s), sampler.and_then(|s| s.wrap_t)].map(wrap);
-        let steps = STEPS_SHARED / of.triangles.len().max(1) as f64;
-        let resolution = steps.clamp(STEPS.0, STEPS.1);
+        let resolution = resolution(of.triangles.len());
         Ok(Some(Layer { pyramid, wrap, places, resolution }))
     }
 
@@ -283,6 +277,18 @@ impl<'a> Looks<'a> {
         let known = |c: f64| if c.is_finite() { c.max(0.0) } else { 1.0 };
         let colours = colours.map(|all| all.into_iter().map(|c| c.map(known)).collect::<Vec<_>>());
         Ok(colours.filter(|colours| colours.iter().any(|c| *c != [1.0; 4])))
+    }
+
+    /// Says once of a material that vertex colours of what has it are left out.
+    fn note_mask(&mut self, material: usize, notes: &mut Vec<Note>) {
+        if self.said.insert((material, "vertex colours")) {
+            let message =
+                "its vertex colours are black with an alpha of 0 at more than half of the vertices, as what is not painted is \
+                 written: they are taken for a mask and left out"
+                    .to_owned();
+            let name = &self.paints[material].name;
+            notes.push(note(Severity::Warning, "vertex-colours", name, 1, message));
+        }
     }
 
     /// An attribute with a value for each vertex, if the primitive has it.
@@ -354,7 +360,7 @@ impl<'a> Looks<'a> {
                 names(materials)
             ),
         );
-        self.tints
+        self.tints.finish()
     }
 }
 
@@ -363,6 +369,11 @@ impl SeenThrough {
         self.materials.insert(material);
         *(if is_open { &mut self.left_out } else { &mut self.opaque }) += polygons;
     }
+}
+
+/// Whether more than half of vertex colours are zero, alpha and all: of what is opaque that is no colour.
+fn is_mask(colours: &[[f64; 4]]) -> bool {
+    2 * colours.iter().filter(|c| **c == [0.0; 4]).count() > colours.len()
 }
 
 fn wrap(code: Option<u32>) -> Wrap {

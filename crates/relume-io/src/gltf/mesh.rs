@@ -185,7 +185,7 @@ impl Soup<'_> {
         let merged = looks.polygons(&Triangles { primitive, points, triangles, owner }, notes)?;
         if merged.degenerate > 0 {
             let message = format!(
-                "{} of {} triangles have no area and were left out",
+                "{} of {} triangles have no area or repeat another and were left out",
                 merged.degenerate,
                 triangles.len()
             );

@@ -11,8 +11,8 @@ use meshoptimizer_rs::codec::{
 use meshoptimizer_rs::{Limits, Workspace};
 
 use super::document::Document;
-use super::guard::guarded;
 use super::json;
+use crate::guard::guarded;
 use relume_core::scene::SceneError;
 
 /// Bytes that one compressed byte can stand for, at most: a block of up to 256 vertices costs the vertex codec

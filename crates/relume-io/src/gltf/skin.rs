@@ -8,10 +8,11 @@ use std::collections::BTreeSet;
 use glam::{DAffine3, DMat4, DVec3};
 
 use super::mesh::{Polygons, by_joint, check_places, soups, vertex_weights};
-use super::tree::{Tree, placed};
+use super::tree::{Tree, both, placed, shaped, weights_at};
 use super::{json, node_name};
+use crate::options::Span;
 use relume_core::scene::draft::DraftNode;
-use relume_core::scene::{Interpolation, SceneError, Severity};
+use relume_core::scene::{SceneError, Severity, Track, check_track};
 
 /// A node of the file with a skinned mesh.
 pub(super) struct Skinned {
@@ -22,6 +23,8 @@ pub(super) struct Skinned {
     pub(super) mesh: usize,
     pub(super) skin: usize,
     pub(super) weights: Vec<f64>,
+    /// Its weights one by one, where they change.
+    pub(super) morphs: Vec<Track>,
 }
 
 /// A skin's joints as the file has them.
@@ -35,6 +38,12 @@ struct Joint {
     node: usize,
     place: usize,
     bind: Option<[f64; 16]>,
+}
+
+/// A mesh as its joints bend it, in the frame of a node of the draft, or in the world.
+struct Bent {
+    on: Option<usize>,
+    primitives: Vec<Polygons>,
 }
 
 impl Tree<'_> {
@@ -95,16 +104,60 @@ impl Tree<'_> {
         Ok(Ok(()))
     }
 
-    /// Puts a mesh that bends where its joints have it at the start, on whatever its skeleton hangs on.
+    /// Puts a mesh that bends where its joints have it: at the start, on whatever its skeleton hangs on; or at each instant, in the
+    /// world.
     fn held(
         &mut self,
         skinned: &Skinned,
         joints: &Joints,
         bent: usize,
     ) -> Result<Result<(), String>, SceneError> {
+        let is_rebuilt = self.is_rebuilt();
+        let at_start = Span { time_s: 0.0, presence: [None; 2] };
+        let spans = if is_rebuilt { self.spans.clone() } else { vec![at_start] };
+        let mut name = None;
+        let mut carrier = None;
+        for (number, span) in spans.iter().enumerate() {
+            let Bent { on, primitives } = match self.bent(skinned, joints, span.time_s)? {
+                Ok(found) => found,
+                Err(why) => return Ok(Err(why)),
+            };
+            let name = name.get_or_insert_with(|| self.leave_name(skinned));
+            let shape = placed(&json::Node::default(), name, on);
+            carrier = on;
+            let shape = if is_rebuilt { shaped(shape, number, span) } else { shape };
+            self.hang(skinned, shape, primitives)?;
+        }
+        if is_rebuilt {
+            self.note_rebuilt(skinned.index);
+            return Ok(Ok(()));
+        }
+        let on = carrier.map_or(String::new(), |c| {
+            format!(" and moves as `{}` does", self.draft.nodes[c].name)
+        });
+        let message = format!(
+            "{bent} of its triangles hang on several joints and would bend: it is held in its pose at the start{on}; --deform \
+             rebuild bends it"
+        );
+        self.note(Severity::Warning, "skin", skinned.index, message);
+        Ok(Ok(()))
+    }
+
+    /// The polygons of a mesh where its joints have it at a time: in the frame of a node that it hangs on, if it is not to be
+    /// read anew as time goes on; or why there is no skin to speak of.
+    fn bent(
+        &mut self,
+        skinned: &Skinned,
+        joints: &Joints,
+        time_s: f64,
+    ) -> Result<Result<Bent, String>, SceneError> {
         let document = self.document;
+        let weights = match self.is_rebuilt() {
+            true => weights_at(&skinned.weights, &skinned.morphs, time_s),
+            false => skinned.weights.clone(),
+        };
         // What the vertices themselves say of them has been noted before.
-        let (mesh, mut soups) = soups(document, skinned.mesh, &skinned.weights, &mut Vec::new())?;
+        let (mesh, mut soups) = soups(document, skinned.mesh, &weights, &mut Vec::new())?;
         let mut matrices: Vec<Option<DAffine3>> = vec![None; joints.nodes.len()];
         let mut used = BTreeSet::new();
         for soup in &mut soups {
@@ -112,7 +165,7 @@ impl Tree<'_> {
             for &(joint, weight) in weights.iter().flatten() {
                 if weight != 0.0 && used.insert(joint) {
                     match self.joint(joints, joint) {
-                        Ok(found) => matrices[joint] = Some(self.posed(&found)),
+                        Ok(found) => matrices[joint] = Some(self.posed(&found, time_s)),
                         Err(why) => return Ok(Err(why)),
                     }
                 }
@@ -121,7 +174,10 @@ impl Tree<'_> {
                 *point = skinned_point(*point, weights, &matrices);
             }
         }
-        let (carrier, from_world) = self.carrier(joints, &used);
+        let (carrier, from_world) = match self.is_rebuilt() {
+            true => (None, DAffine3::IDENTITY),
+            false => self.carrier(joints, &used),
+        };
         let mut primitives = Vec::new();
         for soup in &mut soups {
             soup.points.iter_mut().for_each(|p| *p = from_world.transform_point3(*p));
@@ -129,17 +185,7 @@ impl Tree<'_> {
             let notes = &mut self.draft.notes;
             primitives.push(soup.merged(&soup.triangles, &mesh, &mut self.looks, notes)?);
         }
-        let on = carrier.map_or(String::new(), |c| {
-            format!(" and moves as `{}` does", self.draft.nodes[c].name)
-        });
-        let message = format!(
-            "{bent} of its triangles hang on several joints and would bend: it is held in its pose at the start{on}"
-        );
-        self.note(Severity::Warning, "skin", skinned.index, message);
-        let name = self.leave_name(skinned);
-        let still = placed(&json::Node::default(), &name, carrier);
-        self.hang(skinned, still, primitives)?;
-        Ok(Ok(()))
+        Ok(Ok(Bent { on: carrier, primitives }))
     }
 
     /// A joint of a skin, or why there is none.
@@ -159,17 +205,17 @@ impl Tree<'_> {
         Ok(Joint { node, place, bind })
     }
 
-    /// What a joint makes of a vertex at the start: where it is in the world.
-    fn posed(&self, joint: &Joint) -> DAffine3 {
+    /// What a joint makes of a vertex at a time: where it is in the world.
+    fn posed(&self, joint: &Joint, time_s: f64) -> DAffine3 {
         let bind = joint.bind.map_or(DMat4::IDENTITY, |m| DMat4::from_cols_array(&m));
-        self.at_start(joint.place) * DAffine3::from_mat4(bind)
+        self.at(joint.place, time_s) * DAffine3::from_mat4(bind)
     }
 
-    /// Where a node of the draft is at the start, with all scales above it.
-    fn at_start(&self, node: usize) -> DAffine3 {
+    /// Where a node of the draft is at a time, with all scales above it.
+    fn at(&self, node: usize, time_s: f64) -> DAffine3 {
         let nodes = &self.draft.nodes;
         let upward = std::iter::successors(Some(node), |&n| nodes[n].parent);
-        upward.fold(DAffine3::IDENTITY, |below, n| placement(&nodes[n]) * below)
+        upward.fold(DAffine3::IDENTITY, |below, n| placement(&nodes[n], time_s) * below)
     }
 
     /// The nearest node that all these joints hang below and that is no joint itself, and its frame from the
@@ -189,7 +235,7 @@ impl Tree<'_> {
             common.retain(|n| way.contains(n));
         }
         let carrier = common.into_iter().find(|n| !are_joints.contains(n));
-        let from_world = carrier.map_or(DAffine3::IDENTITY, |c| self.at_start(c).inverse());
+        let from_world = carrier.map_or(DAffine3::IDENTITY, |c| self.at(c, 0.0).inverse());
         match from_world.is_finite() {
             true => (carrier, from_world),
             false => (None, DAffine3::IDENTITY),
@@ -211,22 +257,30 @@ impl Tree<'_> {
         mut part: DraftNode,
         primitives: Vec<Polygons>,
     ) -> Result<(), SceneError> {
-        part.presence = self.presence_of(skinned.me);
+        let presence = self.presence_of(skinned.me);
+        part.presence = match (presence.is_empty(), part.presence.is_empty()) {
+            (_, true) => presence,
+            (true, _) => part.presence,
+            _ => both(&presence, &part.presence),
+        };
         let part = self.below(part.parent, part);
         self.put(part, primitives)
     }
 }
 
-/// Where a node is in its parent at the start.
-fn placement(node: &DraftNode) -> DAffine3 {
-    let first = |interpolation| usize::from(interpolation == Interpolation::CubicSpline);
+/// Where a node is in its parent at a time.
+fn placement(node: &DraftNode, time_s: f64) -> DAffine3 {
+    // Tracks are checked when the scene is made.
+    let is_sound = |times_s: &[f64], values: usize, interpolation| {
+        !times_s.is_empty() && check_track(&node.name, times_s, values, interpolation).is_ok()
+    };
     let track = node.translation_track.as_ref();
-    let translation = track.and_then(|t| t.values.get(first(t.interpolation)));
+    let track = track.filter(|t| is_sound(&t.times_s, t.values.len(), t.interpolation));
+    let translation = track.map_or(node.translation, |t| t.at(time_s));
     let track = node.rotation_track.as_ref();
-    let rotation = track.and_then(|t| t.values.get(first(t.interpolation)));
-    let rotation = rotation.copied().unwrap_or(node.rotation).normalize();
-    let linear = glam::DMat3::from_quat(rotation) * node.shape;
-    DAffine3::from_mat3_translation(linear, translation.copied().unwrap_or(node.translation))
+    let track = track.filter(|t| is_sound(&t.times_s, t.values.len(), t.interpolation));
+    let rotation = track.map_or(node.rotation, |t| t.at(time_s)).normalize();
+    DAffine3::from_mat3_translation(glam::DMat3::from_quat(rotation) * node.shape, translation)
 }
 
 /// The weighted mean of where its joints have a vertex; without weights it stays.

@@ -11,8 +11,9 @@ use super::mesh::{Polygons, polygons};
 use super::skin::Skinned;
 use super::{json, light, material, node_name, note};
 use crate::ImportOptions;
+use crate::options::Span;
 use relume_core::scene::draft::{Draft, DraftNode, DraftSurface};
-use relume_core::scene::{Camera, MaterialId, NodeId, Note, SceneError, Severity};
+use relume_core::scene::{Camera, MaterialId, NodeId, Note, SceneError, Severity, Track};
 
 /// Relative difference of scale components that counts as none (32-bit exporters).
 const SAME_SCALE: f64 = 1e-6;
@@ -20,6 +21,7 @@ const SAME_SCALE: f64 = 1e-6;
 /// Everything of the file's active scene.
 pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draft, SceneError> {
     let mut notes = Vec::new();
+    note_environment(document, &mut notes);
     let played = played(document, options.animation.as_deref(), &mut notes)?;
     let (materials, paints) =
         material::materials(document, &played.materials, &mut notes).into_iter().unzip();
@@ -31,6 +33,7 @@ pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draf
         looks: Looks::new(document, paints, options.pictures),
         meshes: BTreeMap::new(),
         places: document.root.nodes.iter().map(|_| None).collect(),
+        spans: options.rebuild.as_ref().map_or(Vec::new(), |rebuild| rebuild.spans(played.end_s)),
         skinned: Vec::new(),
         polygons: 0,
         without_material: 0,
@@ -47,6 +50,17 @@ pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draf
     tree.walk(&roots)?;
     tree.skins()?;
     Ok(tree.finish())
+}
+
+/// Says that light of pictures all around is not read.
+fn note_environment(document: &Document, notes: &mut Vec<Note>) {
+    let is_such = |name: &&String| name.as_str() == "EXT_lights_image_based";
+    if let Some(extension) = document.root.extensions_used.iter().find(is_such) {
+        let message = format!(
+            "its environment ({extension}) is not read: give a picture of all directions with --environment FILE"
+        );
+        notes.push(note(Severity::Warning, "environment", &document.file, 1, message));
+    }
 }
 
 /// The root nodes of the active scene: the file's default, or its first; without any scene all
@@ -95,6 +109,8 @@ pub(super) struct Tree<'a> {
     meshes: BTreeMap<(usize, Vec<u64>), Vec<Polygons>>,
     /// Where each node of the file is in the draft.
     pub(super) places: Vec<Option<usize>>,
+    /// When meshes that change their shape are read; never again where there are none.
+    pub(super) spans: Vec<Span>,
     /// Nodes with a skin, which wait for their joints.
     pub(super) skinned: Vec<Skinned>,
     /// Polygons in the draft so far.
@@ -151,6 +167,7 @@ impl Tree<'_> {
         let name = node_name(self.document, index);
         let mut placed = placed(node, &name, parent);
         let moves = std::mem::take(&mut self.moves[index]);
+        let morphs = moves.morphs;
         if let Some(scale) = moves.scale {
             placed.shape = shape_of(scale);
         }
@@ -171,15 +188,22 @@ impl Tree<'_> {
         self.growing.push(growing);
         self.draft.nodes.push(placed);
         if let Some(mesh) = node.mesh {
-            let weights = self.weights(mesh, index, moves.weights.as_deref(), moves.morphs)?;
+            let is_still = morphs.is_empty();
+            let weights = self.weights(mesh, index, moves.weights.as_deref(), !is_still)?;
+            let is_rebuilt = self.is_rebuilt() && node.extensions.instancing.is_none();
+            if !is_still && !is_rebuilt {
+                let message = "its morph target animation is ignored: it keeps its shape at rest; --deform rebuild plays it";
+                self.note(Severity::Warning, "morph", index, message.to_owned());
+            }
             match (node.skin, &node.extensions.instancing) {
                 (Some(skin), _) => {
-                    self.skinned.push(Skinned { index, me, mesh, skin, weights });
+                    self.skinned.push(Skinned { index, me, mesh, skin, weights, morphs });
                 }
                 (None, Some(instancing)) => {
                     self.instances((me, index), mesh, &weights, instancing)?;
                 }
-                (None, None) => self.show(me, mesh, &weights)?,
+                (None, None) if is_still || !is_rebuilt => self.show(me, mesh, &weights)?,
+                (None, None) => self.morphing((me, index), mesh, &weights, &morphs)?,
             }
         }
         let id = NodeId(me as u32);
@@ -232,6 +256,36 @@ impl Tree<'_> {
             self.note(Severity::Info, "morph", index, message);
         }
         Ok(weights)
+    }
+
+    /// Whether meshes that change their shape are read at each instant.
+    pub(super) fn is_rebuilt(&self) -> bool {
+        self.spans.len() > 1
+    }
+
+    /// Shows a mesh in the shapes that it has at each instant, each on a node of its own below one of the draft.
+    fn morphing(
+        &mut self,
+        (me, index): (usize, usize),
+        mesh: usize,
+        weights: &[f64],
+        morphs: &[Track],
+    ) -> Result<(), SceneError> {
+        let name = self.draft.nodes[me].name.clone();
+        for (number, span) in self.spans.clone().iter().enumerate() {
+            let shape = placed(&json::Node::default(), &name, Some(me));
+            let shape = self.below(Some(me), shaped(shape, number, span));
+            self.show(shape, mesh, &weights_at(weights, morphs, span.time_s))?;
+        }
+        self.note_rebuilt(index);
+        Ok(())
+    }
+
+    pub(super) fn note_rebuilt(&mut self, index: usize) {
+        let count = self.spans.len();
+        let message =
+            format!("its shape changes: it is a body of its own at each of {count} frames");
+        self.note(Severity::Info, "rebuilt", index, message);
     }
 
     /// Shows a mesh on a node of the draft.
@@ -369,6 +423,19 @@ impl Tree<'_> {
     }
 }
 
+/// A node that is there at one instant of several.
+pub(super) fn shaped(node: DraftNode, number: usize, span: &Span) -> DraftNode {
+    let name = format!("{} @{:.3} s", node.name, span.time_s);
+    DraftNode { name, presence: span.keys(), again: number > 0, ..node }
+}
+
+/// The weights of morph targets at a time, where they change then.
+pub(super) fn weights_at(weights: &[f64], morphs: &[Track], time_s: f64) -> Vec<f64> {
+    let at =
+        |(target, &weight): (usize, &f64)| morphs.get(target).map_or(weight, |m| m.at(time_s).x);
+    weights.iter().enumerate().map(at).collect()
+}
+
 /// A node with its placement: from its matrix, or from translation, rotation and scale.
 pub(super) fn placed(node: &json::Node, name: &str, parent: Option<usize>) -> DraftNode {
     let (translation, rotation, shape) = match &node.matrix {
@@ -409,7 +476,7 @@ fn decomposed(m: &[f64; 16]) -> (DVec3, DQuat, DMat3) {
 }
 
 /// Present where both say so.
-fn both(a: &[(f64, bool)], b: &[(f64, bool)]) -> Vec<(f64, bool)> {
+pub(super) fn both(a: &[(f64, bool)], b: &[(f64, bool)]) -> Vec<(f64, bool)> {
     let at =
         |keys: &[(f64, bool)], t: f64| keys[keys.partition_point(|k| k.0 <= t).saturating_sub(1)].1;
     let mut times: Vec<f64> = a.iter().chain(b).map(|k| k.0).collect();

@@ -5,15 +5,18 @@
 
 use std::path::Path;
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 use crate::ImportOptions;
 use crate::folder::{Folder, read_scene};
-use relume_core::scene::draft::{Draft, DraftNode, DraftSurface};
-use relume_core::scene::merge::merge;
+use crate::surface::Tints;
+use paint::Paint;
+use relume_core::scene::draft::{Draft, DraftNode};
 use relume_core::scene::{Material, MaterialId, Note, Scene, SceneError, Severity};
 
+mod mtl;
 mod obj;
+mod paint;
 mod ply;
 mod polygon;
 mod stl;
@@ -59,6 +62,8 @@ impl Format {
 struct Contents {
     objects: Vec<Object>,
     materials: Vec<Material>,
+    /// Images of the materials, where they have any; as many, or none.
+    paints: Vec<Option<Paint>>,
     notes: Vec<Note>,
 }
 
@@ -74,6 +79,10 @@ struct Part {
     material: Option<usize>,
     points: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
+    /// Texture coordinates of the points, from the lower edge of images.
+    places: Option<Vec<DVec2>>,
+    /// Linear colours of the points.
+    colours: Option<Vec<[f64; 3]>>,
 }
 
 /// Reads a scene at rest.
@@ -97,7 +106,7 @@ pub(super) fn import(
         Format::Stl => stl::read(bytes, &stem, &folder),
         Format::Ply => ply::read(&bytes, &stem, &folder),
     }?;
-    let draft = draft(contents, stem, format)?;
+    let draft = draft(contents, stem, (format, options.pictures))?;
     Scene::from_draft(Draft { edits: options.edits.clone(), ..draft })
 }
 
@@ -112,43 +121,58 @@ fn damaged(folder: &Folder, format: Format, what: impl std::fmt::Display) -> Sce
 }
 
 /// A node for each object.
-fn draft(contents: Contents, name: String, format: Format) -> Result<Draft, SceneError> {
-    let Contents { objects, mut materials, mut notes } = contents;
+fn draft(
+    contents: Contents,
+    name: String,
+    (format, pictures): (Format, bool),
+) -> Result<Draft, SceneError> {
+    let Contents { objects, mut materials, paints, mut notes } = contents;
     let none = materials.len();
-    let bare = objects.iter().flat_map(|o| &o.parts).filter(|p| p.material.is_none()).count();
+    let is_bare = |p: &&Part| p.material.is_none() && p.colours.is_none();
+    let parts = || objects.iter().flat_map(|o| &o.parts);
+    let bare = parts().filter(is_bare).count();
     if bare > 0 {
-        materials.push(grey());
         let message = format!(
             "surfaces without a material: {bare}; they get reflectance {REFLECTANCE} on both sides"
         );
         notes.push(info("no-material", "no material", bare, message));
     }
+    if parts().any(|p| p.material.is_none()) {
+        materials.push(grey());
+    }
     let message =
         format!("{} has no units and no up: coordinates are taken as metres", format.name());
     notes.push(info("units", &name, 1, message));
+    let mut tints = Tints::default();
+    let unpainted = |material: usize| Paint {
+        factor: materials
+            .get(material)
+            .filter(|_| material < none)
+            .map_or([1.0; 3], |m| m.reflectance),
+        ..Paint::default()
+    };
     let mut nodes = Vec::new();
     for object in objects {
         let mut node = DraftNode::still(&object.name, None, DVec3::ZERO, DQuat::IDENTITY);
         for part in object.parts {
             check_places(&part.points, &object.name)?;
-            let merged = merge(&part.points, &part.triangles);
-            if merged.degenerate > 0 {
-                let (none, all) = (merged.degenerate, part.triangles.len());
-                let message = format!("{none} of {all} triangles have no area and were left out");
-                notes.push(info("degenerate", &object.name, none, message));
+            let material = part.material.unwrap_or(none);
+            let paint = paints.get(material).cloned().flatten();
+            let paint = paint.unwrap_or_else(|| unpainted(material));
+            let id = MaterialId(material as u32);
+            let (surface, degenerate) = paint::surface(&part, id, &paint, (&mut tints, pictures));
+            if degenerate > 0 {
+                let all = part.triangles.len();
+                let message = format!(
+                    "{degenerate} of {all} triangles have no area or repeat another and were left out"
+                );
+                notes.push(info("degenerate", &object.name, degenerate, message));
             }
-            let material = MaterialId(part.material.unwrap_or(none) as u32);
-            node.surfaces.push(DraftSurface {
-                name: None,
-                material,
-                polygons: merged.polygons,
-                tints: Vec::new(),
-                prints: Vec::new(),
-            });
+            node.surfaces.push(surface);
         }
         nodes.push(node);
     }
-    Ok(Draft { name, nodes, materials, notes, ..Draft::default() })
+    Ok(Draft { name, nodes, materials, tints: tints.finish(), notes, ..Draft::default() })
 }
 
 fn grey() -> Material {

@@ -6,16 +6,17 @@ use glam::DVec3;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 
+use super::paint::linear;
 use super::{CORNERS_MAX, Contents, Format, Object, Part, damaged, info, polygon};
 use crate::folder::Folder;
 use relume_core::scene::SceneError;
 
-/// A vertex.
-struct Vertex(DVec3);
+/// A vertex: its place and its colour.
+struct Vertex(DVec3, [f64; 3]);
 
 impl PropertyAccess for Vertex {
     fn new() -> Self {
-        Vertex(DVec3::ZERO)
+        Vertex(DVec3::ZERO, [1.0; 3])
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
@@ -23,6 +24,9 @@ impl PropertyAccess for Vertex {
             "x" => &mut self.0.x,
             "y" => &mut self.0.y,
             "z" => &mut self.0.z,
+            "red" | "diffuse_red" | "r" => return self.colour(0, property),
+            "green" | "diffuse_green" | "g" => return self.colour(1, property),
+            "blue" | "diffuse_blue" | "b" => return self.colour(2, property),
             _ => return PropertyAccessResult::Ignored,
         };
         *coordinate = match property {
@@ -35,6 +39,20 @@ impl PropertyAccess for Vertex {
             Property::Float(v) => v.into(),
             Property::Double(v) => v,
             _ => return PropertyAccessResult::UnsupportedType,
+        };
+        PropertyAccessResult::Set
+    }
+}
+
+impl Vertex {
+    /// Sets a channel of the colour, sRGB: integers are shares of their largest.
+    fn colour(&mut self, channel: usize, property: Property) -> PropertyAccessResult {
+        self.1[channel] = match property {
+            Property::UChar(v) => f64::from(v) / 255.0,
+            Property::UShort(v) => f64::from(v) / 65_535.0,
+            Property::Float(v) => v.into(),
+            Property::Double(v) => v,
+            _ => return PropertyAccessResult::Ignored,
         };
         PropertyAccessResult::Set
     }
@@ -117,6 +135,9 @@ pub(super) fn read(bytes: &[u8], stem: &str, folder: &Folder) -> Result<Contents
             }
         }
     }
+    let is_known = |v: &Vertex| v.1.iter().all(|c| c.is_finite());
+    let colours = points.iter().any(|v| v.1 != [1.0; 3]) && points.iter().all(is_known);
+    let colours = colours.then(|| points.iter().map(|v| linear(v.1)).collect());
     let points: Vec<DVec3> = points.into_iter().map(|v| v.0).collect();
     let triangles = triangles(&points, &faces).map_err(|what| wrong(&what))?;
     let mut contents = Contents::default();
@@ -124,7 +145,7 @@ pub(super) fn read(bytes: &[u8], stem: &str, folder: &Folder) -> Result<Contents
         let message = format!("elements that are not read: {}", unused.join(", "));
         contents.notes.push(info("ply", stem, unused.len(), message));
     }
-    let parts = vec![Part { material: None, points, triangles }];
+    let parts = vec![Part { material: None, points, triangles, places: None, colours }];
     contents.objects = vec![Object { name: stem.to_owned(), parts }];
     Ok(contents)
 }

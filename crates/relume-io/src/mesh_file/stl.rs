@@ -28,7 +28,7 @@ pub(super) fn read(
         }
     }
     let triangles = (0..points.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
-    let parts = vec![Part { material: None, points, triangles }];
+    let parts = vec![Part { material: None, points, triangles, places: None, colours: None }];
     let objects = vec![Object { name: stem.to_owned(), parts }];
     Ok(Contents { objects, ..Contents::default() })
 }

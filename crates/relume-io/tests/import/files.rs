@@ -120,6 +120,15 @@ fn harmless_extensions_are_ignored_quietly() {
 }
 
 #[test]
+fn environments_of_files_are_named() {
+    let mut g = Gltf::cube();
+    assert!(with_code(&scene_of(&g).unwrap().notes, "environment").is_empty());
+    g.json["extensionsUsed"] = json!(["EXT_lights_image_based"]);
+    let scene = scene_of(&g).unwrap();
+    assert!(with_code(&scene.notes, "environment")[0].message.contains("--environment FILE"));
+}
+
+#[test]
 fn nodes_of_other_scenes_and_invisible_ones_are_left_out() {
     let mut g = Gltf::cube();
     g.push("nodes", json!({"name": "elsewhere", "mesh": 0}));

@@ -145,7 +145,7 @@ fn obj_files_that_are_black_all_over_are_grey() {
     let one = "newmtl red\nKd 0 0 0\nnewmtl light\nKd 0.2 0.2 0.2\n";
     assert_eq!(reflectances(one), (0.0, 0.2, 0));
     let textured = "newmtl red\nKd 0 0 0\nmap_Kd wood.png\nnewmtl light\nKd 0.2 0.2 0.2\n";
-    assert_eq!(reflectances(textured), (0.5, 0.2, 0));
+    assert_eq!(reflectances(textured), (0.5, 0.2, 0), "its image is not there");
 }
 
 #[test]
@@ -221,13 +221,130 @@ fn obj_with_objects_groups_and_materials() {
             .sum::<f64>()
     };
     assert!((of("floor") - 2.0 * 2.5).abs() < 1e-9, "{}", of("floor"));
-    for code in ["reflectance", "texture", "transparency", "units"] {
+    for code in ["texture", "material-undefined", "units"] {
         assert_eq!(with_code(&scene.notes, code).len(), 1, "{code}");
     }
     std::fs::remove_file(folder.path().join("room.mtl")).unwrap();
     let scene = read(&path).unwrap();
-    assert_eq!(scene.materials.len(), 1);
+    let names: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
+    assert_eq!(names, ["light", "nothing", "red"], "names without a file");
+    assert!(scene.materials.iter().all(|m| m.reflectance == [0.5; 3]));
     assert_eq!(with_code(&scene.notes, "material-file")[0].subject, "room.mtl");
+}
+
+/// A square of 2 m whose texture coordinates show the image once, and its material.
+const SQUARE: &str =
+    "mtllib a.mtl\nv 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\n";
+
+/// A file of the square's faces and its material, beside an image of 2 x 2 texels.
+fn painted(faces: &str, material: &str, texels: &[[u8; 4]; 4]) -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("maps")).unwrap();
+    let image = image::RgbaImage::from_raw(2, 2, texels.concat()).unwrap();
+    for (name, format) in [
+        ("maps/wood.png", image::ImageFormat::Png),
+        ("wood.tga", image::ImageFormat::Tga),
+        ("wood.bmp", image::ImageFormat::Bmp),
+    ] {
+        image.save_with_format(folder.path().join(name), format).unwrap();
+    }
+    std::fs::write(folder.path().join("a.mtl"), format!("newmtl m\n{material}\n")).unwrap();
+    let path = folder.path().join("a.obj");
+    std::fs::write(&path, format!("{SQUARE}{faces}\n")).unwrap();
+    import(&path, &ImportOptions { pictures: true, ..ImportOptions::default() }).unwrap()
+}
+
+/// What the side of a patch reflects and emits that looks at a place above it.
+fn seen_at(scene: &Scene, x: f64, y: f64) -> Option<([f64; 3], [f64; 3])> {
+    let is_at = |p: &&relume_core::scene::Patch| {
+        let corners: Vec<_> = p.corners_in_body().collect();
+        let within = |a: f64, of: &dyn Fn(&glam::DVec3) -> f64| {
+            let all = corners.iter().map(of);
+            all.clone().fold(f64::MAX, f64::min) <= a && a <= all.fold(f64::MIN, f64::max)
+        };
+        p.frame.normal.z > 0.0 && within(x, &|p| p.x) && within(y, &|p| p.y)
+    };
+    let patch = scene.patches.iter().find(is_at)?;
+    Some((scene.reflectance(patch), scene.exitance_at(patch, 0.0)))
+}
+
+const BLACK: [u8; 4] = [0, 0, 0, 255];
+const WHITE: [u8; 4] = [255; 4];
+const FACE: &str = "f 1/1 2/2 3/3 4/4";
+/// Two halves of it, left and right, that look up the texels at the lower left and the upper right.
+const HALVES: &str =
+    "v 1 0 0\nv 1 2 0\nvt 0.25 0.25\nvt 0.75 0.75\nf 1/5 5/5 6/5 4/5\nf 5/6 2/6 3/6 6/6";
+
+#[test]
+fn images_of_obj_count_part_by_part_from_the_lower_left() {
+    // Rows from the top: the lower left texel is red, the upper right one green.
+    let texels = [BLACK, [0, 255, 0, 255], [255, 0, 0, 255], BLACK];
+    for name in ["maps/wood.png", "-blendu on maps\\\\wood.png", "wood.tga", "wood.bmp"] {
+        let name = name.replace("\\\\", "\\");
+        let scene = painted(HALVES, &format!("Kd 0.5 0.5 0.5\nmap_Kd {name}"), &texels);
+        let colour = |x: f64| seen_at(&scene, x, 1.0).unwrap().0;
+        assert_eq!((colour(0.5), colour(1.5)), ([0.5, 0.0, 0.0], [0.0, 0.5, 0.0]), "{name}");
+    }
+    // Where the path is another machine's, the file of that name beside the scene counts.
+    let scene = painted(HALVES, "map_Kd C:\\project\\wood.tga", &texels);
+    assert_eq!(seen_at(&scene, 0.5, 1.0).unwrap().0, [0.98, 0.0, 0.0]);
+    // The mean over the whole, and the image in pictures.
+    let scene = painted(FACE, "Kd 1 1 1\nmap_Kd maps/wood.png", &texels);
+    let [r, g, b] = seen_at(&scene, 1.0, 1.0).unwrap().0;
+    assert!((r - 0.25).abs() < 1e-6 && (g - 0.25).abs() < 1e-6 && b == 0.0, "{r} {g} {b}");
+    assert!(scene.patches.iter().all(|p| p.print.is_some()));
+    let scene = painted(FACE, "Kd 0.3 0.3 0.3\nmap_Kd ../wood.png", &texels);
+    assert_eq!(seen_at(&scene, 1.0, 1.0).unwrap().0, [0.3; 3]);
+    assert!(with_code(&scene.notes, "texture")[0].message.contains("cannot be read"));
+}
+
+#[test]
+fn what_an_image_of_obj_emits_is_its_integral() {
+    let scene = painted(FACE, "Ke 3 3 3\nmap_Ke maps/wood.png", &[WHITE, BLACK, BLACK, BLACK]);
+    let flux: f64 = scene.patches.iter().map(|p| scene.exitance_at(p, 0.0)[0] * p.area_m2()).sum();
+    assert!(
+        (flux / (3.0 * std::f64::consts::PI) - 1.0).abs() < 1e-3,
+        "{flux} of a quarter of 4 m2"
+    );
+    assert!(scene.patches.iter().all(|p| p.twin.is_none()));
+}
+
+#[test]
+fn where_the_dissolve_of_obj_is_low_light_passes() {
+    // The right half of the image is not there; of the file of its own the brightness counts.
+    let clear = [255, 255, 255, 0];
+    let scene =
+        painted(FACE, "Kd 1 1 1\nmap_Kd wood.tga\nmap_d wood.tga", &[WHITE, clear, WHITE, clear]);
+    assert!(seen_at(&scene, 0.5, 1.0).is_some() && seen_at(&scene, 1.5, 1.0).is_none());
+    let scene = painted(FACE, "Kd 0.4 0.4 0.4\nmap_d maps/wood.png", &[BLACK, WHITE, BLACK, WHITE]);
+    assert!(seen_at(&scene, 0.5, 1.0).is_none() && seen_at(&scene, 1.5, 1.0).is_some());
+}
+
+#[test]
+fn what_exporters_leave_out_of_obj_does_not_refuse_it() {
+    // A keyword without a value, and a material without a name.
+    let scene = painted(&format!("usemtl\n{FACE}"), "map_Kd\nillum\nKd 0.3 0.3 0.3", &[WHITE; 4]);
+    assert_eq!(scene.materials[1].name, "(unnamed)");
+    assert_eq!(seen_at(&scene, 1.0, 1.0).unwrap().0, [0.5; 3]);
+    let text = "v 0 0 0\nv 2 0 0\nv 2 2 0\nusemtl brick\nf 1 2 3\n";
+    let scene = scene_of("a.obj", text.as_bytes()).unwrap();
+    assert_eq!(scene.materials[0].name, "brick");
+    assert!(with_code(&scene.notes, "material-undefined")[0].message.contains("brick"));
+}
+
+#[test]
+fn colours_of_vertices_in_obj_and_ply_are_reflectances() {
+    let grey = ((188.0 / 255.0 + 0.055) / 1.055_f64).powf(2.4);
+    let obj = "v 0 0 0 1 0 0\nv 2 0 0 1 0 0\nv 2 2 0 1 0 0\nf 1 2 3\n";
+    let scene = scene_of("a.obj", obj.as_bytes()).unwrap();
+    assert_eq!(scene.reflectance(&scene.patches[0]), [0.98, 0.0, 0.0]);
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+               property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\n\
+               property list uchar int vertex_indices\nend_header\n0 0 0 188 0 0\n2 0 0 188 0 0\n2 2 0 188 0 0\n3 0 1 2\n";
+    let scene = scene_of("a.ply", ply.as_bytes()).unwrap();
+    let found = scene.reflectance(&scene.patches[0]);
+    assert!((found[0] - grey).abs() < 1e-9 && found[1] == 0.0, "{found:?}");
+    assert!(with_code(&scene.notes, "no-material").is_empty());
 }
 
 #[test]
@@ -297,4 +414,47 @@ fn damage_anywhere_never_panics() {
             let _ = scene_of(name, &damaged);
         }
     }
+}
+
+#[test]
+fn damage_to_materials_and_images_never_panics() {
+    let folder = tempfile::tempdir().unwrap();
+    let texels = image::RgbaImage::from_raw(2, 2, [WHITE, BLACK, BLACK, WHITE].concat()).unwrap();
+    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
+    for name in ["wood.png", "wood.tga", "wood.bmp"] {
+        let path = folder.path().join(name);
+        texels.save(&path).unwrap();
+        files.push((name.to_owned(), std::fs::read(path).unwrap()));
+        let text = format!(
+            "newmtl m\nKd 0.5 0.5 0.5\nKe 1 1 1\nd 0.9\nmap_Kd -s 2 2 -o 0.5 {name}\nmap_Ke {name}\nmap_d {name}\n"
+        );
+        std::fs::write(folder.path().join("a.mtl"), &text).unwrap();
+        files.push(("a.mtl".to_owned(), text.into_bytes()));
+        let path = folder.path().join("a.obj");
+        std::fs::write(&path, format!("{SQUARE}{FACE}\n")).unwrap();
+        for (name, whole) in files.drain(..) {
+            for place in 0..whole.len() {
+                let mut damaged = whole.clone();
+                damaged[place] ^= [1, 0x10, 0x80, 0xff][place % 4];
+                std::fs::write(folder.path().join(&name), &damaged).unwrap();
+                // Whatever it says, within bounds.
+                let limit = Some(1 << 26);
+                let _ =
+                    import(&path, &ImportOptions { max_memory_bytes: limit, ..Default::default() });
+            }
+            std::fs::write(folder.path().join(&name), &whole).unwrap();
+        }
+    }
+}
+
+/// A face that goes round several times, and one that is there twice.
+#[test]
+fn triangles_that_repeat_others_count_once() {
+    let places = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\n";
+    let round = "f 1 2 3 4 1 2 3 4 1 2 3 4\nf 3 4 1 2\n";
+    let scene = scene_of("a.obj", format!("{places}{round}").as_bytes()).unwrap();
+    assert_eq!(scene.patches.len(), 2, "a square, from both sides");
+    // One that faces the other way is another surface.
+    let back = scene_of("a.obj", format!("{places}f 1 2 3 4\nf 4 3 2 1\n").as_bytes()).unwrap();
+    assert_eq!(back.patches.len(), 4);
 }

@@ -1,8 +1,12 @@
 //! Animations of a file as poses of bodies.
 
+use std::sync::Arc;
+
 use glam::DVec3;
+use relume_core::scene::outside::{Outside, Sky};
 use relume_core::scene::{BodyId, Scene, Severity};
-use relume_io::{ImportOptions, import};
+use relume_core::session::{Options, Session, compare};
+use relume_io::{ImportOptions, Instants, import};
 use serde_json::json;
 
 use super::gltf::Gltf;
@@ -567,8 +571,8 @@ fn a_skin_of_rigid_joints_moves_with_them() {
     assert_eq!(ends(1.0), (DVec3::ZERO, DVec3::new(3.0, 1.0, 6.0)));
 }
 
-#[test]
-fn a_skin_that_bends_is_held_in_its_pose_at_the_start() {
+/// A skin one of whose vertices hangs on two joints, below an armature that moves.
+fn bending() -> Gltf {
     let mut g = skinned(false);
     // The first vertex of side -x, at the cube's origin, hangs on both joints by halves.
     let weights = g.json["accessors"][3]["bufferView"].as_u64().unwrap() as usize;
@@ -584,7 +588,90 @@ fn a_skin_that_bends_is_held_in_its_pose_at_the_start() {
     let armature = g.node(json!({"name": "armature", "scale": [2, 2, 2], "children": [0, 1]}));
     g.json["scenes"][0]["nodes"] = json!([armature, 2]);
     g.animate("b", armature, "translation", "LINEAR", &[0.0, 1.0], &[0., 0., 0., 0., 0., 9.]);
-    let scene = scene_of(&g).unwrap();
+    g
+}
+
+/// Brute force: the first joint puts a vertex at v + (0, 0, 5), and from there by a share of its way; the second where it is;
+/// twice as large, where the armature is.
+#[track_caller]
+fn is_bent(scene: &Scene, time_s: f64, way: f64) {
+    let there = |p: &&relume_core::scene::Patch| scene.pose(p.body, time_s).is_some();
+    let placed = |p: &relume_core::scene::Patch| {
+        let pose = scene.pose(p.body, time_s).unwrap();
+        p.corners_in_body().map(|c| pose.point(c)).collect::<Vec<_>>()
+    };
+    let found: Vec<DVec3> = scene.patches.iter().filter(there).flat_map(placed).collect();
+    for (vertex, p) in super::gltf::cube_positions().chunks(3).enumerate() {
+        let share = match vertex {
+            0 => 0.5,
+            1..8 => 0.0,
+            _ => 1.0,
+        };
+        let p = DVec3::new(p[0].into(), p[1].into(), p[2].into());
+        let by = DVec3::new(2.0 * way, 0.0, 5.0);
+        let meant = 2.0 * (p + by * share) + DVec3::Z * 9.0 * time_s;
+        let nearest = found.iter().map(|f| f.distance(meant)).fold(99.0, f64::min);
+        assert!(nearest < 1e-6, "vertex {vertex} at {time_s}: {nearest}");
+    }
+}
+
+/// A scene whose meshes are read anew at each frame of four a second.
+fn rebuilt(g: &Gltf) -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    let rebuild = Some(Instants { fps: 4.0, frames: Vec::new() });
+    let options = ImportOptions { rebuild, ..ImportOptions::default() };
+    import(g.write(folder.path(), "scene"), &options).unwrap()
+}
+
+/// The bodies that are there at a time.
+fn present(scene: &Scene, time_s: f64) -> usize {
+    (0..scene.bodies.len() as u32).filter(|&b| scene.pose(BodyId(b), time_s).is_some()).count()
+}
+
+#[test]
+fn a_skin_that_bends_is_rebuilt_at_each_frame_if_asked_for() {
+    let scene = rebuilt(&bending());
+    assert_eq!((scene.bodies.len(), with_code(&scene.notes, "rebuilt").len()), (5, 1));
+    assert!(with_code(&scene.notes, "skin").is_empty());
+    for time_s in [0.0, 0.25, 0.5, 0.75, 1.0] {
+        assert_eq!(present(&scene, time_s), 1);
+        is_bent(&scene, time_s, time_s);
+    }
+    // The scale that sizes are measured by is that of one shape.
+    let first: f64 = scene.patches_of(BodyId(0)).map(|(_, p)| p.area_m2()).sum();
+    assert_eq!(scene.made_area_m2(), first);
+}
+
+#[test]
+fn morph_targets_that_move_are_rebuilt_at_each_frame_if_asked_for() {
+    let mut g = morphing();
+    g.json["nodes"][0]["weights"] = json!([0.0, 2.0]);
+    pointer(&mut g, "/nodes/0/weights", "SCALAR", "LINEAR", &[0.0, 1.0, 0.0, 2.0]);
+    let scene = rebuilt(&g);
+    assert!(with_code(&scene.notes, "morph").is_empty());
+    for k in 0..5 {
+        let time_s = f64::from(k) / 4.0;
+        assert_eq!(present(&scene, time_s), 1);
+        assert!((scene.bounds(time_s).unwrap().0.y - 10.0 * (1.0 + time_s)).abs() < 1e-6);
+    }
+    // Frames that follow each other equal cold builds, bit for bit, there and back again.
+    let sky = Some(Sky::Uniform([1.0; 3]));
+    let scene = scene.with_outside(Outside { sky, fineness: 0.1, ..Outside::default() }).unwrap();
+    let scene = Arc::new(scene);
+    let session = || Session::new(Arc::clone(&scene), Options::default()).unwrap();
+    let mut warm = session();
+    for k in [0, 1, 2, 4, 3, 0] {
+        let mut cold = session();
+        let report = warm.step(k, f64::from(k) / 4.0).unwrap();
+        cold.step(k, f64::from(k) / 4.0).unwrap();
+        assert_eq!(compare(warm.solved().unwrap(), cold.solved().unwrap()), None, "frame {k}");
+        assert!(report.links > 100, "{}", report.links);
+    }
+}
+
+#[test]
+fn a_skin_that_bends_is_held_in_its_pose_at_the_start() {
+    let scene = scene_of(&bending()).unwrap();
     let notes = with_code(&scene.notes, "skin");
     assert_eq!((notes.len(), notes[0].subject.as_str()), (1, "robot"));
     assert!(
@@ -593,25 +680,8 @@ fn a_skin_that_bends_is_held_in_its_pose_at_the_start() {
         notes[0].message
     );
     assert_eq!(scene.surfaces[0].name, "robot");
-    // Brute force: the first joint puts a vertex at v + (0, 0, 5), the second where it is; twice as large.
     for time_s in [0.0, 1.0] {
-        let pose = scene.pose(BodyId(0), time_s).unwrap();
-        let found: Vec<DVec3> =
-            scene.patches.iter().flat_map(|p| p.corners_in_body()).map(|c| pose.point(c)).collect();
-        let positions = super::gltf::cube_positions();
-        for (vertex, p) in positions.chunks(3).enumerate() {
-            let share = if vertex == 0 {
-                0.5
-            } else if vertex < 8 {
-                0.0
-            } else {
-                1.0
-            };
-            let p = DVec3::new(p[0].into(), p[1].into(), p[2].into());
-            let meant = 2.0 * (p + DVec3::Z * 5.0 * share) + DVec3::Z * 9.0 * time_s;
-            let nearest = found.iter().map(|f| f.distance(meant)).fold(99.0, f64::min);
-            assert!(nearest < 1e-6, "vertex {vertex} at {time_s}: {nearest}");
-        }
+        is_bent(&scene, time_s, 0.0);
     }
 }
 

@@ -455,3 +455,27 @@ fn edits_of_a_textured_material_hold_for_all_its_patches() {
         assert_eq!(scene.exitance_at(patch, 0.0), [3.0 * PI; 3]);
     }
 }
+
+/// Exporters write black with an alpha of 0 where vertices are not painted.
+#[test]
+fn vertex_colours_that_are_mostly_unset_are_a_mask() {
+    let scene = |colours: [[f32; 4]; 4], mode: &str| {
+        let mut g = Sheet::new(1, |x, y| [x, y]).gltf(json!({"name": "sheet", "alphaMode": mode,
+            "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1.0], "metallicFactor": 0}}));
+        let accessor = g.floats("VEC4", colours.as_flattened());
+        g.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(accessor);
+        scene_of(&g)
+    };
+    let (unset, red) = ([0.0; 4], [1.0, 0.0, 0.0, 1.0]);
+    let mask = scene([unset, unset, unset, red], "OPAQUE").unwrap();
+    assert_eq!(colours(&mask), [[0.5; 3]]);
+    assert_eq!(with_code(&mask.notes, "vertex-colours").len(), 1);
+    // Black that is meant, half of it unset, and what lets light pass there.
+    let black = [0.0, 0.0, 0.0, 1.0];
+    for (painted, mode) in [([black; 4], "OPAQUE"), ([unset, unset, red, red], "OPAQUE")] {
+        let scene = scene(painted, mode).unwrap();
+        assert!(colours(&scene).iter().all(|c| c[1] == 0.0), "{painted:?}");
+        assert!(with_code(&scene.notes, "vertex-colours").is_empty());
+    }
+    assert!(scene([unset; 4], "MASK").is_err(), "nothing is left of it");
+}

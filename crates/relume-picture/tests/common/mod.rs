@@ -109,7 +109,13 @@ pub(crate) fn body(scene: &mut Scene, polygons: &[(Vec<DVec3>, MaterialId)]) -> 
         });
     }
     let patches = first..scene.patches.len() as u32;
-    scene.bodies.push(Body { name: format!("body {}", body.0), node, patches, distant: false });
+    scene.bodies.push(Body {
+        name: format!("body {}", body.0),
+        node,
+        patches,
+        distant: false,
+        again: false,
+    });
     body
 }
 

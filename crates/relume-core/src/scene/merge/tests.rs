@@ -73,8 +73,17 @@ fn bent_folded_and_single_triangles_stay_apart() {
     assert_eq!(soup(&[[o, x, y], [o, y, x]]).polygons.len(), 2);
     // One folded back over the other along a shared side.
     assert_eq!(soup(&[[o, x, y], [y, x, DVec3::new(0.1, 0.1, 0.0)]]).polygons.len(), 2);
-    // The same triangle twice: three on a side, nothing is merged.
-    assert_eq!(soup(&[[o, x, y], [o, x, y], [x, DVec3::new(1., 1., 0.), y]]).polygons.len(), 3);
+    // Three on a side: nothing is merged there.
+    let (beside, up) = (DVec3::new(1., 1., 0.), DVec3::Z);
+    assert_eq!(soup(&[[o, x, y], [x, up, y], [x, beside, y]]).polygons.len(), 3);
+}
+
+#[test]
+fn of_triangles_on_the_same_corners_the_first_counts() {
+    let (o, x, y, beside) = (DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(1., 1., 0.));
+    let merged = soup(&[[o, x, y], [x, y, o], [x, beside, y], [y, o, x]]);
+    assert_eq!((merged.polygons.len(), merged.degenerate), (1, 2));
+    assert_eq!(merged.polygon_of, [Some(0), None, Some(0), None]);
 }
 
 #[test]

@@ -169,7 +169,13 @@ impl<'a> Adding<'a> {
         self.scene.motion.nodes.push(Node { name: name.clone(), ..node });
         let node = NodeId(self.scene.motion.nodes.len() as u32 - 1);
         let start = self.scene.patches.len() as u32;
-        self.scene.bodies.push(Body { name, node, patches: start..start, distant: true });
+        self.scene.bodies.push(Body {
+            name,
+            node,
+            patches: start..start,
+            distant: true,
+            again: false,
+        });
         BodyId(self.scene.bodies.len() as u32 - 1)
     }
 

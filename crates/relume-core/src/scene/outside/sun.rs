@@ -113,8 +113,8 @@ impl Sun {
     }
 }
 
-/// Corners of the polygon that stands for the disc: three quadrilaterals.
-const CORNERS: u32 = 8;
+/// Corners of the polygon that stands for the disc. Of 8 a penumbra is off by up to 0.6 % of the sun's light.
+const CORNERS: u32 = 16;
 
 /// The shortest rotation from +Y to a direction.
 pub(super) fn from_zenith(to: DVec3) -> DQuat {

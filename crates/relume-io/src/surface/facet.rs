@@ -12,41 +12,41 @@ use relume_core::scene::print::{Print, PrintedTriangle, Sheet};
 use relume_core::scene::pyramid::{Pyramid, Sums};
 
 /// An image on a primitive.
-pub(super) struct Layer {
-    pub(super) pyramid: Arc<Pyramid>,
-    pub(super) wrap: [Wrap; 2],
+pub(crate) struct Layer {
+    pub(crate) pyramid: Arc<Pyramid>,
+    pub(crate) wrap: [Wrap; 2],
     /// Texture coordinates of each vertex; without any the whole image counts everywhere.
-    pub(super) places: Option<Vec<DVec2>>,
+    pub(crate) places: Option<Vec<DVec2>>,
     /// See [`Cover::resolution`].
-    pub(super) resolution: f64,
+    pub(crate) resolution: f64,
 }
 
 /// All that varies over a primitive.
 #[derive(Default)]
-pub(super) struct Look {
-    pub(super) base: Option<Layer>,
-    pub(super) emission: Option<Layer>,
+pub(crate) struct Look {
+    pub(crate) base: Option<Layer>,
+    pub(crate) emission: Option<Layer>,
     /// Vertex colours, linear, with alpha (COLOR_0).
-    pub(super) colours: Option<Vec<[f64; 4]>>,
+    pub(crate) colours: Option<Vec<[f64; 4]>>,
     /// Alpha of the vertices, factor included, from which on a primitive without image that lets light pass blocks it.
-    pub(super) least_vertex_alpha: Option<f64>,
+    pub(crate) least_vertex_alpha: Option<f64>,
     /// The factor of the base colour, where pictures are to show what varies.
-    pub(super) pictured: Option<[f64; 3]>,
+    pub(crate) pictured: Option<[f64; 3]>,
 }
 
 /// Means over a triangle or a polygon.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Facet {
+pub(crate) struct Facet {
     /// Texture times vertex colour, over what is there of it.
-    pub(super) colour: [f64; 3],
+    pub(crate) colour: [f64; 3],
     /// How much of it is there: where the image's alpha is high enough.
-    pub(super) covered: f64,
+    pub(crate) covered: f64,
     /// Standard deviation of the brightness of the image over what is there.
     spread: f64,
-    pub(super) emission: [f64; 3],
+    pub(crate) emission: [f64; 3],
     emission_spread: f64,
     /// The mean of the squares of the brightness of the emission.
-    pub(super) emission_squared: f64,
+    pub(crate) emission_squared: f64,
 }
 
 /// Parts along the sides of a triangle on which image and vertex colours both vary.
@@ -74,12 +74,12 @@ impl Layer {
         }
     }
 
-    pub(super) fn places_of(&self, triangle: [u32; 3]) -> Option<[DVec2; 3]> {
+    pub(crate) fn places_of(&self, triangle: [u32; 3]) -> Option<[DVec2; 3]> {
         self.places.as_ref().map(|places| triangle.map(|v| places[v as usize]))
     }
 
     /// The mean over a convex polygon of texture coordinates.
-    pub(super) fn mean_over(&self, corners: &[DVec2]) -> Sums {
+    pub(crate) fn mean_over(&self, corners: &[DVec2]) -> Sums {
         let (area, sums) = self.cover().integral(corners);
         if area > 0.0 { sums.map(|s| s / area) } else { self.pyramid.mean() }
     }
@@ -87,13 +87,13 @@ impl Layer {
 
 impl Look {
     /// The layer along which polygons are cut into parts.
-    pub(super) fn divided(&self, is_see_through: bool) -> Option<&Layer> {
+    pub(crate) fn divided(&self, is_see_through: bool) -> Option<&Layer> {
         let layer = if is_see_through { &self.base } else { &self.emission };
         layer.as_ref().filter(|layer| layer.places.is_some())
     }
 
     /// The means over a triangle.
-    pub(super) fn facet(&self, triangle: [u32; 3]) -> Facet {
+    pub(crate) fn facet(&self, triangle: [u32; 3]) -> Facet {
         let (colour, there) = self.colour(triangle);
         let emission = self.emission.as_ref().map_or([1.0; 5], |layer| layer.mean(triangle));
         let mut facet = Facet::default().emitting(emission);
@@ -127,7 +127,7 @@ impl Look {
     }
 
     /// What pictures show on a polygon of these triangles, if that is not the same everywhere.
-    pub(super) fn print(
+    pub(crate) fn print(
         &self,
         triangles: &[([u32; 3], [glam::DVec3; 3])],
         facets: &[(Facet, f64)],
@@ -161,7 +161,7 @@ impl Look {
     }
 
     /// Whether two triangles may be merged into one polygon.
-    pub(super) fn alike(&self, one: &Facet, other: &Facet) -> bool {
+    pub(crate) fn alike(&self, one: &Facet, other: &Facet) -> bool {
         let near =
             |a: [f64; 3], b: [f64; 3], least: f64| (0..3).all(|c| (a[c] - b[c]).abs() <= least);
         let brightest = one.emission_max().max(other.emission_max());
@@ -212,7 +212,7 @@ impl Facet {
     }
 
     /// With these means of the emission's image.
-    pub(super) fn emitting(self, sums: Sums) -> Facet {
+    pub(crate) fn emitting(self, sums: Sums) -> Facet {
         Facet {
             emission: [sums[0], sums[1], sums[2]],
             emission_spread: spread_of(sums),
@@ -230,19 +230,19 @@ impl Facet {
     }
 
     /// The mean colour of the vertices where the image alone has these means.
-    pub(super) fn vertex_colour(&self, image: &Sums) -> [f64; 3] {
+    pub(crate) fn vertex_colour(&self, image: &Sums) -> [f64; 3] {
         let of = |c: usize| if image[c] > 0.0 { self.colour[c] * image[3] / image[c] } else { 1.0 };
         [0, 1, 2].map(of)
     }
 
     /// With these means of the base colour's image, times a vertex colour.
-    pub(super) fn coloured(mut self, sums: Sums, vertex: [f64; 3]) -> Facet {
+    pub(crate) fn coloured(mut self, sums: Sums, vertex: [f64; 3]) -> Facet {
         self.set_colour(times(sums, vertex), sums);
         self
     }
 
     /// The mean of several, weighed with their areas.
-    pub(super) fn mean(of: &[(Facet, f64)]) -> Facet {
+    pub(crate) fn mean(of: &[(Facet, f64)]) -> Facet {
         let area: f64 = of.iter().map(|(_, area)| area).sum();
         let covered: f64 = of.iter().map(|(f, area)| f.covered * area).sum();
         let mut mean = Facet { covered: covered / area, ..Facet::default() };
@@ -257,10 +257,10 @@ impl Facet {
 }
 
 /// A layer as what polygons are cut by.
-pub(super) struct Divided<'a> {
-    pub(super) layer: &'a Layer,
+pub(crate) struct Divided<'a> {
+    pub(crate) layer: &'a Layer,
     /// By how much of the image is there, not by its brightness.
-    pub(super) by_alpha: bool,
+    pub(crate) by_alpha: bool,
 }
 
 /// See [`Cover::resolution`]: for the search of cuts.

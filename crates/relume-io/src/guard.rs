@@ -9,7 +9,7 @@ thread_local! {
 }
 
 /// What a decoder returns; `None` if it panics, which is not reported. What it may have left half done must be its own.
-pub(super) fn guarded<T>(decode: impl FnOnce() -> T) -> Option<T> {
+pub(crate) fn guarded<T>(decode: impl FnOnce() -> T) -> Option<T> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let report = panic::take_hook();

@@ -10,7 +10,7 @@ use relume_core::geometry::part_in_front;
 
 /// Least share of the squares of all texels that a cut has to gain: no more than a hundred cuts can, over all
 /// polygons for which that sum is one.
-pub(super) const GAIN: f64 = 0.01;
+pub(crate) const GAIN: f64 = 0.01;
 
 /// Parts of a polygon at most.
 const PARTS_MAX: usize = 32;
@@ -23,14 +23,14 @@ const SLABS: usize = 8;
 const ROUNDS: usize = 5;
 
 /// A part: its texture coordinates, their area and what the image sums to over it, both in texels.
-pub(super) struct Part {
-    pub(super) corners: Vec<DVec2>,
-    pub(super) area: f64,
+pub(crate) struct Part {
+    pub(crate) corners: Vec<DVec2>,
+    pub(crate) area: f64,
     sum: f64,
 }
 
 /// An image on a plane of texture coordinates.
-pub(super) trait Field {
+pub(crate) trait Field {
     /// Area and integral over a convex polygon, in texels.
     fn integral(&self, corners: &[DVec2]) -> (f64, f64);
 
@@ -45,7 +45,7 @@ struct Cut {
 }
 
 /// The parts of a convex polygon of texture coordinates, of cuts that gain at least `least`; one where none does.
-pub(super) fn parts(field: &dyn Field, corners: Vec<DVec2>, least: f64) -> Vec<Part> {
+pub(crate) fn parts(field: &dyn Field, corners: Vec<DVec2>, least: f64) -> Vec<Part> {
     let whole = Part::of(field, corners);
     let smallest = whole.area * SHARE_MIN;
     let first = best_cut(field, &whole, smallest);

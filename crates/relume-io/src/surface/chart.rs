@@ -11,7 +11,7 @@ const ON_PLANE: f64 = 1e-3;
 const ROUNDING: f64 = 1e-4;
 
 /// How the places of a plane in space and in an image belong together.
-pub(super) struct Chart {
+pub(crate) struct Chart {
     origin: DVec3,
     /// Space per unit of each texture coordinate.
     along: [DVec3; 2],
@@ -23,7 +23,7 @@ pub(super) struct Chart {
 
 impl Chart {
     /// The chart of a triangle; `None` where its texture coordinates have no area, or it has none.
-    pub(super) fn new(points: [DVec3; 3], places: [DVec2; 3]) -> Option<Chart> {
+    pub(crate) fn new(points: [DVec3; 3], places: [DVec2; 3]) -> Option<Chart> {
         let (p, q) = (points[1] - points[0], points[2] - points[0]);
         let (s, t) = (places[1] - places[0], places[2] - places[0]);
         let turn = s.perp_dot(t);
@@ -41,18 +41,18 @@ impl Chart {
         Some(Chart { origin: points[0], along, across, at_origin: places[0], extent })
     }
 
-    pub(super) fn place(&self, point: DVec3) -> DVec2 {
+    pub(crate) fn place(&self, point: DVec3) -> DVec2 {
         let d = point - self.origin;
         self.at_origin + DVec2::new(self.across[0].dot(d), self.across[1].dot(d))
     }
 
-    pub(super) fn point(&self, place: DVec2) -> DVec3 {
+    pub(crate) fn point(&self, place: DVec2) -> DVec3 {
         let d = place - self.at_origin;
         self.origin + self.along[0] * d.x + self.along[1] * d.y
     }
 
     /// Whether a corner with this texture coordinate goes on in the same way.
-    pub(super) fn holds(&self, point: DVec3, place: DVec2) -> bool {
+    pub(crate) fn holds(&self, point: DVec3, place: DVec2) -> bool {
         let far = (place - self.at_origin).abs().max_element();
         let off = (self.place(point) - place).abs().max_element();
         off <= ON_PLANE * self.extent + ROUNDING * far

@@ -8,9 +8,9 @@ use glam::{DVec2, DVec3};
 
 use rayon::prelude::*;
 
+use super::Mesh;
 use super::chart::Chart;
 use super::facet::{Divided, Facet, Layer, Look};
-use super::look::Triangles;
 use super::parts::{Field, GAIN, Part, parts};
 use relume_core::scene::Print;
 use relume_core::scene::flatten::area_vector;
@@ -20,20 +20,20 @@ use relume_core::scene::merge::merge_alike;
 const COVERED: (f64, f64) = (1.0 / 64.0, 63.0 / 64.0);
 
 /// A polygon or a part of one.
-pub(super) struct Piece {
-    pub(super) corners: Vec<DVec3>,
-    pub(super) facet: Facet,
-    pub(super) print: Option<Arc<Print>>,
+pub(crate) struct Piece {
+    pub(crate) corners: Vec<DVec3>,
+    pub(crate) facet: Facet,
+    pub(crate) print: Option<Arc<Print>>,
     area: f64,
 }
 
-pub(super) struct Pieces {
-    pub(super) pieces: Vec<Piece>,
-    pub(super) degenerate: usize,
+pub(crate) struct Pieces {
+    pub(crate) pieces: Vec<Piece>,
+    pub(crate) degenerate: usize,
 }
 
 /// Merged and divided polygons of a primitive.
-pub(super) fn pieces(look: &Look, of: &Triangles<'_>, is_see_through: bool) -> Pieces {
+pub(crate) fn pieces(look: &Look, of: &Mesh<'_>, is_see_through: bool) -> Pieces {
     let facets: Vec<Facet> = of.triangles.par_iter().map(|&t| look.facet(t)).collect();
     let points = |t: usize| of.triangles[t].map(|v| of.points[v as usize]);
     let divided = look.divided(is_see_through);
@@ -126,7 +126,7 @@ fn cut(look: &Look, field: &Divided<'_>, piece: Piece, chart: &Chart, least: f64
 }
 
 /// Which of these block light: as many, those that cover most first, as cover the same area in all.
-pub(super) fn blocking(pieces: &[Piece]) -> Vec<bool> {
+pub(crate) fn blocking(pieces: &[Piece]) -> Vec<bool> {
     let mut kept: Vec<bool> = pieces.iter().map(|p| p.facet.covered >= COVERED.1).collect();
     let is_partly = |p: &Piece| p.facet.covered > COVERED.0 && p.facet.covered < COVERED.1;
     let mut partly: Vec<usize> = (0..pieces.len()).filter(|&k| is_partly(&pieces[k])).collect();

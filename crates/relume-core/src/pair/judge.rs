@@ -418,7 +418,8 @@ impl SpaceJudge<'_> {
             false => exchange_by_points(self.simd, place_a, place_b, met),
         };
         if in_contact && x.area_m2 <= 0.0 {
-            return culled(CullReason::FacingAway);
+            let is_covered = !blockers.is_empty();
+            return culled(if is_covered { CullReason::Covered } else { CullReason::FacingAway });
         }
         // How many times too large the area is that verdicts are first made with.
         let mut overstated = 1.0;

@@ -130,6 +130,9 @@ a_few! {
     sensors_in_gaps: "sensor-in-gap", 0..8;
     furnaces_with_gaps: "furnace", 0..3;
     bodies_through_each_other_in_motion: "motion", 0..3;
+    white_bodies_in_motion_keep_their_light: "motion", 100..101;
+    white_bodies_that_pierce_keep_their_light: "motion", 21..22;
+    a_panel_that_slides_off_what_touches_shows_it: "motion", 197..198;
     white_closets: "closet", 2..4;
     white_tables: "table", 0..2;
     small_devices: "device", 1..5;

@@ -7,7 +7,7 @@
 //!
 //! with, if wanted, `RELUME_KINDS=slab,strip`, `RELUME_SEEDS=0..100`, `RELUME_TOLERANCE=0.02`, `RELUME_LIMIT_S=60`
 //! (a scene that takes longer is ended) and `RELUME_JOBS=2` in the environment. One alone, with all that was measured:
-//! `RELUME_SCENE='slab 17' cargo test ... one_scene -- --ignored --nocapture`.
+//! `RELUME_SCENE='slab 17' cargo test ... one_scene -- --ignored --nocapture`, and `RELUME_GLB=FILE` writes it as a file.
 // Reference values may use the platform's functions: nothing that the engine decides rests on them.
 #![allow(clippy::disallowed_methods)]
 
@@ -133,6 +133,7 @@ a_few! {
     white_bodies_in_motion_keep_their_light: "motion", 100..101;
     white_bodies_that_pierce_keep_their_light: "motion", 21..22;
     a_panel_that_slides_off_what_touches_shows_it: "motion", 197..198;
+    a_crate_that_slides_over_panels_in_the_floor_holds_no_light: "motion", 181..182;
     white_closets: "closet", 2..4;
     white_tables: "table", 0..2;
     small_devices: "device", 1..5;

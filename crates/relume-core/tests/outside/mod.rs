@@ -133,6 +133,7 @@ a_few! {
     white_bodies_in_motion_keep_their_light: "motion", 100..101;
     white_bodies_that_pierce_keep_their_light: "motion", 21..22;
     a_panel_that_slides_off_what_touches_shows_it: "motion", 197..198;
+    a_box_that_moves_into_another_that_a_third_sticks_in: "motion", 155..156;
     a_crate_that_slides_over_panels_in_the_floor_holds_no_light: "motion", 181..182;
     white_closets: "closet", 2..4;
     white_tables: "table", 0..2;

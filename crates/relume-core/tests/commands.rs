@@ -540,7 +540,7 @@ fn edits_cost_as_moves(scene: &Scene, options: Options) {
 #[test]
 #[ignore = "minutes: a million links"]
 fn edits_in_a_scene_of_a_million_links_cost_as_moves() {
-    edits_cost_as_moves(&hall(60), Options { groups: false, ..at_tolerance(0.005) });
+    edits_cost_as_moves(&hall(60), Options { groups: false, ..at_tolerance(0.002) });
 }
 
 #[test]

@@ -66,6 +66,9 @@ type Sources<'a> = (&'a Links, &'a dyn Fn(u32) -> Option<Linear>);
 /// Sweeps after which a solve is given up as not converging (reflectances are below 1).
 const SWEEPS_MAX: u32 = 2_000;
 
+/// Sweeps over everything by which a solution is settled further, at most: beyond that it is said that light is unaccounted for.
+const FURTHER_MAX: u32 = 32;
+
 /// Receivers gathered by one task.
 const CHUNK: usize = 256;
 
@@ -153,7 +156,7 @@ impl Radiosity {
     /// change suggests. Where residuals, small as they are, sum to more of the light than may be unaccounted for, as among white
     /// surfaces, everything is gathered until they no longer do.
     pub fn solve(&mut self, surfaces: &impl Surfaces, links: &Links, dirty: Dirty, stop: Stop) {
-        let (is_first, mut is_further) = (self.sweeps == 0, false);
+        let (is_first, mut further) = (self.sweeps == 0, 0);
         let mut work = Work::new(surfaces, dirty);
         let mut jump = Jump::default();
         (self.sweeps, self.gathers) = (0, 0);
@@ -174,7 +177,7 @@ impl Radiosity {
                 work.start_all(surfaces);
             }
             let all = work.all;
-            is_wide |= all && !is_first && !is_further;
+            is_wide |= all && !is_first && further == 0;
             if all {
                 jump.before(&self.radiosity);
             }
@@ -185,15 +188,15 @@ impl Radiosity {
                 true => (small, 0.0),
                 false => (self.skipped_in_full_sweep, self.skipped.max(limit)),
             };
-            let (mean, before) = (self.mean_w_m2(surfaces), limit);
-            limit = stop.limit_w_m2(mean);
-            let limits = (before, limit);
+            let mean = self.mean_w_m2(surfaces);
+            let limits = (limit, stop.limit_w_m2(mean));
+            limit = limits.1;
             if self.is_done((surfaces, links), stop, &mut work, (mean, limits), &mut arriving) {
-                is_further =
-                    self.may_be_unbalanced(surfaces, stop, all.then_some(mean - last_mean));
-                if !is_further {
+                let change = all.then_some(mean - last_mean);
+                if further == FURTHER_MAX || !self.may_be_unbalanced(surfaces, stop, change) {
                     break;
                 }
+                further += 1;
                 work.start_all(surfaces);
             }
             if self.sweeps >= SWEEPS_MAX {

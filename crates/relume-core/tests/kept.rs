@@ -182,9 +182,11 @@ fn commands_leave_the_last_solution() {
     check(&mut session, "after commands");
 }
 
+// Since what escapes is counted by links and bright scenes are settled further, no frame of this scene is refused.
 /// Two rooms that pierce each other, so bright that what a step may leave undone grows to a tenth of the light: whether the
 /// balance is refused is found out by trying.
 #[test]
+#[ignore = "needs a scene of which a frame is refused: none of these is any more"]
 fn light_that_is_unaccounted_for_leaves_the_last_solution() {
     let mut b = SceneBuilder::new("bright");
     let bright = b.material("bright", [0.99; 3], [1.0; 3]);

@@ -127,8 +127,16 @@ pub(crate) fn warning(scene: &Scene) -> Option<String> {
     Some(format!("warning: {}, so every irradiance is 0: {help}", nothing_emits(scene)))
 }
 
+/// That nothing emits, with a material that would if polygons of it were not left out.
 fn nothing_emits(scene: &Scene) -> String {
-    format!("nothing in {} emits light", output::name(&scene.name))
+    let what = format!("nothing in {} emits light", output::name(&scene.name));
+    match scene.materials.iter().find(|material| material.emits()) {
+        Some(material) => format!(
+            "{what} (`{}` would, but there are no polygons of it, or they are too small or thin and were left out)",
+            output::name(&material.name)
+        ),
+        None => what,
+    }
 }
 
 /// What to do where nothing in a scene ever emits.
@@ -153,6 +161,9 @@ fn how_to_light(scene: &Scene) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use glam::DQuat;
+    use relume::SceneBuilder;
+
     use super::*;
     use crate::args::DemoScene;
     use crate::demo;
@@ -167,6 +178,22 @@ mod tests {
     }
 
     #[test]
+    fn a_lamp_that_was_left_out_as_too_small_is_named() {
+        let mut b = SceneBuilder::new("speck");
+        let (grey, lamp) =
+            (b.material("grey", [0.5; 3], [0.0; 3]), b.material("lamp", [0.5; 3], [9.0; 3]));
+        let node = b.node("all", None, DVec3::ZERO, DQuat::IDENTITY);
+        let square = |half: f64, z: f64| {
+            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                .map(|(x, y)| DVec3::new(half * x, half * y, z))
+        };
+        b.polygon(node, "floor", grey, &square(1.0, 0.0));
+        b.polygon(node, "speck", lamp, &square(1e-9, 0.5));
+        let text = required(&b.build().unwrap()).unwrap_err().to_string();
+        assert!(text.contains("(`lamp` would, but there are no polygons of it"), "{text}");
+    }
+
+    #[test]
     fn a_scene_without_light_is_refused_with_its_materials() {
         let mut scene = (demo::demo(DemoScene::Room).build)().unwrap();
         assert_eq!(required(&scene), Ok(()));
@@ -174,7 +201,7 @@ mod tests {
             (material.exitance, material.glow) = ([0.0; 3], None);
         }
         let text = required(&scene).unwrap_err().to_string();
-        assert!(text.contains("nothing in room emits light"), "{text}");
+        assert!(text.contains("nothing in room emits light, so"), "{text}");
         assert!(text.contains("--emit MATERIAL=RADIANCE (W/m2/sr), such as one of `"), "{text}");
     }
 }

@@ -5,6 +5,8 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use relume::export::remove_remains;
+
 use crate::failure::Failure;
 
 /// How often the number of the run that holds a lock is looked for, at most.
@@ -41,6 +43,7 @@ impl Lock {
             let number = std::process::id().to_string();
             let written = file.set_len(0).and_then(|()| file.write_all(number.as_bytes()));
             written.map_err(|error| Failure::write(&path, &error))?;
+            remove_remains(dir, &is_of_a_run);
             return Ok(Lock { _file: file, path });
         }
     }
@@ -68,6 +71,11 @@ fn taken(dir: &Path, file: &mut File) -> Failure {
     };
     Failure::new(format_args!("{who} is writing to {}", dir.display()))
         .help("wait for it to end, or choose another directory with -o")
+}
+
+/// Whether a name is of a file that only runs write into their folder, which have its lock.
+fn is_of_a_run(name: &str) -> bool {
+    name == "report.json" || (name.starts_with("frame-") && name.ends_with(".png"))
 }
 
 /// Whether an open file is the one at a path.
@@ -104,5 +112,15 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         fs::write(dir.path().join(".relume.lock"), "12").unwrap();
         assert!(Lock::take(dir.path()).is_ok());
+    }
+
+    #[test]
+    fn half_files_of_a_dead_run_are_taken_away() {
+        let dir = tempfile::tempdir().unwrap();
+        let names = [".report.json.12-3.tmp", ".frame-0007.png.12-4.tmp", ".notes.txt.12-5.tmp"];
+        let paths = names.map(|name| dir.path().join(name));
+        paths.iter().for_each(|path| fs::write(path, "half").unwrap());
+        let _lock = Lock::take(dir.path()).unwrap();
+        assert_eq!(paths.map(|path| path.exists()), [false, false, true]);
     }
 }

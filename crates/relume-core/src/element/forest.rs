@@ -134,6 +134,8 @@ struct Fixed {
     normals: Vec<Aabb>,
     /// Whether a patch emits light at any time, by patch.
     glows: Vec<bool>,
+    /// Whether a patch does, or there is a punctual light.
+    shines: bool,
     /// Area of the patches connected with each patch, itself among them, by patch, m2.
     connected_m2: Vec<f64>,
     /// Whether a node stands for light from outside, by id; empty if none does.
@@ -494,9 +496,16 @@ impl Forest {
     pub fn set_glows(&mut self, glows: Vec<bool>) -> bool {
         let differs = self.fixed.glows != glows;
         if differs {
+            let lights = (0..self.fixed_len).any(|id| self.kind(ElementId(id)) == Kind::Light);
+            self.fixed_mut().shines = lights || glows.contains(&true);
             self.fixed_mut().glows = glows;
         }
         differs
+    }
+
+    /// Whether anything emits light at any time.
+    pub fn shines(&self) -> bool {
+        self.fixed.shines
     }
 
     /// Whether this is another forest of the same scene though other bodies are displaced: as much of patches is covered, the

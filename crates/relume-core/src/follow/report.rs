@@ -91,14 +91,17 @@ pub struct Energy {
     pub emitted_w: f64,
     /// Absorbed by surfaces.
     pub absorbed_w: f64,
-    /// Left the scene.
+    /// Left the scene: what surfaces send and links carry nowhere. Below 0 where form factors sum to more than 1.
     pub escaped_w: f64,
 }
 
 impl Energy {
-    /// Share of what is emitted that is neither absorbed nor escaped, or that is so without having been emitted.
+    /// Share of what is emitted that is neither absorbed nor escaped, or that is so without having been emitted: the larger of the
+    /// residual of the balance and of what arrives beyond what is sent.
     pub fn unbalanced(&self) -> f64 {
-        let off = (self.emitted_w - self.absorbed_w - self.escaped_w).abs();
+        let residual_w = (self.emitted_w - self.absorbed_w - self.escaped_w).abs();
+        // What is not a number stays one.
+        let off = if -self.escaped_w > residual_w { -self.escaped_w } else { residual_w };
         if self.emitted_w > 0.0 { off / self.emitted_w } else { 0.0 }
     }
 }

@@ -20,22 +20,24 @@ pub(crate) fn balance_of(
     for facet in facets {
         let material = surfaces.material(facet.0);
         sums.clear();
-        row_sums(surfaces, (links, linear), is_surface, facet.0, &mut |_, sum| sums.push(sum));
+        row_sums(surfaces, (links, linear), is_surface, facet.0, &mut |_, sum| sums.push(*sum));
         let mut next = sums.iter();
         radiosity.irradiances(surfaces, facet.0, &mut |id, h| {
             let a = surfaces.area_m2(id);
-            let off = f64::from(*next.next().expect("the same leaves")) - 1.0;
+            let row = next.next().expect("the same leaves");
+            let off = f64::from(row.mean) - 1.0;
             rows.rms += a * off * off;
             if !surfaces.is_covered(id) {
                 rows.max = rows.max.max(off.abs());
             }
             area += a;
             let b = radiosity.radiosity(id);
+            let carried = radiosity.carried(surfaces, id, row);
             for c in 0..3 {
                 energy.emitted_w += a * f64::from(material.exitance[c]);
                 energy.absorbed_w +=
                     a * f64::from((1.0 - material.reflectance[c]) * h.mean[c].max(0.0));
-                energy.escaped_w -= off * a * f64::from(b[c]);
+                energy.escaped_w += a * (f64::from(b[c]) - carried[c]);
             }
         });
     }

@@ -9,7 +9,7 @@ use crate::predict::{History, Lookahead, Tick};
 use super::certificate_tests::Finding;
 use super::margin::Margin;
 use super::space::Judge;
-use super::tree::{Carried, PairId, PairTree, State};
+use super::tree::{Carried, CullReason, PairId, PairTree, State};
 use super::tuning::CHUNK;
 use super::verdict::{Judgement, Stale, Verdict};
 use super::wave::{Below, Item, List};
@@ -162,6 +162,8 @@ fn certificate<J: Judge>(
     may_be_clear: bool,
 ) -> Option<Tick> {
     match found {
+        // What covers it may leave.
+        (Verdict::Cull(CullReason::Covered), _) => Some(judge.expiry(a, b, Finding::Unaffected)),
         (Verdict::Cull(_), _) => Some(judge.expiry(a, b, Finding::Culled)),
         (_, Stale::Followed) => None,
         // It is met again, perhaps still in the state that it had.

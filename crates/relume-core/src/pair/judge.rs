@@ -359,7 +359,8 @@ impl SpaceJudge<'_> {
         let places = Places::new(self, (a, b), !candidates.is_empty());
         let met = meeting(&places.own.0, &places.own.1);
         let shaft = places.shaft(self);
-        if met == Meeting::BackFacing || (met == Meeting::Coplanar && !shaft.is_contact()) {
+        let is_apart = || !shaft.is_contact() || self.leaves_neither(a, b);
+        if met == Meeting::BackFacing || (met == Meeting::Coplanar && is_apart()) {
             return culled(CullReason::FacingAway);
         }
         if self.is_above_coarse(a, b) {
@@ -368,6 +369,15 @@ impl SpaceJudge<'_> {
         }
         let found = shaft.narrow_to_blockers(candidates, narrowed);
         self.decide((a, b), known, (&places.own.0, &places.own.1), met, &shaft, &found)
+    }
+
+    /// Whether what two touching elements exchange counts for nothing, as it leaves neither: where there is light. Links of patches
+    /// that rest against each other say so themselves; tables of form factors have all of it.
+    ///
+    /// Among links of elements of unlike sizes it would be more than leaves them: light between a moving crate's bottom and the floor
+    /// grew to 80 times that of the room.
+    fn leaves_neither(&self, a: ElementId, b: ElementId) -> bool {
+        self.forest.shines() && !self.forest.rest_in_contact(a, b)
     }
 
     fn shaft<'a>(
@@ -418,7 +428,8 @@ impl SpaceJudge<'_> {
             false => exchange_by_points(self.simd, place_a, place_b, met),
         };
         if in_contact && x.area_m2 <= 0.0 {
-            return culled(CullReason::FacingAway);
+            let is_covered = !blockers.is_empty();
+            return culled(if is_covered { CullReason::Covered } else { CullReason::FacingAway });
         }
         // How many times too large the area is that verdicts are first made with.
         let mut overstated = 1.0;

@@ -24,6 +24,8 @@ pub enum CullReason {
     Absent,
     /// Two lights.
     NoReceiver,
+    /// The ends touch, and other surfaces in their plane show in place of all that they have in common.
+    Covered,
 }
 
 /// State of a pair at this instant.
@@ -50,7 +52,7 @@ impl State {
         matches!(self, State::Refined(_) | State::RefinedSelf)
     }
 
-    const ALL: [State; 9] = [
+    const ALL: [State; 10] = [
         State::New,
         State::Active,
         State::Refined(Side::A),
@@ -60,6 +62,7 @@ impl State {
         State::Culled(CullReason::Absent),
         State::Culled(CullReason::NoReceiver),
         State::Vacant,
+        State::Culled(CullReason::Covered),
     ];
 
     fn code(self) -> u32 {
@@ -73,6 +76,7 @@ impl State {
             State::Culled(CullReason::Absent) => 6,
             State::Culled(CullReason::NoReceiver) => 7,
             State::Vacant => 8,
+            State::Culled(CullReason::Covered) => 9,
         }
     }
 }

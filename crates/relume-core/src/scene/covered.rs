@@ -25,6 +25,9 @@ const SLIVER: f64 = 1e-9;
 /// Cuts made in one scene; what would be found after that is not: a count, so that it is the same everywhere.
 const CUTS_MAX: usize = 2_000_000;
 
+/// Parts of the animation in which it is told apart where moving bodies get.
+const SPANS: u32 = 32;
+
 /// Polygons of a surface, and covered parts of a patch, that are looked at.
 const POLYGONS_MAX: usize = 4_096;
 
@@ -79,10 +82,12 @@ struct Placed {
     bounds: Aabb,
 }
 
-/// Where what emits can get in the whole animation, in the world.
+/// Where what emits, and what moves, can get in the whole animation, in the world.
 struct Lamps {
     patches: Vec<(PatchId, Aabb)>,
     lights: Vec<Aabb>,
+    /// Bodies that move, other than those that cover, each in `SPANS` parts of the animation.
+    movers: Vec<Aabb>,
 }
 
 impl Lamps {
@@ -93,11 +98,12 @@ impl Lamps {
             let patch = &scene.patches[*id as usize];
             scene.patch_emits(patch) && counts(patch.body)
         };
+        let [from, to] = scene.motion.span_s();
         let patch = |id: u32| {
             let patch = &scene.patches[id as usize];
-            (PatchId(id), way(scene, patch.body, &Aabb::of(patch.corners_in_body())))
+            let bounds = Aabb::of(patch.corners_in_body());
+            (PatchId(id), way(scene, patch.body, &bounds, [from, to]))
         };
-        let [from, to] = scene.motion.span_s();
         let light = |l: &super::Light| {
             let at = scene.motion.place(l.node, from).translation;
             Aabb::of([at]).sum(&scene.motion.drift(l.node, 0.0, [from, to]).reach())
@@ -105,25 +111,22 @@ impl Lamps {
         Lamps {
             patches: (0..scene.patches.len() as u32).filter(emits).map(patch).collect(),
             lights: scene.lights.iter().map(light).collect(),
+            movers: movers(scene, bodies),
         }
     }
 
-    /// Whether a lamp is, or may get, among the polygons of a body; touching is not enough. An inner side that emits counts.
-    fn may_shine_in(
-        &self,
-        scene: &Scene,
-        (placed, hull): (&[Placed], &Hull),
-        slack_m: f64,
-    ) -> bool {
+    /// Whether a lamp, or a body that moves, is or may get among the polygons of a body; touching is not enough. An inner side that
+    /// emits counts. What moves in there would exchange light with covered parts.
+    fn may_be_in(&self, scene: &Scene, (placed, hull): (&[Placed], &Hull), slack_m: f64) -> bool {
         let own = |id: PatchId, of: &[usize]| of.iter().any(|&k| placed[k].id == id);
         let body = scene.patches[placed[hull.polygons[0]].id.0 as usize].body;
-        let bounds = way(scene, body, &hull.bounds);
+        let bounds = way(scene, body, &hull.bounds, scene.motion.span_s());
         let within = |lamp: &Aabb| {
             let lamp = lamp.grown(2.0 * slack_m);
             let least = bounds.lo.max(lamp.lo).cmplt(bounds.hi.min(lamp.hi) - 3.0 * slack_m);
             least.all()
         };
-        self.lights.iter().any(within)
+        self.lights.iter().chain(&self.movers).any(within)
             || self.patches.iter().any(|(id, lamp)| {
                 within(lamp) && (!own(*id, &hull.polygons) || own(*id, &hull.twins))
                     || !hull.twins.is_empty() && own(*id, &hull.polygons)
@@ -131,12 +134,26 @@ impl Lamps {
     }
 }
 
-/// Where something of a body can get in the whole animation, in the world.
-fn way(scene: &Scene, body: BodyId, bounds: &Aabb) -> Aabb {
+/// Where bodies can get that move and are none of `bodies`, in each of `SPANS` parts of the animation, in the world.
+fn movers(scene: &Scene, bodies: &[BodyId]) -> Vec<Aabb> {
+    let [from, to] = scene.motion.span_s();
+    let at = |k: u32| from + (to - from) * f64::from(k) / f64::from(SPANS);
+    let all = (0..scene.bodies.len() as u32).map(BodyId);
+    let moving = all.filter(|&body| scene.moves(body) && !scene.is_distant(body));
+    let others = moving.filter(|body| !bodies.contains(body) && !scene.is_inserted(*body));
+    let ways = |body: BodyId| {
+        let corners = scene.patches_of(body).flat_map(|(_, patch)| patch.corners_in_body());
+        let bounds = Aabb::of(corners);
+        (0..SPANS).map(move |k| way(scene, body, &bounds, [at(k), at(k + 1)]))
+    };
+    others.flat_map(ways).collect()
+}
+
+/// Where something of a body can get from one time to another, in the world.
+fn way(scene: &Scene, body: BodyId, bounds: &Aabb, [from, to]: [f64; 2]) -> Aabb {
     if !scene.moves(body) {
         return *bounds;
     }
-    let [from, to] = scene.motion.span_s();
     let pose = scene.motion.place(scene.bodies[body.0 as usize].node, from);
     let corner = |k: u32| {
         let pick = |axis: u32, lo: f64, hi: f64| if k >> axis & 1 == 0 { lo } else { hi };
@@ -173,7 +190,7 @@ impl Group {
         let reach = |p: &Placed| p.bounds.lo.abs().max(p.bounds.hi.abs()).max_element();
         let slack_m = IN_PLANE * placed.iter().map(reach).fold(0.0, f64::max);
         let lamps = Lamps::of(scene, bodies);
-        hulls.retain(|hull: &Hull| !lamps.may_shine_in(scene, (&placed, hull), slack_m));
+        hulls.retain(|hull: &Hull| !lamps.may_be_in(scene, (&placed, hull), slack_m));
         Group { placed, hulls, slack_m }
     }
 

@@ -21,7 +21,7 @@ pub use field::Linear;
 pub use groups::{GroupEnd, GroupLink, GroupLinks, PlacedLinks};
 pub use links::{Link, Links, LinksBuilder};
 pub use place::Place;
-pub use push::row_sums;
+pub use push::{RowSum, row_sums};
 pub use radiosity::{Radiosity, Stop};
 pub use surfaces::{FacetMaterial, SQUARE_MOMENT, Surfaces};
 pub use work::Dirty;

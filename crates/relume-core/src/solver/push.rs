@@ -5,6 +5,15 @@ use super::links::Links;
 use super::place::Place;
 use super::surfaces::Surfaces;
 
+/// Sum of the form factors from points of an element: 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RowSum {
+    /// Mean over the element.
+    pub mean: f32,
+    /// Gradient, per metre.
+    pub gradient: [f32; 2],
+}
+
 /// Calls `visit` with the sum of the form factors from each leaf of a facet, over its and its
 /// ancestors' links: as lines, or as means alone unless `linear`.
 pub fn row_sums(
@@ -12,7 +21,7 @@ pub fn row_sums(
     (links, linear): (&Links, bool),
     counts: &(dyn Fn(u32) -> bool + Sync),
     facet: u32,
-    visit: &mut dyn FnMut(u32, f32),
+    visit: &mut dyn FnMut(u32, &RowSum),
 ) {
     let own = |id: u32| {
         let mut sum = Linear::default();
@@ -37,7 +46,7 @@ pub fn row_sums(
     };
     let place = surfaces.place(facet);
     push(surfaces, (facet, &place), &Linear::default(), &own, &mut |id, sum| {
-        visit(id, sum.mean[0]);
+        visit(id, &RowSum { mean: sum.mean[0], gradient: sum.gradient.map(|g| g[0]) });
     });
 }
 

@@ -6,7 +6,7 @@ use crate::element::Renumbering;
 
 use super::field::{Field, Linear, SLACK, grow};
 use super::place::Place;
-use super::push::push;
+use super::push::{RowSum, push};
 use super::surfaces::{Surfaces, for_each_below};
 use super::trend::Trend;
 
@@ -186,6 +186,19 @@ impl Radiosity {
             (b.gradient[0][c], b.gradient[1][c]) = (slope[0], slope[1]);
         }
         b
+    }
+
+    /// Mean over an element of its radiosity times the sum of the form factors from there, W/m2: what its links carry away,
+    /// where both vary together too.
+    pub fn carried(&self, surfaces: &impl Surfaces, id: u32, row: &RowSum) -> [f64; 3] {
+        let b = self.radiosity.get(id);
+        let scale = surfaces.place(id).radius * surfaces.source_moment();
+        let [x, y] = row.gradient.map(|g| f64::from(g * scale));
+        let of = |c: usize| {
+            let [u, v] = b.gradient.map(|g| f64::from(g[c]));
+            f64::from(b.mean[c]) * f64::from(row.mean) + x * u + y * v
+        };
+        [of(0), of(1), of(2)]
     }
 
     /// Calls `visit` with the irradiance (mean, and gradient per metre) of each leaf of a facet,

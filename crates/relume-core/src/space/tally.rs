@@ -118,7 +118,7 @@ pub(crate) fn row_sums_of(solved: &Solved) -> Vec<(ElementId, f64)> {
     for facet in forest.near_facets() {
         let links = (&solved.links, !solved.radiosity.is_bounded());
         row_sums(&surfaces, links, &is_surface, facet.0, &mut |id, sum| {
-            out.push((ElementId(id), f64::from(sum)));
+            out.push((ElementId(id), f64::from(sum.mean)));
         });
     }
     out

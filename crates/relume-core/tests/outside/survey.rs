@@ -3,10 +3,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
+use relume_io::export::write_glb;
 
 use crate::outside::case::Case;
 use crate::outside::verdict::{STEP, Verdict, judge};
@@ -52,6 +54,9 @@ fn one_scene() {
     let seed = seed.parse().expect("a seed is a number");
     let mut case = kind(name).case(seed, tolerance());
     case.says_steps = true;
+    if let Some(file) = variable("RELUME_GLB") {
+        write_glb(&case.scene(), Path::new(&file)).expect("a scene can be written");
+    }
     let loud = variable("RELUME_QUIET").is_none();
     if loud {
         println!("{}, at {}", case.story, case.tolerance);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use relume_core::scene::{Scene, check};
-use relume_core::session::{Factors, FrameReport, Grouping, Options, Sensor, Session};
+use relume_core::session::{Factors, FrameReport, Grouping, Options, Sensor, Session, compare};
 use relume_judge::path::{self, Estimate, Site};
 use relume_judge::rows;
 
@@ -18,7 +18,7 @@ const BALANCE: f64 = 0.01;
 const NOISE: f64 = 4.0;
 
 /// The engine's own memory, at most.
-const MEMORY_BYTES: u64 = 1_500_000_000;
+const MEMORY_BYTES: u64 = 1_000_000_000;
 
 /// What begins a line about a frame that is solved.
 pub(crate) const STEP: &str = "STEP ";
@@ -138,13 +138,12 @@ fn run(case: &Case, scene: &Arc<Scene>, options: &Options, verdict: &mut Verdict
             let mut cold = Session::new(Arc::clone(scene), options.clone()).expect("as before");
             match cold.step(frame as u32, time_s) {
                 Ok(found) => {
-                    let differs = if found.hash == report.hash { 0.0 } else { 1.0 };
-                    verdict.add(
-                        "hash",
-                        format!("hash at {time_s} s is not that of a cold build"),
-                        differs,
-                        0.5,
-                    );
+                    let is_equal = found.hash == report.hash;
+                    let between = [&session, &cold].map(|s| s.solved().expect("both have one"));
+                    let why = (!is_equal).then(|| compare(between[0], between[1])).flatten();
+                    let why = why.map_or_else(String::new, |why| format!(": {why}"));
+                    let what = format!("hash at {time_s} s is not that of a cold build{why}");
+                    verdict.add("hash", what, f64::from(u8::from(!is_equal)), 0.5);
                 }
                 Err(why) => verdict.refused = Some(format!("cold at {time_s} s: {why}")),
             }

@@ -61,8 +61,10 @@ impl WholeFile {
             return Ok(WholeFile { file, places: None });
         }
         let temporary = temporary_beside(path)?;
+        // Held, so that no file is there that a process that ends does not know of.
+        let mut unfinished = unfinished();
         let file = BufWriter::new(fs::File::create_new(&temporary)?);
-        unfinished().insert(temporary.clone(), (path.to_owned(), None));
+        unfinished.insert(temporary.clone(), (path.to_owned(), None));
         Ok(WholeFile { file, places: Some((temporary, path.to_owned())) })
     }
 
@@ -121,6 +123,27 @@ impl Drop for WholeFile {
     }
 }
 
+/// Takes away temporary files that processes left in a folder when they were killed, of files whose names `is_of` says. Nobody else
+/// may be writing these there.
+pub fn remove_remains(dir: &Path, is_of: &dyn Fn(&str) -> bool) {
+    let Ok(entries) = fs::read_dir(dir) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        if name.to_str().and_then(place_of).is_some_and(is_of) {
+            // Best effort: what is left does no harm.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// Name of the file that a temporary one was to become, from the name that [`temporary_beside`] gave it.
+fn place_of(temporary: &str) -> Option<&str> {
+    let (name, numbers) = temporary.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once('.')?;
+    let (process, count) = numbers.split_once('-')?;
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    (is_number(process) && is_number(count)).then_some(name)
+}
+
 /// Whether [`write_atomically`] could write to `path` now: makes a temporary file beside it and
 /// takes it away again.
 pub fn probe(path: &Path) -> io::Result<()> {
@@ -161,6 +184,22 @@ mod tests {
             .collect();
         names.sort();
         names
+    }
+
+    #[test]
+    fn what_killed_processes_left_is_taken_away_and_nothing_else() {
+        let dir = tempfile::tempdir().unwrap();
+        let all = [
+            ".a.txt.12-0.tmp",
+            ".a.txt.tmp",
+            ".a.txt.x-0.tmp",
+            ".b.txt.12-0.tmp",
+            "a.txt",
+            "a.txt.12-0.tmp",
+        ];
+        all.iter().for_each(|name| fs::write(dir.path().join(name), "x").unwrap());
+        remove_remains(dir.path(), &|name| name == "a.txt");
+        assert_eq!(names(dir.path()), all[1..]);
     }
 
     #[test]

@@ -8,6 +8,6 @@ mod glb;
 mod npz;
 
 pub use factors::{energyplus, view3d};
-pub use file::{WholeFile, probe, settle_unfinished, write_atomically};
+pub use file::{WholeFile, probe, remove_remains, settle_unfinished, write_atomically};
 pub use glb::{ExportError, glb, write_glb};
 pub use npz::Npz;

@@ -166,8 +166,8 @@ impl Forest {
         self.kept_len = self.fixed_len;
         self.sum_areas();
         self.fixed_mut().normals = self.boxes_of_normals(scene);
-        self.fixed_mut().glows =
-            scene.patches.iter().map(|patch| scene.patch_emits(patch)).collect();
+        self.fixed_mut().shines = !scene.lights.is_empty();
+        self.set_glows(scene.patches.iter().map(|patch| scene.patch_emits(patch)).collect());
         self.fixed_mut().connected_m2 = scene.connected_areas_m2();
     }
 

@@ -17,7 +17,7 @@ impl Forest {
     ) -> Option<Renumbering> {
         let mut new_of = vec![NONE; old.kept_len as usize];
         let made = old.fixed.made_children;
-        if made != new.fixed.made_children {
+        if made != new.fixed.made_children || old.shines() != new.shines() {
             return None;
         }
         new_of[Forest::ROOT.0 as usize] = Forest::ROOT.0;

@@ -4,6 +4,7 @@ use fearless_simd::dispatch;
 use rayon::prelude::*;
 
 use super::{OverGroups, Radiosity};
+use crate::element::ElementId;
 use crate::solver::dirty_path::{Batch, DirtyPath};
 use crate::solver::field::{Linear, grow};
 use crate::solver::gather::gather_some;
@@ -12,9 +13,9 @@ use crate::solver::jump::Jump;
 use crate::solver::links::Links;
 use crate::solver::push::row_sums;
 use crate::solver::settle::{Below, IrradianceChange, Settled};
-use crate::solver::surfaces::{Surfaces, for_each_below};
+use crate::solver::surfaces::{FacetMaterial, Surfaces, for_each_below};
 use crate::solver::trend::Trend;
-use crate::solver::tuning::{PENDING_SHARE, SKIPPED_MAX};
+use crate::solver::tuning::{PENDING_SHARE, SKIPPED_MAX, UNBALANCED_MAX, UNKNOWN_MAX};
 use crate::solver::work::{Dirty, Work};
 use crate::transport;
 
@@ -51,11 +52,22 @@ impl Stop {
     }
 }
 
+/// Fluxes of a solution, W.
+struct Fluxes {
+    /// A B.
+    sent: f64,
+    /// A M or A (1 - rho) H, whichever is larger.
+    passed: f64,
+}
+
 /// Links of elements, and what comes to an element over groups, if there are any.
 type Sources<'a> = (&'a Links, &'a dyn Fn(u32) -> Option<Linear>);
 
 /// Sweeps after which a solve is given up as not converging (reflectances are below 1).
 const SWEEPS_MAX: u32 = 2_000;
+
+/// Sweeps over everything by which a solution is settled further, at most: beyond that it is said that light is unaccounted for.
+const FURTHER_MAX: u32 = 32;
 
 /// Receivers gathered by one task.
 const CHUNK: usize = 256;
@@ -94,7 +106,7 @@ impl Radiosity {
         let is_surface = |id: u32| surfaces.is_surface(id);
         for facet in surfaces.facets() {
             row_sums(surfaces, (links, false), &is_surface, facet.0, &mut |leaf, sum| {
-                self.limits[leaf as usize] = sum.max(1.0);
+                self.limits[leaf as usize] = sum.mean.max(1.0);
             });
         }
         self.start_anew(surfaces);
@@ -141,9 +153,10 @@ impl Radiosity {
     /// often this is called.
     ///
     /// Where the last solve changed most of the scene, this one begins with all of it, as much further along as the last
-    /// change suggests.
+    /// change suggests. Where residuals, small as they are, sum to more of the light than may be unaccounted for, as among white
+    /// surfaces, everything is gathered until they no longer do.
     pub fn solve(&mut self, surfaces: &impl Surfaces, links: &Links, dirty: Dirty, stop: Stop) {
-        let is_first = self.sweeps == 0;
+        let (is_first, mut further) = (self.sweeps == 0, 0);
         let mut work = Work::new(surfaces, dirty);
         let mut jump = Jump::default();
         (self.sweeps, self.gathers) = (0, 0);
@@ -157,17 +170,14 @@ impl Radiosity {
         let start = (stop.is_by_residual() && self.trend.is_wide)
             .then(|| self.trend.follow(surfaces, &mut self.radiosity));
         let mut is_wide = work.all && !is_first;
-        let mut arriving = match work.all {
-            true => None,
-            false => self.mark_over_groups(surfaces, &mut work, limit),
-        };
+        let mut arriving = self.mark_over_groups(surfaces, &mut work, limit);
         loop {
+            // What was little beside a brighter scene is too much beside this one.
             if self.skipped > SKIPPED_MAX * limit && !work.all && stop.is_by_residual() {
-                // What was little beside a brighter scene is too much beside this one.
                 work.start_all(surfaces);
             }
             let all = work.all;
-            is_wide |= all && !is_first;
+            is_wide |= all && !is_first && further == 0;
             if all {
                 jump.before(&self.radiosity);
             }
@@ -178,11 +188,16 @@ impl Radiosity {
                 true => (small, 0.0),
                 false => (self.skipped_in_full_sweep, self.skipped.max(limit)),
             };
-            let (mean, before) = (self.mean_w_m2(surfaces), limit);
-            limit = stop.limit_w_m2(mean);
-            let limits = (before, limit);
+            let mean = self.mean_w_m2(surfaces);
+            let limits = (limit, stop.limit_w_m2(mean));
+            limit = limits.1;
             if self.is_done((surfaces, links), stop, &mut work, (mean, limits), &mut arriving) {
-                break;
+                let change = all.then_some(mean - last_mean);
+                if further == FURTHER_MAX || !self.may_be_unbalanced(surfaces, stop, change) {
+                    break;
+                }
+                further += 1;
+                work.start_all(surfaces);
             }
             if self.sweeps >= SWEEPS_MAX {
                 self.give_up((mean - last_mean).abs() / mean);
@@ -205,6 +220,50 @@ impl Radiosity {
     /// Ends a solve that did not settle; the relative change of the last sweep adds to the residual.
     fn give_up(&mut self, change: f64) {
         self.residual = if change.is_finite() { self.residual + change } else { f64::INFINITY };
+    }
+
+    /// Whether more of the light than `UNBALANCED_MAX` is, or may be, unaccounted for: by how much a sweep over everything
+    /// changed the mean radiosity (W/m2), or, after one over a part, by what residuals may sum to.
+    fn may_be_unbalanced(
+        &self,
+        surfaces: &impl Surfaces,
+        stop: Stop,
+        change_w_m2: Option<f64>,
+    ) -> bool {
+        if !stop.is_by_residual() || !self.residual.is_finite() || self.is_bounded() {
+            return false;
+        }
+        let Fluxes { sent, passed } = self.fluxes(surfaces);
+        match change_w_m2 {
+            Some(change) => {
+                change.abs() * sent > UNBALANCED_MAX * passed * self.mean_w_m2(surfaces)
+            }
+            None => self.residual * sent > UNKNOWN_MAX * passed,
+        }
+    }
+
+    /// Fluxes of a solution over all surfaces and channels, with irradiances as they were gathered.
+    fn fluxes(&self, surfaces: &impl Surfaces) -> Fluxes {
+        let of_facet = |facet: &ElementId| {
+            let FacetMaterial { reflectance, exitance } = surfaces.material(facet.0);
+            // Lines over an element add nothing to the flux on it.
+            let mut arriving = [0.0; 3];
+            for_each_below(surfaces, facet.0, &mut |id| {
+                let (area, h) = (surfaces.area_m2(id), self.gathered.get(id).mean);
+                (0..3).for_each(|c| arriving[c] += area * f64::from(h[c]));
+            });
+            let (area, b) = (surfaces.area_m2(facet.0), self.radiosity.get(facet.0).mean);
+            let mut out = [0.0; 3];
+            for c in 0..3 {
+                let absorbed = (1.0 - f64::from(reflectance[c])) * arriving[c];
+                let fluxes = [f64::from(b[c]) * area, f64::from(exitance[c]) * area, absorbed];
+                (0..3).for_each(|k| out[k] += fluxes[k]);
+            }
+            out
+        };
+        let of_facets: Vec<[f64; 3]> = surfaces.facets().par_iter().map(of_facet).collect();
+        let sum = |k: usize| of_facets.iter().map(|fluxes| fluxes[k]).sum::<f64>();
+        Fluxes { sent: sum(0), passed: sum(1).max(sum(2)) }
     }
 
     /// Whether a sweep was the last one, by the mean radiosity after it and what counted as little before and counts so now;
@@ -235,9 +294,7 @@ impl Radiosity {
             }
             _ => {
                 let is_left = work.is_left(surfaces, links, limit, &mut self.pending);
-                if !work.all {
-                    *arriving = self.mark_over_groups(surfaces, work, limit);
-                }
+                *arriving = self.mark_over_groups(surfaces, work, limit);
                 !is_left && !work.waits()
             }
         }
@@ -294,14 +351,14 @@ impl Radiosity {
     }
 
     /// Lets those wait to be gathered to whom something else arrives over groups than they gathered, as soon as the
-    /// difference is as large as what may add up of other sources. What arrives.
+    /// difference is as large as what may add up of other sources. What arrives; nothing where everything is gathered anyway.
     fn mark_over_groups(
         &mut self,
         surfaces: &impl Surfaces,
         work: &mut Work,
         limit: f32,
     ) -> Option<Arriving> {
-        if surfaces.groups().is_none() && self.over_groups.is_empty() {
+        if work.all || (surfaces.groups().is_none() && self.over_groups.is_empty()) {
             return None;
         }
         let arriving = self.arriving(surfaces);

@@ -17,7 +17,7 @@ use crate::transport::{
 use crate::space::{Solved, place_of};
 
 use super::choice::at_share;
-use super::tuning::{GAP_FAR, GATHER_FAR};
+use super::tuning::{GAP_FAR, GATHER_FAR, GATHER_PART};
 
 /// A place and a direction at which irradiance is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +60,8 @@ pub(super) struct Look<'a> {
     /// Distance up to which no leaf is taken at its word, however small it is, metres: that of the other side of a gap, some
     /// times; 0 outside gaps.
     reach_m: f64,
+    /// Radius of a part over its distance, at most, outside gaps.
+    part_size: f64,
 }
 
 /// What a point gathers.
@@ -123,6 +125,7 @@ impl<'a> Look<'a> {
             slack_m,
             purpose,
             reach_m: 0.0,
+            part_size: if purpose == Purpose::Sensor { GATHER_PART } else { 1.0 },
         }
     }
 
@@ -333,7 +336,7 @@ impl<'a> Look<'a> {
         // In a gap a part reaches no nearer than it is large: what arrives changes within the gap's width.
         let way_m = match self.reach_m > 0.0 {
             true => nearest_m,
-            false => (middle - self.point).length(),
+            false => self.part_size * (middle - self.point).length(),
         };
         if splits > 0 && radius > way_m {
             for k in 0..part.len() {

@@ -137,7 +137,7 @@ a_few! {
     a_crate_that_slides_over_panels_in_the_floor_holds_no_light: "motion", 181..182;
     white_closets: "closet", 2..4;
     white_tables: "table", 0..2;
-    small_devices: "device", 1..5;
+    small_devices: "device", 0..5;
     lamps_let_into_a_ceiling: "downlight", 0..2;
 }
 

@@ -82,9 +82,9 @@ impl Estimate {
 /// The irradiance on a from b is B_b X V / A_a, with a gradient over a and one over b. It errs by
 /// (1) what the gradient does not catch of its variation over the receiver, of the kernel and of
 /// the visibility; (2) the variation of the source's reflected radiosity beyond its gradient, as
-/// far as the kernel weighs it unevenly, with jumps where something stands on it; (3) the sampling of V. All three are standard deviations
-/// and add in quadrature. Small receivers weigh by the root of their area: equal shares of the
-/// total squared error.
+/// far as the kernel weighs it unevenly, with jumps where something stands on it; (3) the sampling
+/// of V. All three are standard deviations and add in quadrature. Small receivers weigh by the root
+/// of their area: equal shares of the total squared error.
 pub(super) fn estimate(
     x: &Exchange,
     v: &Visibility,

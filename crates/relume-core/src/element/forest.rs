@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::exposed::{exposed_extent, exposed_m2};
 use super::groups::{Group, Groups};
 use super::ids::{ElementId, ElementKey, Kind, Renumbering};
-use super::split::{Chart, Extent, Place, Shape};
+use super::split::{Chart, Extent, Place, Seam, Shape};
 use crate::geometry::Aabb;
 use crate::scene::{BodyId, Covered, Enclosure, PatchId, Solid, Solids};
 
@@ -121,6 +121,8 @@ struct Fixed {
     subjects: Vec<u32>,
     /// Geometry of each facet; of no meaning for other nodes.
     charts: Vec<Chart>,
+    /// Lines of contact that elements are divided along, by facet; only of facets that have some.
+    seams: BTreeMap<u32, Vec<Seam>>,
     /// Numbers of the coarse elements, by id; empty if they have not been numbered.
     coarse: Vec<u32>,
     patch_roots: Vec<ElementId>,
@@ -237,6 +239,10 @@ impl Forest {
         let kinds = f.kinds.capacity() * size_of::<Kind>() + f.child_counts.capacity() * 2;
         let ids = ids + f.names.capacity();
         (f.charts.capacity() * size_of::<Chart>() + ids * 4 + kinds) as u64
+            + f.seams
+                .values()
+                .map(|seams| (seams.capacity() * size_of::<Seam>()) as u64)
+                .sum::<u64>()
             + f.groups.memory_bytes()
     }
 
@@ -558,14 +564,17 @@ impl Forest {
         self.kind(id) == Kind::Element && !self.is_distant(id)
     }
 
-    /// Whether the element may be split once more: paths have room for 15 levels. What is distant is as small as it is.
+    /// Whether the element may be split once more: paths have room for 15 levels, and places for 2^15 steps. What is distant is
+    /// as small as it is.
     #[inline]
     pub fn can_split(&self, id: ElementId) -> bool {
         let path = self.key(id).path;
         if self.is_distant(id) {
             return false;
         }
-        !self.children(id).is_empty() || path.leading_zeros() > 31 - 2 * LEVELS_MAX + 1
+        let has_room = path.leading_zeros() > 31 - 2 * LEVELS_MAX + 1;
+        let is_divisible = || self.nodes[id.0 as usize].place.is_divisible(self.chart(id).len);
+        !self.children(id).is_empty() || (has_room && is_divisible())
     }
 }
 

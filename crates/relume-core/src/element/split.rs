@@ -1,6 +1,7 @@
 //! How a quadrilateral or triangle is split into well-shaped children.
 
-use super::tuning::{ELONGATED, SLENDER};
+use super::tuning::{ELONGATED, SEAM_PART, SEAM_SHARE, SLENDER};
+use crate::geometry::Segment;
 use glam::{DVec2, DVec3};
 
 /// Corners of an element in its patch's frame, metres, and whether there are three or four; a
@@ -113,9 +114,9 @@ pub struct Extent {
 pub(super) enum Cut {
     /// In four.
     Quarters,
-    /// A quadrilateral in two, halving its first parameter.
+    /// A quadrilateral in two, dividing its first parameter.
     AcrossS,
-    /// A quadrilateral in two, halving its second parameter.
+    /// A quadrilateral in two, dividing its second parameter.
     AcrossT,
     /// A triangle in two, from the middle of this edge.
     Edge(usize),
@@ -150,14 +151,45 @@ impl Place {
         }
     }
 
-    /// Places of the children, in canonical order.
-    pub(super) fn children(&self, corner_count: usize, cut: Cut) -> ([Place; 4], usize) {
-        if corner_count == 3 { self.triangle_children(cut) } else { self.quad_children(cut) }
+    /// Whether an element here is wide enough to be divided either way.
+    pub(super) fn is_divisible(&self, corner_count: usize) -> bool {
+        let [s0, t0, s1, t1, ..] = self.0;
+        corner_count == 3 || (s1 - s0 >= 2 && t1 - t0 >= 2)
     }
 
-    fn quad_children(&self, cut: Cut) -> ([Place; 4], usize) {
+    /// Places of the children, in canonical order. A quadrilateral is divided along lines of contact where they suit, else in
+    /// the middle.
+    pub(super) fn children(
+        &self,
+        corner_count: usize,
+        cut: Cut,
+        seams: &[Seam],
+    ) -> ([Place; 4], usize) {
+        if corner_count == 3 { self.triangle_children(cut) } else { self.quad_children(cut, seams) }
+    }
+
+    /// Where one parameter (0, 1) of a quadrilateral is divided: along the seam that runs over most of it, near its middle.
+    fn divide(&self, axis: usize, seams: &[Seam]) -> u16 {
+        let [lo, hi] = [self.0[axis], self.0[axis + 2]];
+        let [from, to] = [self.0[1 - axis], self.0[3 - axis]];
+        let (width, across) = (f64::from(hi - lo), f64::from(to - from));
+        let suits = |seam: &&Seam| {
+            let part = seam.at.saturating_sub(lo).min(hi.saturating_sub(seam.at));
+            seam.axis == axis
+                && f64::from(part) >= SEAM_PART * width
+                && f64::from(seam.overlap(from, to)) >= SEAM_SHARE * across
+        };
+        let score = |seam: &Seam| {
+            u64::from(seam.overlap(from, to)) * u64::from((seam.at - lo).min(hi - seam.at))
+        };
+        // The first of several that are as good.
+        let best = seams.iter().filter(suits).rev().max_by_key(|seam| score(seam));
+        best.map_or(middle(lo, hi), |seam| seam.at)
+    }
+
+    fn quad_children(&self, cut: Cut, seams: &[Seam]) -> ([Place; 4], usize) {
         let [s0, t0, s1, t1, ..] = self.0;
-        let (s, t) = (middle(s0, s1), middle(t0, t1));
+        let (s, t) = (self.divide(0, seams), self.divide(1, seams));
         let place = |s0, t0, s1, t1| Place([s0, t0, s1, t1, 0, 0]);
         match cut {
             Cut::AcrossS => {
@@ -198,9 +230,28 @@ impl Place {
     }
 }
 
-/// Exact: after n of at most 15 cuts all parameters are multiples of 2^(15 - n) steps.
+/// Exact where nothing was divided along a seam: after n of at most 15 cuts all parameters are multiples of 2^(15 - n) steps.
 fn middle(x: u16, y: u16) -> u16 {
     ((u32::from(x) + u32::from(y)) / 2) as u16
+}
+
+/// A line of contact along which one parameter of a facet is constant, in steps of 2^-15.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Seam {
+    /// Which parameter: 0 or 1.
+    axis: usize,
+    /// Its value.
+    at: u16,
+    /// Where the line begins and ends, in the other parameter.
+    from: u16,
+    to: u16,
+}
+
+impl Seam {
+    /// How much of a range of the other parameter it runs over, steps.
+    fn overlap(&self, from: u16, to: u16) -> u16 {
+        self.to.min(to).saturating_sub(self.from.max(from))
+    }
 }
 
 /// The map from a facet's parameters to its patch's frame: `origin + e s + f t + g s t`.
@@ -225,6 +276,34 @@ impl Chart {
         // What is left of the twist of a parallelogram is rounding.
         let even = g.length_squared() <= 1e-24 * (e.length_squared() + f.length_squared());
         Chart { origin: a, e, f, g: if even { DVec2::ZERO } else { g }, len: facet.len }
+    }
+
+    /// Lines of contact along which elements of the facet can be divided: within it, parallel to its sides. None in triangles, and
+    /// in quadrilaterals that are no parallelograms.
+    pub(super) fn seams(&self, lines: &[Segment]) -> Vec<Seam> {
+        let det = self.e.perp_dot(self.f);
+        if self.len == 3 || self.g != DVec2::ZERO || det == 0.0 {
+            return Vec::new();
+        }
+        let one = f64::from(ONE);
+        let steps = |p: DVec2| {
+            let d = p - self.origin;
+            [d.perp_dot(self.f) / det * one, self.e.perp_dot(d) / det * one]
+        };
+        let inner = |x: f64| x.round().clamp(0.0, one) as u16;
+        let of_axis = |[p, q]: [[f64; 2]; 2], axis: usize| {
+            let at = inner(0.5 * (p[axis] + q[axis]));
+            let [from, to] = [p, q].map(|end| end[1 - axis]);
+            let is_parallel = (p[axis] - q[axis]).abs() <= 1.0;
+            let seam = Seam { axis, at, from: inner(from.min(to)), to: inner(from.max(to)) };
+            (is_parallel && (1..ONE).contains(&at) && seam.from < seam.to).then_some(seam)
+        };
+        let ends = lines.iter().map(|line| line.map(steps));
+        let mut seams: Vec<Seam> =
+            ends.flat_map(|ends| [0, 1].map(|axis| of_axis(ends, axis))).flatten().collect();
+        seams.sort_unstable();
+        seams.dedup();
+        seams
     }
 
     /// Extent of the element at a place; quick for parallelograms.
@@ -281,7 +360,7 @@ mod tests {
 
     fn children(shape: &Shape) -> Vec<Shape> {
         let chart = Chart::of(shape);
-        let (places, count) = Place::whole(shape.len).children(shape.len, shape.cut());
+        let (places, count) = Place::whole(shape.len).children(shape.len, shape.cut(), &[]);
         places[..count].iter().map(|p| chart.shape(p)).collect()
     }
 
@@ -323,7 +402,7 @@ mod tests {
         let v = DVec2::new;
         let shape = Shape::new(&[v(0.2, 0.1), v(1.2, 0.3), v(1.5, 1.3), v(0.5, 1.1)]);
         let chart = Chart::of(&shape);
-        let (places, _) = Place::whole(4).children(4, Cut::Quarters);
+        let (places, _) = Place::whole(4).children(4, Cut::Quarters, &[]);
         for place in places {
             let (one, two) = (chart.extent(&place), chart.shape(&place).extent());
             assert!((one.centroid - two.centroid).length() < 1e-15);
@@ -331,6 +410,34 @@ mod tests {
             let moments = one.second_moment.iter().zip(two.second_moment);
             assert!(moments.into_iter().all(|(m, n)| (m - n).abs() < 1e-15), "{one:?} {two:?}");
         }
+    }
+
+    #[test]
+    fn elements_are_divided_along_lines_of_contact_that_suit() {
+        let v = DVec2::new;
+        let shape = Shape::new(&[v(0., 0.), v(4., 0.), v(5., 2.), v(1., 2.)]);
+        let chart = Chart::of(&shape);
+        // A quarter of the way along the first side, over half of the second; one that is aslant; one of the facet's own sides.
+        let [e, f] = [v(4., 0.), v(1., 2.)];
+        let at = |s: f64, t: f64| e * s + f * t;
+        let lines = [
+            [at(0.25, 0.3), at(0.25, 0.8)],
+            [at(0.6, 0.1), at(0.7, 0.9)],
+            [at(0.0, 0.0), at(0.0, 1.0)],
+        ];
+        let seams = chart.seams(&lines);
+        assert_eq!(seams.len(), 1, "{seams:?}");
+        let (places, count) = Place::WHOLE.children(4, Cut::Quarters, &seams);
+        assert_eq!(count, 4);
+        let parts: Vec<Shape> = places.iter().map(|place| chart.shape(place)).collect();
+        assert!((parts[0].corners[1] - at(0.25, 0.0)).length() < 1e-4, "{:?}", parts[0]);
+        assert!((parts[0].corners[2] - at(0.25, 0.5)).length() < 1e-4, "{:?}", parts[0]);
+        let sum: f64 = parts.iter().map(Shape::area).sum();
+        assert!((sum - shape.area()).abs() < 1e-12);
+        // The line is too near a side of this part, and beyond that.
+        let (below, _) = places[0].children(4, Cut::Quarters, &seams);
+        assert!((chart.shape(&below[0]).corners[1] - at(0.125, 0.0)).length() < 1e-4);
+        assert!(!Place([0, 0, 1, 9, 0, 0]).is_divisible(4) && places[0].is_divisible(4));
     }
 
     #[test]

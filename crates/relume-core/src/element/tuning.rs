@@ -51,6 +51,22 @@ pub(super) const SMALL_CUT_PART: f64 = 1.0 / 64.0;
 /// - Smaller: light leaks through the other walls
 pub(super) const SMALL_CUT_TIMES: u32 = 2;
 
+/// Distance of a line of contact from the sides of an element, over its width, from which the element is divided along it.
+///
+/// - Unit: 1
+/// - Tried: 0.2
+/// - Larger: elements lie on both sides of lines that are near their own
+/// - Smaller: slender elements
+pub(super) const SEAM_PART: f64 = 0.2;
+
+/// Share of an element's width that a line of contact must run over for the element to be divided along it.
+///
+/// - Unit: 1
+/// - Tried: 1/16
+/// - Larger: elements lie on both sides of what stands on them until they are small
+/// - Smaller: large elements of uneven shape for the sake of small bodies
+pub(super) const SEAM_SHARE: f64 = 1.0 / 16.0;
+
 /// Ratio of the sides from which an element is halved across its long side, not quartered.
 ///
 /// - Unit: 1

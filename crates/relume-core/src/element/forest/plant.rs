@@ -289,7 +289,7 @@ impl Forest {
         let cut = cut + u32::from(along_lines.is_some());
         let parts = along_lines.or_else(|| (corners.len() > 4).then(|| split_convex(corners)));
         let Some((one, two)) = parts else {
-            return self.plant_facet(cuts.patch, corners, at);
+            return self.plant_facet(cuts, corners, at);
         };
         self.set(at, Kind::Polygon, cuts.patch);
         let child = self.add_children(at, 2);
@@ -297,11 +297,16 @@ impl Forest {
         self.plant_polygon(cuts, cut, &two, child + 1);
     }
 
-    fn plant_facet(&mut self, patch: u32, corners: &[DVec2], at: u32) {
-        self.set(at, Kind::Element, patch);
+    fn plant_facet(&mut self, cuts: &PatchCuts<'_>, corners: &[DVec2], at: u32) {
+        self.set(at, Kind::Element, cuts.patch);
         let shape = Shape::new(corners);
+        let chart = Chart::of(&shape);
+        let seams = chart.seams(cuts.lines);
         let fixed = self.fixed_mut();
-        fixed.charts[at as usize] = Chart::of(&shape);
+        fixed.charts[at as usize] = chart;
+        if !seams.is_empty() {
+            fixed.seams.insert(at, seams);
+        }
         fixed.facets.push(ElementId(at));
         self.nodes[at as usize].place = Place::whole(shape.len);
         let siblings = &mut self.siblings[at as usize];

@@ -34,7 +34,8 @@ impl Forest {
         let (key, place, chart) = (self.key(id), self.nodes[id.0 as usize].place, *self.chart(id));
         let facet = self.siblings(id).facet;
         let coarse = self.coarse(id).map_or(NONE, |number| number as u32);
-        let (places, count) = place.children(chart.len, chart.shape(&place).cut());
+        let seams = self.fixed.seams.get(&facet).map_or(&[][..], |seams| seams);
+        let (places, count) = place.children(chart.len, chart.shape(&place).cut(), seams);
         let first = self.room_for(count);
         for (k, place) in places[..count].iter().enumerate() {
             let shape = chart.shape(place);

@@ -65,6 +65,7 @@ impl Forest {
             && subject(self, own) == subject(other, id)
             && self.kind(own) == other.kind(id)
             && glows(self, own) == glows(other, id)
+            && self.fixed.seams.get(&own.0) == other.fixed.seams.get(&id.0)
     }
 
     /// Whether a node is of what the scene was made with, not of a body that was inserted.

@@ -16,7 +16,7 @@ pub(crate) fn balance_of(
     let mut energy = Energy::default();
     let mut area = 0.0;
     let mut sums = Vec::new();
-    let linear = !radiosity.is_bounded();
+    let linear = radiosity.is_linear();
     for facet in facets {
         let material = surfaces.material(facet.0);
         sums.clear();
@@ -24,7 +24,7 @@ pub(crate) fn balance_of(
         let mut next = sums.iter();
         radiosity.irradiances(surfaces, facet.0, &mut |id, h| {
             let a = surfaces.area_m2(id);
-            let row = next.next().expect("the same leaves");
+            let row = &radiosity.row(id, next.next().expect("the same leaves"));
             let off = f64::from(row.mean) - 1.0;
             rows.rms += a * off * off;
             if !surfaces.is_covered(id) {

@@ -37,9 +37,9 @@ impl Linear {
         Linear { mean: self.at(dx, dy), ..*self }
     }
 
-    /// Divided by a number.
-    pub(super) fn divided(&self, by: f32) -> Linear {
-        let each = |numbers: [f32; 3]| numbers.map(|x| x / by);
+    /// Times a number.
+    pub(super) fn times(&self, by: f32) -> Linear {
+        let each = |numbers: [f32; 3]| numbers.map(|x| x * by);
         Linear { mean: each(self.mean), gradient: self.gradient.map(each) }
     }
 

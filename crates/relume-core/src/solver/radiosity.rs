@@ -10,8 +10,10 @@ use super::push::{RowSum, push};
 use super::surfaces::{Surfaces, for_each_below};
 use super::trend::Trend;
 
+mod shares;
 mod solve;
 
+use shares::Shares;
 pub use solve::Stop;
 
 /// What came over links of groups to whom something did: few elements do, since groups are linked with large ones.
@@ -66,9 +68,8 @@ pub struct Radiosity {
     trend: Trend,
     /// Elements are taken to be constant, as the solution would grow without end if lines were handed down.
     constant: bool,
-    /// For each leaf what its irradiance is divided by: its row sum where that is above 1. Empty unless the solution
-    /// would grow even so.
-    limits: Vec<f32>,
+    /// Shares of leaves; empty unless the solution would grow.
+    shares: Shares,
     /// Sweeps made by the last solve.
     pub sweeps: u32,
     /// Receivers gathered by the last solve, each time counted.
@@ -114,7 +115,8 @@ impl Radiosity {
         self.gathered.renumber(to);
         self.over_groups.renumber(to);
         self.trend.renumber(to);
-        let numbers = [&mut self.pending, &mut self.deferred, &mut self.limits];
+        self.shares.renumber(to);
+        let numbers = [&mut self.pending, &mut self.deferred];
         let kept = numbers.into_iter().filter(|v| !v.is_empty());
         for values in kept {
             *values = to.old_of().iter().map(|&old| values[old as usize]).collect();
@@ -211,8 +213,8 @@ impl Radiosity {
     ) {
         let own = |id: u32| self.gathered.get(id);
         push(surfaces, (facet, &surfaces.place(facet)), &Linear::default(), &own, &mut |id, h| {
-            match self.limits.get(id as usize) {
-                Some(&limit) => visit(id, &h.divided(limit)),
+            match self.shares.of.get(id as usize) {
+                Some(&share) => visit(id, &h.times(share)),
                 None => visit(id, h),
             }
         });
@@ -220,9 +222,10 @@ impl Radiosity {
 
     /// Bytes held, without [`Radiosity::group_bytes`].
     pub fn memory_bytes(&self) -> u64 {
-        let single = self.pending.capacity() + self.deferred.capacity() + self.limits.capacity();
-        let single = (single * size_of::<f32>()) as u64;
-        self.radiosity.bytes() + self.gathered.bytes() + single + self.trend.bytes()
+        let single =
+            ((self.pending.capacity() + self.deferred.capacity()) * size_of::<f32>()) as u64;
+        let fields = self.radiosity.bytes() + self.gathered.bytes();
+        fields + single + self.shares.bytes() + self.trend.bytes()
     }
 
     /// Bytes held for what came over links of groups.

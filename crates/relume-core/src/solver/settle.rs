@@ -41,8 +41,8 @@ pub(super) struct Below<'a, S> {
     pub(super) gathered: &'a Field,
     /// Deferred error: bound of the error of radiosities at and below each element by irradiance not pushed down yet, W/m2.
     pub(super) deferred: &'a [f32],
-    /// Divisor of the irradiance of each leaf; empty where there is none.
-    pub(super) limits: &'a [f32],
+    /// Share of each leaf in what it receives and sends; empty where all are 1.
+    pub(super) shares: &'a [f32],
     pub(super) surfaces: &'a S,
     pub(super) material: &'a FacetMaterial,
     pub(super) limit: f32,
@@ -65,8 +65,8 @@ impl<S: Surfaces> Below<'_, S> {
         let children = self.surfaces.children(id);
         let mut deferred = 0.0_f32;
         let b = if children.is_empty() {
-            match self.limits.get(id as usize) {
-                Some(&limit) => self.reflect(&h.divided(limit), place),
+            match self.shares.get(id as usize) {
+                Some(&share) => self.reflect(&h.times(share), place).times(share),
                 None => self.reflect(&h, place),
             }
         } else {
@@ -156,14 +156,20 @@ impl<S: Surfaces> Below<'_, S> {
 
 /// Mean and first moments over an element from those over its children: exact.
 #[derive(Default)]
-struct Fit {
+pub(super) struct Fit {
     area: f64,
     mean: [f64; 3],
     first: [[f64; 3]; 2],
 }
 
 impl Fit {
-    fn add(&mut self, area: f64, (own, place): (&Place, &Place), moment: f32, b: &Linear) {
+    pub(super) fn add(
+        &mut self,
+        area: f64,
+        (own, place): (&Place, &Place),
+        moment: f32,
+        b: &Linear,
+    ) {
         let dx = f64::from(place.centroid[0] - own.centroid[0]);
         let dy = f64::from(place.centroid[1] - own.centroid[1]);
         let scale = f64::from(place.radius * moment);
@@ -176,7 +182,7 @@ impl Fit {
         }
     }
 
-    fn linear(&self, own: &Place, moment: f32) -> Linear {
+    pub(super) fn linear(&self, own: &Place, moment: f32) -> Linear {
         let per_area = 1.0 / self.area;
         let scale = per_area / f64::from(own.radius * moment);
         let mut out = Linear::default();

@@ -116,7 +116,7 @@ pub(crate) fn row_sums_of(solved: &Solved) -> Vec<(ElementId, f64)> {
     let is_surface = |id: u32| forest.receives(ElementId(id));
     let mut out = Vec::with_capacity(forest.counts().leaves as usize);
     for facet in forest.near_facets() {
-        let links = (&solved.links, !solved.radiosity.is_bounded());
+        let links = (&solved.links, solved.radiosity.is_linear());
         row_sums(&surfaces, links, &is_surface, facet.0, &mut |id, sum| {
             out.push((ElementId(id), f64::from(sum.mean)));
         });

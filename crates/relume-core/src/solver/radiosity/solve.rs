@@ -3,6 +3,7 @@
 use fearless_simd::dispatch;
 use rayon::prelude::*;
 
+use super::shares::{CLOSE, Shares};
 use super::{OverGroups, Radiosity};
 use crate::element::ElementId;
 use crate::solver::dirty_path::{Batch, DirtyPath};
@@ -11,11 +12,12 @@ use crate::solver::gather::gather_some;
 use crate::solver::groups::Arriving;
 use crate::solver::jump::Jump;
 use crate::solver::links::Links;
-use crate::solver::push::row_sums;
 use crate::solver::settle::{Below, IrradianceChange, Settled};
 use crate::solver::surfaces::{FacetMaterial, Surfaces, for_each_below};
 use crate::solver::trend::Trend;
-use crate::solver::tuning::{PENDING_SHARE, SKIPPED_MAX, UNBALANCED_MAX, UNKNOWN_MAX};
+use crate::solver::tuning::{
+    GAIN_MAX, PENDING_SHARE, SKIPPED_MAX, UNBALANCED_MAX, UNKNOWN_MAX, WHITE,
+};
 use crate::solver::work::{Dirty, Work};
 use crate::transport;
 
@@ -70,13 +72,12 @@ const SWEEPS_MAX: u32 = 2_000;
 const FURTHER_MAX: u32 = 32;
 
 /// Receivers gathered by one task.
-const CHUNK: usize = 256;
+pub(super) const CHUNK: usize = 256;
 
 impl Radiosity {
-    /// [`solve`](Radiosity::solve) to a residual, relative to the mean radiosity, whatever the links: where light would
-    /// grow without end, or not settle, because rows of leaves sum to more than 1, it is found anew from nothing with
-    /// constant elements, whose rows lines do not raise; and if that grows too, with these rows bounded by 1.
-    /// `most_mean_w_m2` is what the mean radiosity cannot reach.
+    /// [`solve`](Radiosity::solve) to a residual, relative to the mean radiosity, whatever the links: where rows of leaves that sum to
+    /// more than 1 would make light of nothing, with shares of leaves ([`Shares`]), with which none do; and if lines grow even so,
+    /// with constant elements and shares that lose light. `most_mean_w_m2` is what the mean radiosity cannot reach.
     pub fn solve_bounded(
         &mut self,
         surfaces: &impl Surfaces,
@@ -85,42 +86,49 @@ impl Radiosity {
         (residual, most_mean_w_m2): (f64, f64),
     ) {
         let stop = Stop::Bounded { residual, mean_w_m2: most_mean_w_m2 };
-        if !self.is_bounded() {
-            self.solve(surfaces, links, dirty, stop);
-        } else {
-            // As a cold build would: it may do without this time.
-            (self.constant, self.limits) = (false, Vec::new());
+        if !self.has_settled() {
             self.start_anew(surfaces);
-            self.solve(surfaces, links, Dirty::All, stop);
         }
-        if self.has_settled() {
-            return;
+        let was = (std::mem::take(&mut self.shares), std::mem::take(&mut self.constant));
+        let rows = is_white(surfaces).then(|| Shares::none(surfaces, links, true));
+        match rows.filter(|rows| rows.gain(surfaces) > GAIN_MAX) {
+            Some(rows) => {
+                self.shares = rows.found(surfaces, links, &was.0);
+                self.solve_shared(surfaces, links, stop);
+            }
+            None if was.0.is_none() => self.solve(surfaces, links, dirty, stop),
+            None => {
+                self.forget(surfaces);
+                self.solve(surfaces, links, Dirty::All, stop);
+            }
         }
-        self.constant = true;
-        self.start_anew(surfaces);
+        for constant in [false, true] {
+            if self.has_settled() {
+                return;
+            }
+            self.constant = constant;
+            let rows = Shares::none(surfaces, links, !constant);
+            self.shares = match constant {
+                false => rows.found(surfaces, links, &Shares::default()),
+                true => rows.strict(surfaces, links),
+            };
+            self.start_anew(surfaces);
+            self.solve_shared(surfaces, links, stop);
+        }
+    }
+
+    /// Solves with shares, from what surfaces send as it was found last.
+    fn solve_shared(&mut self, surfaces: &impl Surfaces, links: &Links, stop: Stop) {
+        self.scale_by_shares(surfaces, |b, share| b.times(share));
+        self.forget(surfaces);
         self.solve(surfaces, links, Dirty::All, stop);
-        if self.has_settled() {
-            return;
-        }
-        self.limits = vec![1.0; surfaces.len()];
-        let is_surface = |id: u32| surfaces.is_surface(id);
-        for facet in surfaces.facets() {
-            row_sums(surfaces, (links, false), &is_surface, facet.0, &mut |leaf, sum| {
-                self.limits[leaf as usize] = sum.mean.max(1.0);
-            });
-        }
-        self.start_anew(surfaces);
-        self.solve(surfaces, links, Dirty::All, stop);
+        self.scale_by_shares(surfaces, |b, share| b.times(1.0 / share));
+        self.forget(surfaces);
     }
 
     /// Whether the last solve came to its end.
     pub fn has_settled(&self) -> bool {
         self.residual.is_finite() && self.sweeps < SWEEPS_MAX
-    }
-
-    /// Whether elements were taken to be constant, or rows of leaves bounded, so that the solution does not grow.
-    pub fn is_bounded(&self) -> bool {
-        self.constant
     }
 
     /// Exitances alone; punctual lights stay as they are.
@@ -132,13 +140,19 @@ impl Radiosity {
                 self.gathered.set(id, &Linear::default());
             });
         }
-        self.pending.fill(0.0);
         self.over_groups = OverGroups::default();
+        self.forget(surfaces);
+        self.sweeps = 0;
+    }
+
+    /// Forgets what was left out and how the solution changed: the next solve gathers everything.
+    fn forget(&mut self, surfaces: &impl Surfaces) {
+        self.pending.fill(0.0);
         // A solve that changed most of the scene has given it back.
         self.deferred.clear();
-        self.deferred.resize(self.pending.len(), 0.0);
+        self.deferred.resize(self.pending.len().max(surfaces.len()), 0.0);
         self.trend = Trend::default();
-        (self.skipped, self.skipped_in_full_sweep, self.sweeps) = (0.0, 0.0, 0);
+        (self.skipped, self.skipped_in_full_sweep) = (0.0, 0.0);
     }
 
     /// Gathers, pushes and pulls until the solution is settled, beginning with what is dirty.
@@ -230,7 +244,7 @@ impl Radiosity {
         stop: Stop,
         change_w_m2: Option<f64>,
     ) -> bool {
-        if !stop.is_by_residual() || !self.residual.is_finite() || self.is_bounded() {
+        if !stop.is_by_residual() || !self.residual.is_finite() {
             return false;
         }
         let Fluxes { sent, passed } = self.fluxes(surfaces);
@@ -454,7 +468,7 @@ impl Radiosity {
                 radiosity: &self.radiosity,
                 gathered: &self.gathered,
                 deferred: &self.deferred,
-                limits: &self.limits,
+                shares: &self.shares.of,
                 surfaces,
                 material,
                 limit,
@@ -468,6 +482,15 @@ impl Radiosity {
             facets.par_iter().zip(settled).for_each(facet);
         }
     }
+}
+
+/// Whether some surface reflects so much that rows above 1 may make light of nothing, and none so much that no rows are known as
+/// well as that.
+fn is_white(surfaces: &impl Surfaces) -> bool {
+    let most =
+        |facet: &ElementId| surfaces.material(facet.0).reflectance.into_iter().fold(0.0, f32::max);
+    let most = surfaces.facets().iter().map(most).fold(0.0, f32::max);
+    (WHITE..1.0 - CLOSE).contains(&most)
 }
 
 /// Adds `change` to the deferred error of an element and of those above it.
@@ -576,6 +599,32 @@ mod tests {
             for (value, want) in b.radiosity(id).iter().zip([2.0, 10.0, 3.0]) {
                 assert!((value - want).abs() < 1e-4, "{id} {value} {want}");
             }
+        }
+    }
+
+    /// A leaf that gets, and sends, a quarter more than all, which its sibling lacks: with nearly white surfaces light would grow.
+    #[test]
+    fn rows_above_one_are_taken_back_and_facets_keep_their_sums() {
+        let (mut plates, mut links) = plates();
+        plates.lit = [FacetMaterial { reflectance: [0.99; 3], exitance: [1.0; 3] }; 2];
+        for (receiver, source, coupling) in [(2, 0, 1.25), (3, 0, 0.75)] {
+            set(&mut links, receiver, source, coupling);
+        }
+        let list = [(2, 0.625), (3, 0.375)];
+        links.set(
+            0,
+            list.map(|(source, coupling)| Link { source, coupling, ..Link::default() }).into_iter(),
+        );
+        let rows = Shares::none(&plates, &links, true);
+        let shares = rows.found(&plates, &links, &Shares::default());
+        for leaf in [0, 2, 3] {
+            assert!((shares.rows[leaf].mean - 1.0).abs() < 1e-3, "{:?}", shares.rows);
+        }
+        let mut b = Radiosity::new(&plates);
+        b.solve_bounded(&plates, &links, Dirty::All, (1e-7, 2e2));
+        assert!(b.is_bounded() && b.has_settled());
+        for id in 0..4 {
+            assert!((b.radiosity(id)[0] - 100.0).abs() < 0.5, "{id}: {:?}", b.radiosity(id));
         }
     }
 

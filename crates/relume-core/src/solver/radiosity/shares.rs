@@ -1,0 +1,248 @@
+//! Shares of leaves: how much of the light that links hand down to a leaf is its own, so that no row sums to more than 1.
+//!
+//! A link of an element counts for all of it; a leaf in a narrow gap gets its part of that too, though it lies in the dark, and its row sums
+//! to more than 1. Among white surfaces light grows there. With shares d the links between leaves i and j count d_i d_j times, in both
+//! directions, and d is such that rows have the sums that they should: at most 1, and over each facet as much as before, since sums over
+//! facets are good. That is the symmetric scaling of a matrix to given row sums (Sinkhorn and Knopp 1967).
+
+use fearless_simd::dispatch;
+use rayon::prelude::*;
+
+use super::Radiosity;
+use super::solve::CHUNK;
+use crate::element::{ElementId, Renumbering};
+use crate::solver::field::{Field, Linear};
+use crate::solver::gather::gather_some;
+use crate::solver::links::Links;
+use crate::solver::place::Place;
+use crate::solver::push::{RowSum, push};
+use crate::solver::settle::Fit;
+use crate::solver::surfaces::{Surfaces, for_each_below};
+use crate::solver::tuning::{SHARE_LEAST, SHARE_ROUNDS};
+use crate::transport;
+
+/// Shares of leaves, and the sums of their rows with them; by id, of no meaning for what is no leaf.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Shares {
+    /// Factor of what a leaf receives and of what it sends, 1.
+    pub(super) of: Vec<f32>,
+    /// Sums of rows, 1 and 1/m.
+    pub(super) rows: Vec<RowSum>,
+    linear: bool,
+}
+
+/// Rows that are less off than this are as they should be, 1.
+pub(super) const CLOSE: f32 = 1e-3;
+
+/// What rows may be above 1 by rounding, and as their exchange is found: 1.
+const ROUNDED: f64 = 1e-3;
+
+impl Shares {
+    /// Shares of 1, with the sums of rows as lines or as means alone unless `linear`.
+    pub(super) fn none(surfaces: &impl Surfaces, links: &Links, linear: bool) -> Shares {
+        let len = surfaces.len();
+        let (of, rows) = (vec![1.0; len], vec![RowSum::default(); len]);
+        let mut shares = Shares { of, rows, linear };
+        shares.sum_rows(surfaces, links);
+        shares
+    }
+
+    /// Whether there are none.
+    pub(super) fn is_none(&self) -> bool {
+        self.of.is_empty()
+    }
+
+    /// Flux that leaves with rows above 1 would make of nothing, over what all surfaces absorb, in light that is even: 1.
+    /// Of links and materials alone, so that it is the same however links came about.
+    pub(super) fn gain(&self, surfaces: &impl Surfaces) -> f64 {
+        let (mut made, mut absorbed) = (0.0, 0.0);
+        for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
+            let [r, g, b] = surfaces.material(facet.0).reflectance.map(f64::from);
+            let most = r.max(g).max(b);
+            absorbed += surfaces.area_m2(facet.0) * (1.0 - most);
+            for_each_leaf(surfaces, facet.0, &mut |leaf| {
+                let row = f64::from(self.rows[leaf as usize].mean);
+                made += surfaces.area_m2(leaf) * (most * row - 1.0 - ROUNDED).max(0.0);
+            });
+        }
+        made / absorbed
+    }
+
+    /// Shares with which these rows have the sums that they should, beginning with those of another time, if there are any.
+    pub(super) fn found(
+        mut self,
+        surfaces: &impl Surfaces,
+        links: &Links,
+        from: &Shares,
+    ) -> Shares {
+        let wanted = self.wanted(surfaces);
+        if !from.is_none() {
+            let last = |id: usize| from.of.get(id).copied().unwrap_or(1.0);
+            self.of = (0..self.of.len()).map(last).collect();
+            self.sum_rows(surfaces, links);
+        }
+        for _ in 0..SHARE_ROUNDS {
+            let mut off = 0.0_f32;
+            for ((share, row), &wanted) in self.of.iter_mut().zip(&self.rows).zip(&wanted) {
+                if row.mean > 0.0 && wanted > 0.0 {
+                    off = off.max((row.mean - wanted).abs());
+                    let better = *share * (wanted / row.mean).sqrt();
+                    *share = better.clamp(SHARE_LEAST, 1.0 / SHARE_LEAST);
+                }
+            }
+            if off < CLOSE {
+                break;
+            }
+            self.sum_rows(surfaces, links);
+        }
+        self
+    }
+
+    /// Shares with which none of these rows sums to more than 1, whatever is lost.
+    pub(super) fn strict(mut self, surfaces: &impl Surfaces, links: &Links) -> Shares {
+        for (share, row) in self.of.iter_mut().zip(&self.rows) {
+            *share = 1.0 / row.mean.max(1.0);
+        }
+        self.sum_rows(surfaces, links);
+        self
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> u64 {
+        (self.of.capacity() * size_of::<f32>() + self.rows.capacity() * size_of::<RowSum>()) as u64
+    }
+
+    /// Follows elements to their new ids.
+    pub(super) fn renumber(&mut self, to: &Renumbering) {
+        if !self.of.is_empty() {
+            self.of = to.old_of().iter().map(|&old| self.of[old as usize]).collect();
+            self.rows = to.old_of().iter().map(|&old| self.rows[old as usize]).collect();
+        }
+    }
+
+    /// Sums that the rows of leaves should have: at most 1, and over each facet together as much as they have.
+    fn wanted(&self, surfaces: &impl Surfaces) -> Vec<f32> {
+        let mut wanted = vec![0.0; surfaces.len()];
+        for facet in surfaces.facets() {
+            let (mut above, mut below) = (0.0, 0.0);
+            for_each_leaf(surfaces, facet.0, &mut |leaf| {
+                let off = surfaces.area_m2(leaf) * (f64::from(self.rows[leaf as usize].mean) - 1.0);
+                *(if off > 0.0 { &mut above } else { &mut below }) += off.abs();
+            });
+            let left = if below > above { (1.0 - above / below) as f32 } else { 0.0 };
+            for_each_leaf(surfaces, facet.0, &mut |leaf| {
+                let short = (1.0 - self.rows[leaf as usize].mean).max(0.0);
+                wanted[leaf as usize] = 1.0 - left * short;
+            });
+        }
+        wanted
+    }
+
+    /// Finds the sums of rows with these shares.
+    fn sum_rows(&mut self, surfaces: &impl Surfaces, links: &Links) {
+        let mut sent = Field::default();
+        sent.extend(surfaces.len());
+        for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
+            self.pull(surfaces, facet.0, &mut sent);
+        }
+        let mut gathered = vec![Linear::default(); surfaces.len()];
+        let level = transport::Simd::detect().level();
+        gathered.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
+            let first = (chunk * CHUNK) as u32;
+            let ids: Vec<u32> = (first..first + out.len() as u32).collect();
+            let gather = (ids.as_slice(), self.linear);
+            dispatch!(level, simd => gather_some(simd, (&sent, links), surfaces, gather, out));
+        });
+        if let Some(groups) = surfaces.groups() {
+            let arriving = groups.arriving(&|id| sent.get(id), surfaces.source_moment());
+            for (id, h) in (0..).zip(&mut gathered) {
+                *h = h.plus(&groups.at(&arriving, id));
+            }
+        }
+        let own = |id: u32| gathered[id as usize];
+        for facet in surfaces.facets() {
+            let at = surfaces.place(facet.0);
+            push(surfaces, (facet.0, &at), &Linear::default(), &own, &mut |leaf, h| {
+                let share = self.of[leaf as usize];
+                let gradient = h.gradient.map(|g| share * g[0]);
+                self.rows[leaf as usize] = RowSum { mean: share * h.mean[0], gradient };
+            });
+        }
+    }
+
+    /// Sets shares as what surfaces send, with first moments.
+    fn pull(&self, surfaces: &impl Surfaces, id: u32, sent: &mut Field) -> (Linear, Place) {
+        let (place, moment) = (surfaces.place(id), surfaces.source_moment());
+        let children = surfaces.children(id);
+        let own = if children.is_empty() {
+            Linear { mean: [self.of[id as usize]; 3], ..Linear::default() }
+        } else {
+            let mut fit = Fit::default();
+            for child in children {
+                let (own, at) = self.pull(surfaces, child, sent);
+                fit.add(surfaces.area_m2(child), (&place, &at), moment, &own);
+            }
+            fit.linear(&place, moment)
+        };
+        sent.set(id, &own);
+        (own, place)
+    }
+}
+
+impl Radiosity {
+    /// Whether shares of leaves count, so that the solution does not grow.
+    pub fn is_bounded(&self) -> bool {
+        !self.shares.is_none()
+    }
+
+    /// Whether light varies linearly over elements, as it does unless it would grow.
+    pub fn is_linear(&self) -> bool {
+        !self.constant
+    }
+
+    /// Sum of the form factors from a leaf as they count, of what its links sum to.
+    pub fn row(&self, leaf: u32, links: &RowSum) -> RowSum {
+        self.shares.rows.get(leaf as usize).copied().unwrap_or(*links)
+    }
+
+    /// Changes what leaves send, by their shares, and what elements above them send with it.
+    pub(super) fn scale_by_shares(
+        &mut self,
+        surfaces: &impl Surfaces,
+        scaled: impl Fn(&Linear, f32) -> Linear + Copy,
+    ) {
+        for ElementId(facet) in surfaces.facets() {
+            self.scale_below(surfaces, *facet, scaled);
+        }
+    }
+
+    fn scale_below(
+        &mut self,
+        surfaces: &impl Surfaces,
+        id: u32,
+        scaled: impl Fn(&Linear, f32) -> Linear + Copy,
+    ) -> (Linear, Place) {
+        let (place, moment) = (surfaces.place(id), surfaces.source_moment());
+        let children = surfaces.children(id);
+        let own = if children.is_empty() {
+            scaled(&self.radiosity.get(id), self.shares.of[id as usize])
+        } else {
+            let mut fit = Fit::default();
+            for child in children {
+                let (own, at) = self.scale_below(surfaces, child, scaled);
+                fit.add(surfaces.area_m2(child), (&place, &at), moment, &own);
+            }
+            fit.linear(&place, moment)
+        };
+        self.radiosity.set(id, &own);
+        (own, place)
+    }
+}
+
+fn for_each_leaf(surfaces: &impl Surfaces, facet: u32, visit: &mut dyn FnMut(u32)) {
+    for_each_below(surfaces, facet, &mut |id| {
+        if surfaces.children(id).is_empty() {
+            visit(id);
+        }
+    });
+}

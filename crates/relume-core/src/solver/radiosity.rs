@@ -10,10 +10,10 @@ use super::push::{RowSum, push};
 use super::surfaces::{Surfaces, for_each_below};
 use super::trend::Trend;
 
-mod shares;
+mod scaling;
 mod solve;
 
-use shares::Shares;
+use scaling::RowScaling;
 pub use solve::Stop;
 
 /// What came over links of groups to whom something did: few elements do, since groups are linked with large ones.
@@ -68,8 +68,8 @@ pub struct Radiosity {
     trend: Trend,
     /// Elements are taken to be constant, as the solution would grow without end if lines were handed down.
     constant: bool,
-    /// Shares of leaves; empty unless the solution would grow.
-    shares: Shares,
+    /// RowScaling of leaves; empty unless the solution would grow.
+    scaling: RowScaling,
     /// Sweeps made by the last solve.
     pub sweeps: u32,
     /// Receivers gathered by the last solve, each time counted.
@@ -115,7 +115,7 @@ impl Radiosity {
         self.gathered.renumber(to);
         self.over_groups.renumber(to);
         self.trend.renumber(to);
-        self.shares.renumber(to);
+        self.scaling.renumber(to);
         let numbers = [&mut self.pending, &mut self.deferred];
         let kept = numbers.into_iter().filter(|v| !v.is_empty());
         for values in kept {
@@ -213,8 +213,8 @@ impl Radiosity {
     ) {
         let own = |id: u32| self.gathered.get(id);
         push(surfaces, (facet, &surfaces.place(facet)), &Linear::default(), &own, &mut |id, h| {
-            match self.shares.of.get(id as usize) {
-                Some(&share) => visit(id, &h.times(share)),
+            match self.scaling.factors.get(id as usize) {
+                Some(&factor) => visit(id, &h.times(factor)),
                 None => visit(id, h),
             }
         });
@@ -225,7 +225,7 @@ impl Radiosity {
         let single =
             ((self.pending.capacity() + self.deferred.capacity()) * size_of::<f32>()) as u64;
         let fields = self.radiosity.bytes() + self.gathered.bytes();
-        fields + single + self.shares.bytes() + self.trend.bytes()
+        fields + single + self.scaling.bytes() + self.trend.bytes()
     }
 
     /// Bytes held for what came over links of groups.

@@ -41,8 +41,8 @@ pub(super) struct Below<'a, S> {
     pub(super) gathered: &'a Field,
     /// Deferred error: bound of the error of radiosities at and below each element by irradiance not pushed down yet, W/m2.
     pub(super) deferred: &'a [f32],
-    /// Share of each leaf in what it receives and sends; empty where all are 1.
-    pub(super) shares: &'a [f32],
+    /// Factor of what each leaf receives and sends; empty where all are 1.
+    pub(super) factors: &'a [f32],
     pub(super) surfaces: &'a S,
     pub(super) material: &'a FacetMaterial,
     pub(super) limit: f32,
@@ -65,8 +65,8 @@ impl<S: Surfaces> Below<'_, S> {
         let children = self.surfaces.children(id);
         let mut deferred = 0.0_f32;
         let b = if children.is_empty() {
-            match self.shares.get(id as usize) {
-                Some(&share) => self.reflect(&h.times(share), place).times(share),
+            match self.factors.get(id as usize) {
+                Some(&factor) => self.reflect(&h.times(factor), place).times(factor),
                 None => self.reflect(&h, place),
             }
         } else {

@@ -76,12 +76,12 @@ pub(super) const UNBALANCED_MAX: f64 = 0.005;
 /// - Smaller: time: full sweeps where little moved
 pub(super) const UNKNOWN_MAX: f64 = 0.08;
 
-/// Flux that rows above 1 would make in even light, over what surfaces absorb, from which shares of leaves count.
+/// Flux that rows above 1 would make in even light, over what surfaces absorb, from which factors of leaves count.
 ///
 /// - Unit: 1
 /// - Tried: 0.005, 0.0015; white closets were off by 2 to 60 % without, and bodies of reflectance 0.9 in motion by 2.4 %
 /// - Larger: light is unaccounted for in white gaps
-/// - Smaller: time: shares where rows are only a little off
+/// - Smaller: time: factors where rows are only a little off
 pub(super) const GAIN_MAX: f64 = 0.0015;
 
 /// Largest reflectance of a scene from which it is looked whether rows above 1 make light of nothing.
@@ -98,12 +98,12 @@ pub(super) const WHITE: f32 = 0.85;
 /// - Tried: 0.25
 /// - Larger: rows above 1
 /// - Smaller: light that comes from a few neighbours only
-pub(super) const SHARE_LEAST: f32 = 0.25;
+pub(super) const FACTOR_LEAST: f32 = 0.25;
 
-/// Rounds of the search for shares.
+/// Rounds of the search for factors.
 ///
 /// - Unit: rounds
 /// - Tried: 32
 /// - Larger: time, in white scenes
 /// - Smaller: rows above 1
-pub(super) const SHARE_ROUNDS: u32 = 32;
+pub(super) const SCALING_ROUNDS: u32 = 32;

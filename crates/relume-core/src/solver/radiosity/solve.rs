@@ -3,7 +3,7 @@
 use fearless_simd::dispatch;
 use rayon::prelude::*;
 
-use super::shares::{CLOSE, Shares};
+use super::scaling::{CLOSE, RowScaling};
 use super::{OverGroups, Radiosity};
 use crate::element::ElementId;
 use crate::solver::dirty_path::{Batch, DirtyPath};
@@ -76,8 +76,8 @@ pub(super) const CHUNK: usize = 256;
 
 impl Radiosity {
     /// [`solve`](Radiosity::solve) to a residual, relative to the mean radiosity, whatever the links: where rows of leaves that sum to
-    /// more than 1 would make light of nothing, with shares of leaves ([`Shares`]), with which none do; and if lines grow even so,
-    /// with constant elements and shares that lose light. `most_mean_w_m2` is what the mean radiosity cannot reach.
+    /// more than 1 would make light of nothing, with factors of leaves ([`RowScaling`]), with which none do; and if lines grow even so,
+    /// with constant elements and factors that lose light. `most_mean_w_m2` is what the mean radiosity cannot reach.
     pub fn solve_bounded(
         &mut self,
         surfaces: &impl Surfaces,
@@ -89,12 +89,12 @@ impl Radiosity {
         if !self.has_settled() {
             self.start_anew(surfaces);
         }
-        let was = (std::mem::take(&mut self.shares), std::mem::take(&mut self.constant));
-        let rows = is_white(surfaces).then(|| Shares::none(surfaces, links, true));
+        let was = (std::mem::take(&mut self.scaling), std::mem::take(&mut self.constant));
+        let rows = is_white(surfaces).then(|| RowScaling::none(surfaces, links, true));
         match rows.filter(|rows| rows.gain(surfaces) > GAIN_MAX) {
             Some(rows) => {
-                self.shares = rows.found(surfaces, links, &was.0);
-                self.solve_shared(surfaces, links, stop);
+                self.scaling = rows.found(surfaces, links, &was.0);
+                self.solve_scaled(surfaces, links, stop);
             }
             None if was.0.is_none() => self.solve(surfaces, links, dirty, stop),
             None => {
@@ -107,22 +107,22 @@ impl Radiosity {
                 return;
             }
             self.constant = constant;
-            let rows = Shares::none(surfaces, links, !constant);
-            self.shares = match constant {
-                false => rows.found(surfaces, links, &Shares::default()),
+            let rows = RowScaling::none(surfaces, links, !constant);
+            self.scaling = match constant {
+                false => rows.found(surfaces, links, &RowScaling::default()),
                 true => rows.strict(surfaces, links),
             };
             self.start_anew(surfaces);
-            self.solve_shared(surfaces, links, stop);
+            self.solve_scaled(surfaces, links, stop);
         }
     }
 
-    /// Solves with shares, from what surfaces send as it was found last.
-    fn solve_shared(&mut self, surfaces: &impl Surfaces, links: &Links, stop: Stop) {
-        self.scale_by_shares(surfaces, |b, share| b.times(share));
+    /// Solves with factors, from what surfaces send as it was found last.
+    fn solve_scaled(&mut self, surfaces: &impl Surfaces, links: &Links, stop: Stop) {
+        self.scale_leaves(surfaces, |b, factor| b.times(factor));
         self.forget(surfaces);
         self.solve(surfaces, links, Dirty::All, stop);
-        self.scale_by_shares(surfaces, |b, share| b.times(1.0 / share));
+        self.scale_leaves(surfaces, |b, factor| b.times(1.0 / factor));
         self.forget(surfaces);
     }
 
@@ -468,7 +468,7 @@ impl Radiosity {
                 radiosity: &self.radiosity,
                 gathered: &self.gathered,
                 deferred: &self.deferred,
-                shares: &self.shares.of,
+                factors: &self.scaling.factors,
                 surfaces,
                 material,
                 limit,
@@ -615,10 +615,10 @@ mod tests {
             0,
             list.map(|(source, coupling)| Link { source, coupling, ..Link::default() }).into_iter(),
         );
-        let rows = Shares::none(&plates, &links, true);
-        let shares = rows.found(&plates, &links, &Shares::default());
+        let rows = RowScaling::none(&plates, &links, true);
+        let scaling = rows.found(&plates, &links, &RowScaling::default());
         for leaf in [0, 2, 3] {
-            assert!((shares.rows[leaf].mean - 1.0).abs() < 1e-3, "{:?}", shares.rows);
+            assert!((scaling.rows[leaf].mean - 1.0).abs() < 1e-3, "{:?}", scaling.rows);
         }
         let mut b = Radiosity::new(&plates);
         b.solve_bounded(&plates, &links, Dirty::All, (1e-7, 2e2));

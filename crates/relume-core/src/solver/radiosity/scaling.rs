@@ -1,7 +1,7 @@
-//! Shares of leaves: how much of the light that links hand down to a leaf is its own, so that no row sums to more than 1.
+//! Row scaling: factors of leaves with which no row of form factors sums to more than 1.
 //!
-//! A link of an element counts for all of it; a leaf in a narrow gap gets its part of that too, though it lies in the dark, and its row sums
-//! to more than 1. Among white surfaces light grows there. With shares d the links between leaves i and j count d_i d_j times, in both
+//! A link of an element counts for all of it: a leaf in a narrow gap inherits its part though it lies in the dark, and its row sums
+//! to more than 1. Between white surfaces light grows there. With factors d the links between leaves i and j count d_i d_j times, in both
 //! directions, and d is such that rows have the sums that they should: at most 1, and over each facet as much as before, since sums over
 //! facets are good. That is the symmetric scaling of a matrix to given row sums (Sinkhorn and Knopp 1967).
 
@@ -18,16 +18,17 @@ use crate::solver::place::Place;
 use crate::solver::push::{RowSum, push};
 use crate::solver::settle::Fit;
 use crate::solver::surfaces::{Surfaces, for_each_below};
-use crate::solver::tuning::{SHARE_LEAST, SHARE_ROUNDS};
+use crate::solver::tuning::{FACTOR_LEAST, SCALING_ROUNDS};
 use crate::transport;
 
-/// Shares of leaves, and the sums of their rows with them; by id, of no meaning for what is no leaf.
+/// Factors of leaves, and the sums of their rows with them; by id, of no meaning for what is no leaf.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Shares {
+pub(super) struct RowScaling {
     /// Factor of what a leaf receives and of what it sends, 1.
-    pub(super) of: Vec<f32>,
+    pub(super) factors: Vec<f32>,
     /// Sums of rows, 1 and 1/m.
     pub(super) rows: Vec<RowSum>,
+    /// Whether rows are taken as lines.
     linear: bool,
 }
 
@@ -37,19 +38,19 @@ pub(super) const CLOSE: f32 = 1e-3;
 /// What rows may be above 1 by rounding, and as their exchange is found: 1.
 const ROUNDED: f64 = 1e-3;
 
-impl Shares {
-    /// Shares of 1, with the sums of rows as lines or as means alone unless `linear`.
-    pub(super) fn none(surfaces: &impl Surfaces, links: &Links, linear: bool) -> Shares {
+impl RowScaling {
+    /// Factors of 1, with the sums of rows as lines or as means alone unless `linear`.
+    pub(super) fn none(surfaces: &impl Surfaces, links: &Links, linear: bool) -> RowScaling {
         let len = surfaces.len();
-        let (of, rows) = (vec![1.0; len], vec![RowSum::default(); len]);
-        let mut shares = Shares { of, rows, linear };
-        shares.sum_rows(surfaces, links);
-        shares
+        let (factors, rows) = (vec![1.0; len], vec![RowSum::default(); len]);
+        let mut scaling = RowScaling { factors, rows, linear };
+        scaling.sum_rows(surfaces, links);
+        scaling
     }
 
     /// Whether there are none.
     pub(super) fn is_none(&self) -> bool {
-        self.of.is_empty()
+        self.factors.is_empty()
     }
 
     /// Flux that leaves with rows above 1 would make of nothing, over what all surfaces absorb, in light that is even: 1.
@@ -68,26 +69,26 @@ impl Shares {
         made / absorbed
     }
 
-    /// Shares with which these rows have the sums that they should, beginning with those of another time, if there are any.
+    /// Factors with which these rows have the sums that they should, beginning with those of another time if there were any.
     pub(super) fn found(
         mut self,
         surfaces: &impl Surfaces,
         links: &Links,
-        from: &Shares,
-    ) -> Shares {
+        from: &RowScaling,
+    ) -> RowScaling {
         let wanted = self.wanted(surfaces);
         if !from.is_none() {
-            let last = |id: usize| from.of.get(id).copied().unwrap_or(1.0);
-            self.of = (0..self.of.len()).map(last).collect();
+            let last = |id: usize| from.factors.get(id).copied().unwrap_or(1.0);
+            self.factors = (0..self.factors.len()).map(last).collect();
             self.sum_rows(surfaces, links);
         }
-        for _ in 0..SHARE_ROUNDS {
+        for _ in 0..SCALING_ROUNDS {
             let mut off = 0.0_f32;
-            for ((share, row), &wanted) in self.of.iter_mut().zip(&self.rows).zip(&wanted) {
+            for ((factor, row), &wanted) in self.factors.iter_mut().zip(&self.rows).zip(&wanted) {
                 if row.mean > 0.0 && wanted > 0.0 {
                     off = off.max((row.mean - wanted).abs());
-                    let better = *share * (wanted / row.mean).sqrt();
-                    *share = better.clamp(SHARE_LEAST, 1.0 / SHARE_LEAST);
+                    let better = *factor * (wanted / row.mean).sqrt();
+                    *factor = better.clamp(FACTOR_LEAST, 1.0 / FACTOR_LEAST);
                 }
             }
             if off < CLOSE {
@@ -98,10 +99,10 @@ impl Shares {
         self
     }
 
-    /// Shares with which none of these rows sums to more than 1, whatever is lost.
-    pub(super) fn strict(mut self, surfaces: &impl Surfaces, links: &Links) -> Shares {
-        for (share, row) in self.of.iter_mut().zip(&self.rows) {
-            *share = 1.0 / row.mean.max(1.0);
+    /// Factors with which none of these rows sums to more than 1, whatever is lost.
+    pub(super) fn strict(mut self, surfaces: &impl Surfaces, links: &Links) -> RowScaling {
+        for (factor, row) in self.factors.iter_mut().zip(&self.rows) {
+            *factor = 1.0 / row.mean.max(1.0);
         }
         self.sum_rows(surfaces, links);
         self
@@ -109,13 +110,14 @@ impl Shares {
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> u64 {
-        (self.of.capacity() * size_of::<f32>() + self.rows.capacity() * size_of::<RowSum>()) as u64
+        (self.factors.capacity() * size_of::<f32>() + self.rows.capacity() * size_of::<RowSum>())
+            as u64
     }
 
     /// Follows elements to their new ids.
     pub(super) fn renumber(&mut self, to: &Renumbering) {
-        if !self.of.is_empty() {
-            self.of = to.old_of().iter().map(|&old| self.of[old as usize]).collect();
+        if !self.factors.is_empty() {
+            self.factors = to.old_of().iter().map(|&old| self.factors[old as usize]).collect();
             self.rows = to.old_of().iter().map(|&old| self.rows[old as usize]).collect();
         }
     }
@@ -138,7 +140,7 @@ impl Shares {
         wanted
     }
 
-    /// Finds the sums of rows with these shares.
+    /// Finds the sums of rows with these factors.
     fn sum_rows(&mut self, surfaces: &impl Surfaces, links: &Links) {
         let mut sent = Field::default();
         sent.extend(surfaces.len());
@@ -163,19 +165,19 @@ impl Shares {
         for facet in surfaces.facets() {
             let at = surfaces.place(facet.0);
             push(surfaces, (facet.0, &at), &Linear::default(), &own, &mut |leaf, h| {
-                let share = self.of[leaf as usize];
-                let gradient = h.gradient.map(|g| share * g[0]);
-                self.rows[leaf as usize] = RowSum { mean: share * h.mean[0], gradient };
+                let factor = self.factors[leaf as usize];
+                let gradient = h.gradient.map(|g| factor * g[0]);
+                self.rows[leaf as usize] = RowSum { mean: factor * h.mean[0], gradient };
             });
         }
     }
 
-    /// Sets shares as what surfaces send, with first moments.
+    /// Sets factors as what surfaces send, with first moments.
     fn pull(&self, surfaces: &impl Surfaces, id: u32, sent: &mut Field) -> (Linear, Place) {
         let (place, moment) = (surfaces.place(id), surfaces.source_moment());
         let children = surfaces.children(id);
         let own = if children.is_empty() {
-            Linear { mean: [self.of[id as usize]; 3], ..Linear::default() }
+            Linear { mean: [self.factors[id as usize]; 3], ..Linear::default() }
         } else {
             let mut fit = Fit::default();
             for child in children {
@@ -190,9 +192,9 @@ impl Shares {
 }
 
 impl Radiosity {
-    /// Whether shares of leaves count, so that the solution does not grow.
+    /// Whether factors of leaves count, so that the solution does not grow.
     pub fn is_bounded(&self) -> bool {
-        !self.shares.is_none()
+        !self.scaling.is_none()
     }
 
     /// Whether light varies linearly over elements, as it does unless it would grow.
@@ -202,11 +204,11 @@ impl Radiosity {
 
     /// Sum of the form factors from a leaf as they count, of what its links sum to.
     pub fn row(&self, leaf: u32, links: &RowSum) -> RowSum {
-        self.shares.rows.get(leaf as usize).copied().unwrap_or(*links)
+        self.scaling.rows.get(leaf as usize).copied().unwrap_or(*links)
     }
 
-    /// Changes what leaves send, by their shares, and what elements above them send with it.
-    pub(super) fn scale_by_shares(
+    /// Changes what leaves send, by their factors, and what elements above them send with it.
+    pub(super) fn scale_leaves(
         &mut self,
         surfaces: &impl Surfaces,
         scaled: impl Fn(&Linear, f32) -> Linear + Copy,
@@ -225,7 +227,7 @@ impl Radiosity {
         let (place, moment) = (surfaces.place(id), surfaces.source_moment());
         let children = surfaces.children(id);
         let own = if children.is_empty() {
-            scaled(&self.radiosity.get(id), self.shares.of[id as usize])
+            scaled(&self.radiosity.get(id), self.scaling.factors[id as usize])
         } else {
             let mut fit = Fit::default();
             for child in children {

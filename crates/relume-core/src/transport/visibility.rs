@@ -14,6 +14,7 @@ use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use super::share::Visibility;
 use super::side::Side;
 use super::spot::spot;
+use super::tuning::BODY_SHARE;
 use glam::{DVec2, DVec3};
 
 /// Candidate occluders of a pair: nodes of the forest's fixed part (clusters and patch roots) that may stand between its ends.
@@ -268,14 +269,19 @@ impl<'a> Shaft<'a> {
     /// Sizes of some blockers and lamps; of a crowd the blockers are those that stand for it.
     pub fn sizes_of(
         &self,
-        InShaft { blockers, lamps, .. }: &InShaft,
+        InShaft { blockers, lamps, is_crowd }: &InShaft,
         around_m2: (f64, f64),
     ) -> BlockerSizes {
         let spots = self.spots(lamps, around_m2);
         if blockers.is_empty() {
             return BlockerSizes { spots, ..BlockerSizes::NOTHING };
         }
-        let area = |&patch: &PatchId| self.forest.area_m2(self.forest.patch_root(patch));
+        let own = |patch: PatchId| self.forest.area_m2(self.forest.patch_root(patch));
+        // The shadow of a finely tessellated body has the size of the body.
+        let area = |&patch: &PatchId| match is_crowd {
+            true => own(patch).max(BODY_SHARE * self.forest.connected_m2(patch)),
+            false => own(patch),
+        };
         let mut sizes = BlockerSizes {
             spots,
             least_m2: blockers.iter().map(area).fold(f64::INFINITY, f64::min),

@@ -147,7 +147,7 @@ pub(super) const CLIPPED_MAX_REST: usize = 4;
 /// - Tried: 64, 128, 256
 /// - Larger: time in rooms with thousands of things
 /// - Smaller: pairs that contribute much past few things are sampled
-pub(super) const LISTED_MAX: usize = 128;
+pub(super) const LISTED_MAX: usize = 64;
 
 /// Visibility that segments which are all blocked may have missed.
 ///

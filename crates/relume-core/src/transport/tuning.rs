@@ -91,7 +91,7 @@ pub(super) const BEND_FAR: f64 = 0.03;
 /// - Smaller: noise of sampling
 pub const CLIPPED_MAX: usize = 12;
 
-/// Area of a blocker in a crowd, over that of the connected patches that it belongs to, at least: a face of a cube.
+/// Area of a blocker that is in a group, over that of the connected patches that it belongs to, at least: a face of a cube.
 ///
 /// - Unit: 1
 /// - Tried: 0, 1/6

@@ -269,18 +269,21 @@ impl<'a> Shaft<'a> {
     /// Sizes of some blockers and lamps; of a crowd the blockers are those that stand for it.
     pub fn sizes_of(
         &self,
-        InShaft { blockers, lamps, is_crowd }: &InShaft,
+        InShaft { blockers, lamps, .. }: &InShaft,
         around_m2: (f64, f64),
     ) -> BlockerSizes {
         let spots = self.spots(lamps, around_m2);
         if blockers.is_empty() {
             return BlockerSizes { spots, ..BlockerSizes::NOTHING };
         }
-        let own = |patch: PatchId| self.forest.area_m2(self.forest.patch_root(patch));
-        // The shadow of a finely tessellated body has the size of the body.
-        let area = |&patch: &PatchId| match is_crowd {
-            true => own(patch).max(BODY_SHARE * self.forest.connected_m2(patch)),
-            false => own(patch),
+        let area = |&patch: &PatchId| {
+            let root = self.forest.patch_root(patch);
+            let own = self.forest.area_m2(root);
+            // The shadow of a finely tessellated body has the size of the body.
+            match self.forest.is_in_group(root) {
+                true => own.max(BODY_SHARE * self.forest.connected_m2(patch)),
+                false => own,
+            }
         };
         let mut sizes = BlockerSizes {
             spots,

@@ -11,8 +11,8 @@ use crate::predict::{Lookahead, MotionBounds, Tick};
 use crate::scene::{BodyId, PatchId};
 use crate::transport::{
     BlockerSizes, CELLS_MAX, CLIPPED_MAX, Clipping, Crowd, Exchange, InShaft, Meeting, Shaft, Simd,
-    Visibility, clipping, contact_exchange, exchange_by_points, light_exchange, light_past_crowd, light_visibility,
-    meeting, visibility,
+    Visibility, clipping, contact_exchange, exchange_by_points, light_exchange, light_past_crowd,
+    light_visibility, meeting, visibility,
 };
 
 use super::certificate::SpaceCertificateTests;
@@ -25,8 +25,8 @@ use super::oracle::{End, Estimate, Oracle, estimate};
 use super::space::{Hierarchy, Judge};
 use super::tree::{Carried, CullReason, Gradients, in_steps};
 use super::tuning::{
-    CLIPPED_MAX_CLOSE, CLIPPED_MAX_REST, CLOSE_SHARE, CLOSER, CONNECTED_SHARE, EFFORT, FINEST, LISTED_MAX,
-    OVERLOOKED_MAX, SAMPLED_MAX, SPOT_AROUND,
+    CLIPPED_MAX_CLOSE, CLIPPED_MAX_REST, CLOSE_SHARE, CLOSER, CONNECTED_SHARE, EFFORT, FINEST,
+    LISTED_MAX, OVERLOOKED_MAX, SAMPLED_MAX, SPOT_AROUND,
 };
 use super::verdict::{Judgement, Stale, Verdict};
 use super::world_change::WorldChange;

@@ -88,6 +88,22 @@ impl SegmentBundle {
         out
     }
 
+    /// Segments between given ends, which carry nothing.
+    pub fn of_ends(ends: &[[DVec3; 2]; SEGMENTS]) -> SegmentBundle {
+        let of = |part: fn(&[DVec3; 2]) -> f64| ends.each_ref().map(part);
+        SegmentBundle {
+            px: of(|[p, _]| p.x),
+            py: of(|[p, _]| p.y),
+            pz: of(|[p, _]| p.z),
+            dx: of(|[p, q]| q.x - p.x),
+            dy: of(|[p, q]| q.y - p.y),
+            dz: of(|[p, q]| q.z - p.z),
+            weight: [0.0; SEGMENTS],
+            quadrant_a: [0; SEGMENTS],
+            quadrant_b: [0; SEGMENTS],
+        }
+    }
+
     fn set(
         &mut self,
         k: usize,

@@ -431,12 +431,7 @@ impl<'a> Shaft<'a> {
     }
 
     /// Lists a patch that is not out of the shaft.
-    fn meet(
-        &self,
-        (patch, standing): (PatchId, Standing),
-        listed_max: usize,
-        found: &mut InShaft,
-    ) {
+    fn meet(&self, (patch, standing): (PatchId, Standing), listed_max: usize, found: &mut InShaft) {
         if standing == Standing::Between && !found.is_crowd {
             found.blockers.push(patch);
             if found.blockers.len() > listed_max {
@@ -725,7 +720,13 @@ impl SideTally {
 }
 
 impl Tally {
-    pub(super) fn add(&mut self, bundle: &SegmentBundle, mask: u16, a: &WorldElement, b: &WorldElement) {
+    pub(super) fn add(
+        &mut self,
+        bundle: &SegmentBundle,
+        mask: u16,
+        a: &WorldElement,
+        b: &WorldElement,
+    ) {
         let dark = bundle.weight.iter().all(|&w| w <= 0.0);
         for k in 0..SEGMENTS {
             // A pair that hardly faces itself has no weights: all segments count alike.
@@ -794,7 +795,7 @@ mod tests {
     use super::*;
     use crate::element::Shape;
     use crate::scene::{Scene, SceneBuilder};
-    use crate::transport::CLIPPED_MAX;
+    use crate::transport::{CLIPPED_MAX, Crowd};
     use glam::DQuat;
 
     /// Floor and ceiling, both double-sided if wanted, and what `fill` adds: V of their inner sides.
@@ -879,6 +880,27 @@ mod tests {
         b.build().unwrap()
     }
 
+    /// What blocks a pair is not listed where it is more than asked for, and segments find it all the same.
+    fn past_a_crowd(pair: &Shaft<'_>, handed: &Candidates, blockers: &[PatchId]) {
+        let Some(most) = blockers.len().checked_sub(1) else { return };
+        let (simd, mut narrowed) = (Simd::detect(), Vec::new());
+        let found = pair.narrow_to_blockers(handed, &mut narrowed, most);
+        assert!(found.is_crowd && found.blockers.is_empty() && !found.is_clear());
+        let crowd = Crowd { shaft: pair, candidates: &narrowed, simd };
+        let listed = |log2_count| visibility(simd, pair, blockers, 7, log2_count);
+        let (first, sample) = crowd.first_look(7);
+        assert_eq!(first, listed(4));
+        assert_eq!(crowd.visibility(7, 6), listed(6));
+        let world = SegmentBundle::new(pair.a, pair.b, 7, 4, 0);
+        let hits = |&patch: &PatchId| {
+            let polygon = pair.lifted(patch).1.polygon();
+            world.blocked_by(simd, &polygon, 2.0 * pair.slack()) != 0
+        };
+        let mut want: Vec<PatchId> = blockers.iter().copied().filter(hits).collect();
+        want.sort_unstable();
+        assert_eq!(sample, want);
+    }
+
     /// What segments between two slivers cross is among their blockers, and among the candidates of every
     /// pair above them; and the walk for both at once finds what either finds alone.
     #[test]
@@ -912,8 +934,9 @@ mod tests {
                 shaft(&above.0, &above.1).narrow(&[Forest::ROOT.0], &mut handed);
                 let pair = shaft(&a, &b);
                 let blockers = pair.blockers(&[Forest::ROOT.0]);
-                let found = pair.narrow_to_blockers(&handed, &mut both, usize::MAX);
-                assert_eq!(found.blockers, blockers);
+                let listed = pair.narrow_to_blockers(&handed, &mut both, usize::MAX);
+                assert_eq!(listed.blockers, blockers);
+                past_a_crowd(&pair, &handed, &blockers);
                 let mut alone = Vec::new();
                 pair.narrow(&handed, &mut alone);
                 assert_eq!(both, alone);

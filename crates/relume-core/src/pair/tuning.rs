@@ -144,7 +144,7 @@ pub(super) const CLIPPED_MAX_REST: usize = 4;
 /// Blockers of a pair that are listed; more are a crowd, past which segments look in the hierarchy.
 ///
 /// - Unit: blockers
-/// - Tried: 64, 128, 256
+/// - Tried: 64, 128
 /// - Larger: time in rooms with thousands of things
 /// - Smaller: pairs that contribute much past few things are sampled
 pub(super) const LISTED_MAX: usize = 64;

@@ -13,8 +13,9 @@ use relume_core::session::{Options, Session};
 /// Bytes a pair: pair tree, and links by receiver.
 const PAIR_BYTES: f64 = 48.0;
 
-/// Bytes a pair more where groups of patches are ends of links: what came over these is kept for each receiver.
-const GROUP_BYTES: f64 = 4.0;
+/// Bytes a pair more where groups of patches are ends of links: what came over these is kept for each receiver, however few pairs
+/// it has.
+const GROUP_BYTES: f64 = 6.0;
 
 /// Bytes an element: forest, radiosities, and where the links of each are.
 const ELEMENT_BYTES: f64 = 128.0;

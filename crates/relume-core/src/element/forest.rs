@@ -136,6 +136,8 @@ struct Fixed {
     normals: Vec<Aabb>,
     /// Whether a patch emits light at any time, by patch.
     glows: Vec<bool>,
+    /// Whether any patch at or below a node does, by id.
+    may_glow: Vec<bool>,
     /// Whether a patch does, or there is a punctual light.
     shines: bool,
     /// Area of the patches connected with each patch, itself among them, by patch, m2.
@@ -498,11 +500,25 @@ impl Forest {
         self.fixed.glows[patch.0 as usize]
     }
 
+    /// Whether any patch at or below a node of the fixed part does.
+    pub fn may_glow(&self, id: ElementId) -> bool {
+        self.fixed.may_glow[id.0 as usize]
+    }
+
     /// Says which patches emit light at any time. Whether that differs from before.
     pub fn set_glows(&mut self, glows: Vec<bool>) -> bool {
         let differs = self.fixed.glows != glows;
         if differs {
             let lights = (0..self.fixed_len).any(|id| self.kind(ElementId(id)) == Kind::Light);
+            let mut may_glow = vec![false; self.fixed_len as usize];
+            for id in (0..self.fixed_len).rev() {
+                let glowing = self.patch(ElementId(id)).is_some_and(|p| glows[p.0 as usize]);
+                may_glow[id as usize] |= glowing;
+                if let Some(parent) = self.parent(ElementId(id)).filter(|_| may_glow[id as usize]) {
+                    may_glow[parent.0 as usize] = true;
+                }
+            }
+            self.fixed_mut().may_glow = may_glow;
             self.fixed_mut().shines = lights || glows.contains(&true);
             self.fixed_mut().glows = glows;
         }

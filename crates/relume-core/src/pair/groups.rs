@@ -85,7 +85,8 @@ impl SpaceJudge<'_> {
         let end = |id| Spread::new(self.forest, self.view, id, common);
         let ends = (end(a), end(b));
         let key = pair_key(self.forest.key(a), self.forest.key(b));
-        let sight = GroupSight { forest: self.forest, view: self.view, common, candidates };
+        let (forest, view, simd) = (&*self.forest, self.view, self.simd);
+        let sight = GroupSight { forest, view, common, candidates, simd };
         let Stage::Fine(brightness) = self.stage else {
             let (one, other) = match no_smaller(ends.0.radius, ends.1.radius) {
                 true => (&ends.0, &ends.1),

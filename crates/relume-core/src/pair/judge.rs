@@ -10,9 +10,9 @@ use crate::geometry::{Aabb, Plane, no_smaller};
 use crate::predict::{Lookahead, MotionBounds, Tick};
 use crate::scene::{BodyId, PatchId};
 use crate::transport::{
-    BlockerSizes, CELLS_MAX, CLIPPED_MAX, Clipping, Exchange, InShaft, Meeting, Shaft, Simd,
-    Visibility, clipping, contact_exchange, exchange_by_points, light_exchange, light_visibility,
-    meeting, visibility,
+    BlockerSizes, CELLS_MAX, CLIPPED_MAX, Clipping, Crowd, Exchange, InShaft, Meeting, Shaft, Simd,
+    Visibility, clipping, contact_exchange, exchange_by_points, light_exchange, light_past_crowd,
+    light_visibility, meeting, visibility,
 };
 
 use super::certificate::SpaceCertificateTests;
@@ -26,7 +26,7 @@ use super::space::{Hierarchy, Judge};
 use super::tree::{Carried, CullReason, Gradients, in_steps};
 use super::tuning::{
     CLIPPED_MAX_CLOSE, CLIPPED_MAX_REST, CLOSE_SHARE, CLOSER, CONNECTED_SHARE, EFFORT, FINEST,
-    OVERLOOKED_MAX, SAMPLED_MAX, SPOT_AROUND,
+    LISTED_MAX, OVERLOOKED_MAX, SAMPLED_MAX, SPOT_AROUND,
 };
 use super::verdict::{Judgement, Stale, Verdict};
 use super::world_change::WorldChange;
@@ -367,8 +367,12 @@ impl SpaceJudge<'_> {
             shaft.narrow(candidates, narrowed);
             return passing(Verdict::Refine(self.larger_above_coarse(a, b)), 0);
         }
-        let found = shaft.narrow_to_blockers(candidates, narrowed);
-        self.decide((a, b), known, (&places.own.0, &places.own.1), met, &shaft, &found)
+        // What two ends in contact exchange is found from all that covers it.
+        let listed_max = if met == Meeting::Coplanar { usize::MAX } else { LISTED_MAX };
+        let start = narrowed.len();
+        let found = shaft.narrow_to_blockers(candidates, narrowed, listed_max);
+        let between = Between { shaft: &shaft, candidates: &narrowed[start..], found };
+        self.decide((a, b), known, (&places.own.0, &places.own.1), met, between)
     }
 
     /// Whether what two touching elements exchange counts for nothing, as it leaves neither: where there is light. Links of patches
@@ -404,10 +408,8 @@ impl SpaceJudge<'_> {
         known: Option<&Carried>,
         (place_a, place_b): (&WorldElement, &WorldElement),
         met: Meeting,
-        shaft: &Shaft<'_>,
-        found: &InShaft,
+        Between { shaft, candidates, mut found }: Between<'_>,
     ) -> Judgement {
-        let blockers = &found.blockers[..];
         let key = pair_key(self.forest.key(a), self.forest.key(b));
         let in_contact = met == Meeting::Coplanar;
         let end = |brightness: &CoarseBrightness, id, area| End {
@@ -424,11 +426,11 @@ impl SpaceJudge<'_> {
         };
         let distant = self.forest.is_distant(a) || self.forest.is_distant(b);
         let mut x = match in_contact {
-            true => contact_exchange(place_a, place_b, shaft.contact_m2(blockers)),
+            true => contact_exchange(place_a, place_b, shaft.contact_m2(&found.blockers)),
             false => exchange_by_points(self.simd, place_a, place_b, met),
         };
         if in_contact && x.area_m2 <= 0.0 {
-            let is_covered = !blockers.is_empty();
+            let is_covered = !found.blockers.is_empty();
             return culled(if is_covered { CullReason::Covered } else { CullReason::FacingAway });
         }
         // How many times too large the area is that verdicts are first made with.
@@ -437,7 +439,7 @@ impl SpaceJudge<'_> {
             // What the smaller area by points is enough to refine needs no better one.
             if let (Stage::Fine(brightness), Oracle::Error { threshold }) =
                 (self.stage, self.oracle)
-                && blockers.is_empty()
+                && found.is_clear()
             {
                 let (clear, nothing) = (Visibility::CLEAR, BlockerSizes::NOTHING);
                 let ends = (end(brightness, a, place_a.area), end(brightness, b, place_b.area));
@@ -471,8 +473,9 @@ impl SpaceJudge<'_> {
                 }
             }
         }
-        let blockers = if in_contact { &[][..] } else { blockers };
-        let occluders = shaft.occluders(blockers);
+        let crowd = found.is_crowd.then_some(Crowd { shaft, candidates, simd: self.simd });
+        let blockers = if in_contact { &[][..] } else { &found.blockers };
+        let occluders = if crowd.is_some() { usize::MAX } else { shaft.occluders(blockers) };
         let mut most = CLIPPED_MAX;
         let mut way = Margin::ENDLESS;
         if let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle) {
@@ -498,8 +501,16 @@ impl SpaceJudge<'_> {
         let mut clipped =
             (1..=most).contains(&occluders).then(|| clipping(self.simd, shaft, blockers));
         let mut sampled = None;
+        let mut sample = None;
         if clipped.is_none() {
-            let v = visibility(self.simd, shaft, blockers, key, 4);
+            let v = match &crowd {
+                Some(crowd) => {
+                    let (v, crossed) = crowd.first_look(key);
+                    sample = Some(crossed);
+                    v
+                }
+                None => visibility(self.simd, shaft, blockers, key, 4),
+            };
             // Segments that are all blocked prove nothing.
             if v.value <= 0.0 && occluders <= CLIPPED_MAX_CLOSE && SAMPLED_MAX > overlooked_max {
                 clipped = Some(clipping(self.simd, shaft, blockers));
@@ -523,7 +534,13 @@ impl SpaceJudge<'_> {
         let ends = (end(brightness, a, place_a.area), end(brightness, b, place_b.area));
         let scale = (brightness.reference_area_m2(), threshold);
         let around = |end: &End| end.surface_area.min(SPOT_AROUND * brightness.reference_area_m2());
-        let sizes = shaft.sizes_of(found, (around(&ends.0), around(&ends.1)));
+        let sizes = match sample {
+            Some(blockers) => shaft.sizes_of(
+                &InShaft { blockers, lamps: std::mem::take(&mut found.lamps), ..found },
+                (around(&ends.0), around(&ends.1)),
+            ),
+            None => shaft.sizes_of(&found, (around(&ends.0), around(&ends.1))),
+        };
         let e = estimate(&x, &v, (&ends.0, &ends.1), &sizes, scale);
         let stake = factor / threshold.max(FINEST);
         let both_ways = way != Margin::ENDLESS;
@@ -544,7 +561,10 @@ impl SpaceJudge<'_> {
             Some(clipped) => look_closer(v, clipped, stake * doubt),
             None if v.segments == 0 => v,
             None => {
-                let again = visibility(self.simd, shaft, blockers, key, 6);
+                let again = match &crowd {
+                    Some(crowd) => crowd.visibility(key, 6),
+                    None => visibility(self.simd, shaft, blockers, key, 6),
+                };
                 Visibility { segments: v.segments + again.segments, ..again }
             }
         };
@@ -683,10 +703,16 @@ impl SpaceJudge<'_> {
         }
         let place = LightPlace::new(lamp, &e, self.view.far_m());
         let shaft = self.shaft((&e, &place.stand_in), None, (patch, patch));
-        let InShaft { blockers, .. } = shaft.narrow_to_blockers(candidates, narrowed);
+        let start = narrowed.len();
+        let found = shaft.narrow_to_blockers(candidates, narrowed, LISTED_MAX);
         let key = pair_key(self.forest.key(element), self.forest.key(light));
         let segments = place.segments(lamp, &e, key);
-        let v = light_visibility(self.simd, &shaft, &blockers, (&segments, place.from(lamp, &e)));
+        let crowd = Crowd { shaft: &shaft, candidates: &narrowed[start..], simd: self.simd };
+        let from = place.from(lamp, &e);
+        let v = match found.is_crowd {
+            true => light_past_crowd(&crowd, &segments),
+            false => light_visibility(self.simd, &shaft, &found.blockers, (&segments, from)),
+        };
         let mut margin = Margin::Firm;
         let verdict = match (self.stage, self.oracle) {
             (Stage::Coarse, _) => Verdict::CoarseLink,
@@ -736,6 +762,14 @@ impl SpaceJudge<'_> {
     fn refine_if(&self, wanted: bool, side: Side) -> Verdict {
         if wanted { Verdict::Refine(side) } else { Verdict::Link }
     }
+}
+
+/// What is between the two elements of a pair.
+struct Between<'a> {
+    shaft: &'a Shaft<'a>,
+    /// Candidates in the shaft.
+    candidates: &'a [u32],
+    found: InShaft,
 }
 
 /// Places of the two elements of a pair.

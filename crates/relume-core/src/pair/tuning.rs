@@ -141,6 +141,14 @@ pub(super) const CLIPPED_MAX_CLOSE: usize = 96;
 /// - Smaller: noise of sampling
 pub(super) const CLIPPED_MAX_REST: usize = 4;
 
+/// Blockers of a pair that are listed; more are a crowd, past which segments look in the hierarchy.
+///
+/// - Unit: blockers
+/// - Tried: 64, 128
+/// - Larger: time in rooms with thousands of things
+/// - Smaller: pairs that contribute much past few things are sampled
+pub(super) const LISTED_MAX: usize = 64;
+
 /// Visibility that segments which are all blocked may have missed.
 ///
 /// - Unit: 1

@@ -9,7 +9,7 @@ use crate::geometry::Aabb;
 use crate::pair::{self, PairTree};
 use crate::scene::{BodyId, PatchId, Scene};
 use crate::solver::{GroupEnd, GroupLink, GroupLinks, PlacedLinks, SQUARE_MOMENT};
-use crate::transport::{GroupSight, Spread, common_body};
+use crate::transport::{GroupSight, Simd, Spread, common_body};
 
 use crate::follow::LinkKinds;
 
@@ -68,7 +68,7 @@ impl Before {
         }
         let common = common_body(forest, view, link.a, link.b);
         let ends = [link.a, link.b].map(|id| Spread::new(forest, view, id, common));
-        let sight = GroupSight { forest, view, common, candidates: &[] };
+        let sight = GroupSight { forest, view, common, candidates: &[], simd: Simd::detect() };
         let key = pair::pair_key(forest.key(link.a), forest.key(link.b));
         let touched = by_facets && sight.rays_meet(&ends[0], &ends[1], key, &self.boxes);
         (!touched).then_some(last)
@@ -129,7 +129,8 @@ fn placed(
     let apart2 = ends[0].centre.distance_squared(ends[1].centre);
     let seen = (link.carried.visibility < u16::MAX).then(|| {
         let candidates = GroupSight::between(forest, view, link.a, link.b);
-        let sight = GroupSight { forest, view, common, candidates: &candidates };
+        let simd = Simd::detect();
+        let sight = GroupSight { forest, view, common, candidates: &candidates, simd };
         let key = pair::pair_key(forest.key(link.a), forest.key(link.b));
         sight.by_facets(&ends[0], &ends[1], key)
     });

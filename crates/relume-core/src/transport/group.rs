@@ -353,6 +353,7 @@ mod tests {
     use super::sight::FacetSight;
     use super::*;
     use crate::scene::SceneBuilder;
+    use crate::transport::kernel::Simd;
 
     /// Two balls of 0.5 m and so many facets around, some distance apart in a large room, and what `fill` adds.
     fn balls(around: u32, apart_m: f64, fill: impl Fn(&mut SceneBuilder)) -> (Forest, WorldView) {
@@ -370,6 +371,14 @@ mod tests {
         let forest = Forest::with_groups(&scene, &|_| false);
         let view = WorldView::new(&scene, &forest, &scene.at(0.0));
         (forest, view)
+    }
+
+    fn sight_of<'a>(
+        forest: &'a Forest,
+        view: &'a WorldView,
+        candidates: &'a [u32],
+    ) -> GroupSight<'a> {
+        GroupSight { forest, view, common: None, candidates, simd: Simd::detect() }
     }
 
     fn ball(
@@ -453,11 +462,8 @@ mod tests {
         let [a, b] = ends(forest)[..] else { unreachable!() };
         let end = |id| Spread::new(forest, view, id, None);
         let candidates = [Forest::ROOT.0];
-        GroupSight { forest, view, common: None, candidates: &candidates }.visibility(
-            &end(a),
-            &end(b),
-            7,
-        )
+        GroupSight { forest, view, common: None, candidates: &candidates, simd: Simd::detect() }
+            .visibility(&end(a), &end(b), 7)
     }
 
     #[test]
@@ -532,8 +538,7 @@ mod tests {
         let [a, b] = ends(&forest)[..] else { unreachable!() };
         let end = |id| Spread::new(&forest, &view, id, None);
         let candidates = GroupSight::between(&forest, &view, a, b);
-        let sight =
-            GroupSight { forest: &forest, view: &view, common: None, candidates: &candidates };
+        let sight = sight_of(&forest, &view, &candidates);
         // Rays of one pair are few and follow a fixed pattern: sixteen pairs of the same ends.
         let pairs: Vec<_> = (0..16).map(|key| sight.by_facets(&end(a), &end(b), key)).collect();
         let over_pairs = |of: &dyn Fn(&FacetSight) -> f64| pairs.iter().map(of).sum::<f64>() / 16.0;
@@ -564,8 +569,7 @@ mod tests {
         let [a, b] = ends(&forest)[..] else { unreachable!() };
         let end = |id| Spread::new(&forest, &view, id, None);
         let candidates = GroupSight::between(&forest, &view, a, b);
-        let sight =
-            GroupSight { forest: &forest, view: &view, common: None, candidates: &candidates };
+        let sight = sight_of(&forest, &view, &candidates);
         for (one, other) in [(a, b), (b, a)] {
             let seen = sight.by_facets(&end(one), &end(other), 7);
             assert_eq!(seen.mean, 1.0);

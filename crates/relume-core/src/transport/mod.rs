@@ -8,6 +8,7 @@ mod bend;
 mod clip;
 mod contact;
 mod contour;
+mod crowd;
 mod exchange;
 mod group;
 mod kernel;
@@ -24,6 +25,7 @@ mod visibility;
 pub use bend::{Bend, Receiver};
 pub use clip::keep_in_front;
 pub use contact::{in_plane, lies_in, overlap_m2};
+pub use crowd::{Crowd, light_past_crowd};
 pub use exchange::{
     Exchange, Meeting, Variation, contact_exchange, exchange, exchange_by_points,
     exchange_of_points, light_at, light_exchange, meeting,

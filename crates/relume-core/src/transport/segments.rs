@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::kernel::Simd;
 use crate::element::{OccluderPolygon, WorldElement, bilinear_area};
+use crate::geometry::Aabb;
 
 /// Segments in a bundle.
 pub const SEGMENTS: usize = 16;
@@ -87,6 +88,22 @@ impl SegmentBundle {
         out
     }
 
+    /// Segments between given ends, which carry nothing.
+    pub fn of_ends(ends: &[[DVec3; 2]; SEGMENTS]) -> SegmentBundle {
+        let of = |part: fn(&[DVec3; 2]) -> f64| ends.each_ref().map(part);
+        SegmentBundle {
+            px: of(|[p, _]| p.x),
+            py: of(|[p, _]| p.y),
+            pz: of(|[p, _]| p.z),
+            dx: of(|[p, q]| q.x - p.x),
+            dy: of(|[p, q]| q.y - p.y),
+            dz: of(|[p, q]| q.z - p.z),
+            weight: [0.0; SEGMENTS],
+            quadrant_a: [0; SEGMENTS],
+            quadrant_b: [0; SEGMENTS],
+        }
+    }
+
     fn set(
         &mut self,
         k: usize,
@@ -129,6 +146,39 @@ impl SegmentBundle {
     pub fn ends(&self, k: usize) -> (DVec3, DVec3) {
         let p = DVec3::new(self.px[k], self.py[k], self.pz[k]);
         (p, p + DVec3::new(self.dx[k], self.dy[k], self.dz[k]))
+    }
+
+    /// One bit for each segment that meets a box grown by a margin. Conservative.
+    pub fn that_meet(&self, simd: Simd, bounds: &Aabb, margin_m: f64) -> u16 {
+        dispatch!(simd.level(), _simd => self.meeting(bounds, margin_m))
+    }
+
+    /// By separating axes: those of the box, and its edges' with the segment.
+    #[inline(always)]
+    fn meeting(&self, bounds: &Aabb, margin_m: f64) -> u16 {
+        let (centre, half) = (bounds.centre(), 0.5 * bounds.extent() + margin_m);
+        // Kept as numbers so that the loop stays free of branches: >= 0 means that no axis separates.
+        let mut room = [0.0_f64; SEGMENTS];
+        for k in 0..SEGMENTS {
+            let (ex, ey, ez) = (0.5 * self.dx[k], 0.5 * self.dy[k], 0.5 * self.dz[k]);
+            let (x, y, z) = (
+                self.px[k] + ex - centre.x,
+                self.py[k] + ey - centre.y,
+                self.pz[k] + ez - centre.z,
+            );
+            let (ax, ay, az) = (ex.abs(), ey.abs(), ez.abs());
+            let by_box =
+                (half.x + ax - x.abs()).min(half.y + ay - y.abs()).min(half.z + az - z.abs());
+            let across_x = half.y * az + half.z * ay - (ey * z - ez * y).abs();
+            let across_y = half.z * ax + half.x * az - (ez * x - ex * z).abs();
+            let across_z = half.x * ay + half.y * ax - (ex * y - ey * x).abs();
+            room[k] = by_box.min(across_x).min(across_y).min(across_z);
+        }
+        let mut mask = 0;
+        for (k, &room) in room.iter().enumerate() {
+            mask |= u16::from(room >= 0.0) << k;
+        }
+        mask
     }
 
     /// One bit for each segment that crosses the polygon, boundary included.

@@ -91,6 +91,14 @@ pub(super) const BEND_FAR: f64 = 0.03;
 /// - Smaller: noise of sampling
 pub const CLIPPED_MAX: usize = 12;
 
+/// Area of a blocker that is in a group, over that of the connected patches that it belongs to, at least: a face of a cube.
+///
+/// - Unit: 1
+/// - Tried: 0, 1/6
+/// - Larger: elements in shadows of small things weigh less
+/// - Smaller: with 0 triangles of a ball count as things of their own, and elements in its shadow are split to the size of these
+pub(super) const BODY_SHARE: f64 = 1.0 / 6.0;
+
 /// Error of visibility from four points that all see a part of the other end, over its spread between them.
 ///
 /// - Unit: 1

@@ -14,6 +14,7 @@ use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use super::share::Visibility;
 use super::side::Side;
 use super::spot::spot;
+use super::tuning::BODY_SHARE;
 use glam::{DVec2, DVec3};
 
 /// Candidate occluders of a pair: nodes of the forest's fixed part (clusters and patch roots) that may stand between its ends.
@@ -42,15 +43,24 @@ const COVER: f64 = 0.5;
 
 /// How far a polygon that lies on an end is lifted off it, in slacks: more than anything that is
 /// disregarded because it is close to an end.
-const LIFT: f64 = 8.0;
+pub(super) const LIFT: f64 = 8.0;
 
 /// Patches in the shaft of a pair.
 #[derive(Clone, Debug, Default)]
 pub struct InShaft {
-    /// Those that block.
+    /// Those that block; none where they are a crowd.
     pub blockers: Vec<PatchId>,
     /// Those that emit light at any time; they may block as well or not.
     pub lamps: Vec<PatchId>,
+    /// Whether more block than were to be listed.
+    pub is_crowd: bool,
+}
+
+impl InShaft {
+    /// Whether nothing blocks.
+    pub fn is_clear(&self) -> bool {
+        self.blockers.is_empty() && !self.is_crowd
+    }
 }
 
 /// Sizes of the blockers between two ends; infinite where there are none.
@@ -83,7 +93,7 @@ impl BlockerSizes {
 
 /// Relation of a patch to a shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Standing {
+pub(super) enum Standing {
     /// It blocks neither this pair nor any below it.
     Out,
     /// It may be a blocker of a pair below this one.
@@ -102,13 +112,13 @@ struct SeenEnds<'a> {
 }
 
 /// Shafts of the ends' boxes: in the world, and in the frame of the body that both ride on.
-struct ShaftsOfBoxes {
+pub(super) struct ShaftsOfBoxes {
     world: ShaftOfBoxes,
     own: Option<ShaftOfBoxes>,
 }
 
 /// A polygon, moved.
-struct Lifted<'a> {
+pub(super) struct Lifted<'a> {
     polygon: OccluderPolygon<'a>,
     by: DVec3,
 }
@@ -120,7 +130,7 @@ impl<'a> Lifted<'a> {
     }
 
     /// For tests that use the planes; a move along the normal leaves those of the edges as they are.
-    fn polygon(&self) -> OccluderPolygon<'a> {
+    pub(super) fn polygon(&self) -> OccluderPolygon<'a> {
         let plane = self.polygon.plane;
         let offset = plane.offset + plane.normal.dot(self.by);
         OccluderPolygon { plane: Plane { offset, ..plane }, ..self.polygon }
@@ -146,7 +156,7 @@ fn reach(plane: &Plane, a: &WorldElement, b: &WorldElement) -> f64 {
 }
 
 impl<'a> Shaft<'a> {
-    fn slack(&self) -> f64 {
+    pub(super) fn slack(&self) -> f64 {
         self.a.rounding_m + self.b.rounding_m
     }
 
@@ -159,7 +169,7 @@ impl<'a> Shaft<'a> {
         }
     }
 
-    fn shafts(&self) -> ShaftsOfBoxes {
+    pub(super) fn shafts(&self) -> ShaftsOfBoxes {
         ShaftsOfBoxes {
             world: ShaftOfBoxes::new(&self.a.bounds, &self.b.bounds),
             own: self.own.map(|(_, a, b)| ShaftOfBoxes::new(&a.bounds, &b.bounds)),
@@ -173,7 +183,7 @@ impl<'a> Shaft<'a> {
     }
 
     /// Relation of a patch to the shaft.
-    fn standing(&self, shafts: &ShaftsOfBoxes, patch: PatchId) -> Standing {
+    pub(super) fn standing(&self, shafts: &ShaftsOfBoxes, patch: PatchId) -> Standing {
         if patch == self.patches.0 || patch == self.patches.1 || self.view.is_hidden_twin(patch) {
             return Standing::Out;
         }
@@ -256,17 +266,25 @@ impl<'a> Shaft<'a> {
         most
     }
 
-    /// Sizes of some blockers and lamps.
+    /// Sizes of some blockers and lamps; of a crowd the blockers are those that stand for it.
     pub fn sizes_of(
         &self,
-        InShaft { blockers, lamps }: &InShaft,
+        InShaft { blockers, lamps, .. }: &InShaft,
         around_m2: (f64, f64),
     ) -> BlockerSizes {
         let spots = self.spots(lamps, around_m2);
         if blockers.is_empty() {
             return BlockerSizes { spots, ..BlockerSizes::NOTHING };
         }
-        let area = |&patch: &PatchId| self.forest.area_m2(self.forest.patch_root(patch));
+        let area = |&patch: &PatchId| {
+            let root = self.forest.patch_root(patch);
+            let own = self.forest.area_m2(root);
+            // The shadow of a finely tessellated body has the size of the body.
+            match self.forest.is_in_group(root) {
+                true => own.max(BODY_SHARE * self.forest.connected_m2(patch)),
+                false => own,
+            }
+        };
         let mut sizes = BlockerSizes {
             spots,
             least_m2: blockers.iter().map(area).fold(f64::INFINITY, f64::min),
@@ -338,7 +356,7 @@ impl<'a> Shaft<'a> {
 
     /// A blocker where it blocks, and whether that is in the frame of the pair's own body: polygons
     /// that cover an end are lifted clear of it.
-    fn lifted(&self, patch: PatchId) -> (bool, Lifted<'a>) {
+    pub(super) fn lifted(&self, patch: PatchId) -> (bool, Lifted<'a>) {
         let (own, a, b) = self.seen_by(Some(self.view.patch(patch).body));
         let polygon =
             if own { self.view.occluder_in_body(patch) } else { self.view.occluder(patch) };
@@ -382,29 +400,27 @@ impl<'a> Shaft<'a> {
         out
     }
 
-    /// [`Shaft::narrow`] and [`Shaft::blockers`] in one walk.
-    pub fn narrow_to_blockers(&self, parents: &Candidates, out: &mut Vec<u32>) -> InShaft {
+    /// [`Shaft::narrow`] and [`Shaft::blockers`] in one walk; of more blockers than `listed_max` none are listed.
+    pub fn narrow_to_blockers(
+        &self,
+        parents: &Candidates,
+        out: &mut Vec<u32>,
+        listed_max: usize,
+    ) -> InShaft {
         let (shafts, keep_m) = (self.shafts(), self.keep_m());
         let mut found = InShaft::default();
-        let mut meet = |patch: PatchId, standing: Standing| {
-            if standing == Standing::Between {
-                found.blockers.push(patch);
-            }
-            if self.forest.glows(patch) {
-                found.lamps.push(patch);
-            }
-        };
         for &parent in parents {
             self.walk(&shafts, ElementId(parent), keep_m, &mut |id, standing| {
                 out.push(id.0);
                 match self.forest.patch(id) {
-                    Some(patch) => meet(patch, standing),
+                    Some(patch) => self.meet((patch, standing), listed_max, &mut found),
+                    None if found.is_crowd && !self.forest.may_glow(id) => {}
                     None => {
-                        self.walk(&shafts, id, -1.0, &mut |id, standing| {
-                            if let Some(patch) = self.forest.patch(id) {
-                                meet(patch, standing);
+                        self.walk(&shafts, id, -1.0, &mut |below, standing| {
+                            if let Some(patch) = self.forest.patch(below) {
+                                self.meet((patch, standing), listed_max, &mut found);
                             }
-                            true
+                            !found.is_crowd || self.forest.may_glow(id)
                         });
                     }
                 }
@@ -412,6 +428,20 @@ impl<'a> Shaft<'a> {
             });
         }
         found
+    }
+
+    /// Lists a patch that is not out of the shaft.
+    fn meet(&self, (patch, standing): (PatchId, Standing), listed_max: usize, found: &mut InShaft) {
+        if standing == Standing::Between && !found.is_crowd {
+            found.blockers.push(patch);
+            if found.blockers.len() > listed_max {
+                found.is_crowd = true;
+                found.blockers.clear();
+            }
+        }
+        if self.forest.glows(patch) {
+            found.lamps.push(patch);
+        }
     }
 
     /// Blockers of this pair among those of a pair above.
@@ -645,7 +675,7 @@ pub fn light_visibility(
 
 /// Weighted sums over segments, of all and of the clear ones.
 #[derive(Default)]
-struct Tally {
+pub(super) struct Tally {
     a: SideTally,
     b: SideTally,
 }
@@ -690,7 +720,13 @@ impl SideTally {
 }
 
 impl Tally {
-    fn add(&mut self, bundle: &SegmentBundle, mask: u16, a: &WorldElement, b: &WorldElement) {
+    pub(super) fn add(
+        &mut self,
+        bundle: &SegmentBundle,
+        mask: u16,
+        a: &WorldElement,
+        b: &WorldElement,
+    ) {
         let dark = bundle.weight.iter().all(|&w| w <= 0.0);
         for k in 0..SEGMENTS {
             // A pair that hardly faces itself has no weights: all segments count alike.
@@ -702,7 +738,7 @@ impl Tally {
         }
     }
 
-    fn finish(&self, segments: u32, a: &WorldElement, b: &WorldElement) -> Visibility {
+    pub(super) fn finish(&self, segments: u32, a: &WorldElement, b: &WorldElement) -> Visibility {
         let (total, clear): (f64, f64) = (self.a.total.iter().sum(), self.a.clear.iter().sum());
         let value = (clear / total).clamp(0.0, 1.0);
         Visibility {
@@ -759,7 +795,7 @@ mod tests {
     use super::*;
     use crate::element::Shape;
     use crate::scene::{Scene, SceneBuilder};
-    use crate::transport::CLIPPED_MAX;
+    use crate::transport::{CLIPPED_MAX, Crowd};
     use glam::DQuat;
 
     /// Floor and ceiling, both double-sided if wanted, and what `fill` adds: V of their inner sides.
@@ -844,6 +880,27 @@ mod tests {
         b.build().unwrap()
     }
 
+    /// What blocks a pair is not listed where it is more than asked for, and segments find it all the same.
+    fn past_a_crowd(pair: &Shaft<'_>, handed: &Candidates, blockers: &[PatchId]) {
+        let Some(most) = blockers.len().checked_sub(1) else { return };
+        let (simd, mut narrowed) = (Simd::detect(), Vec::new());
+        let found = pair.narrow_to_blockers(handed, &mut narrowed, most);
+        assert!(found.is_crowd && found.blockers.is_empty() && !found.is_clear());
+        let crowd = Crowd { shaft: pair, candidates: &narrowed, simd };
+        let listed = |log2_count| visibility(simd, pair, blockers, 7, log2_count);
+        let (first, sample) = crowd.first_look(7);
+        assert_eq!(first, listed(4));
+        assert_eq!(crowd.visibility(7, 6), listed(6));
+        let world = SegmentBundle::new(pair.a, pair.b, 7, 4, 0);
+        let hits = |&patch: &PatchId| {
+            let polygon = pair.lifted(patch).1.polygon();
+            world.blocked_by(simd, &polygon, 2.0 * pair.slack()) != 0
+        };
+        let mut want: Vec<PatchId> = blockers.iter().copied().filter(hits).collect();
+        want.sort_unstable();
+        assert_eq!(sample, want);
+    }
+
     /// What segments between two slivers cross is among their blockers, and among the candidates of every
     /// pair above them; and the walk for both at once finds what either finds alone.
     #[test]
@@ -877,7 +934,9 @@ mod tests {
                 shaft(&above.0, &above.1).narrow(&[Forest::ROOT.0], &mut handed);
                 let pair = shaft(&a, &b);
                 let blockers = pair.blockers(&[Forest::ROOT.0]);
-                assert_eq!(pair.narrow_to_blockers(&handed, &mut both).blockers, blockers);
+                let listed = pair.narrow_to_blockers(&handed, &mut both, usize::MAX);
+                assert_eq!(listed.blockers, blockers);
+                past_a_crowd(&pair, &handed, &blockers);
                 let mut alone = Vec::new();
                 pair.narrow(&handed, &mut alone);
                 assert_eq!(both, alone);

@@ -1,9 +1,10 @@
 //! Visibility of pairs with a group as an end, over fixed segments and rays.
 
-use crate::element::{ElementId, Forest, WorldView, bilinear_area};
+use crate::element::{ElementId, Forest, OccluderPolygon, WorldView, bilinear_area};
 use crate::geometry::{Aabb, Pose, ShaftOfBoxes};
 use crate::scene::{BodyId, PatchId};
-use crate::transport::segments::EDGE_OVERLAP;
+use crate::transport::kernel::Simd;
+use crate::transport::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use glam::DVec3;
 
 use super::super::tuning::FACET_RAYS;
@@ -19,6 +20,8 @@ pub struct GroupSight<'a> {
     pub common: Option<BodyId>,
     /// Candidate occluders.
     pub candidates: &'a [u32],
+    /// Vector instructions.
+    pub simd: Simd,
 }
 
 impl GroupSight<'_> {
@@ -32,21 +35,31 @@ impl GroupSight<'_> {
         }
         let from = a.samples(self.forest, self.view, b, key);
         let to = b.samples(self.forest, self.view, a, key.rotate_left(32));
-        let (mut clear, mut all) = (0.0, 0.0);
-        let mut stack = Vec::with_capacity(64);
+        let mut lines = Vec::with_capacity(SEGMENTS);
+        let mut weights = Vec::with_capacity(SEGMENTS);
         for k in 0..GROUP_SEGMENTS as usize {
             let other = (k as u32).reverse_bits() as usize >> 28;
             // What is behind one of the planes is out of sight: candidates may leave out what would block it.
             let way = to.points[other] - from.points[k];
             let faces = from.normals[k].dot(way) > 0.0 && to.normals[other].dot(way) < 0.0;
             let weight = if faces { from.weights[k] * to.weights[other] } else { 0.0 };
-            all += weight;
-            let ends = [(from.points[k], from.patches[k]), (to.points[other], to.patches[other])];
-            if weight > 0.0 && !self.is_blocked(&candidates, ends, (a, b), &mut stack) {
-                clear += weight;
+            if weight > 0.0 {
+                let (points, patches) =
+                    ([from.points[k], to.points[other]], [from.patches[k], to.patches[other]]);
+                lines.push(Line { points, patches });
+                weights.push(weight);
             }
         }
-        if all <= 0.0 { (1.0, GROUP_SEGMENTS) } else { (clear / all, GROUP_SEGMENTS) }
+        if lines.is_empty() {
+            return (1.0, GROUP_SEGMENTS);
+        }
+        let blocked = self.blocked(&candidates, &lines, (a, b), &mut Vec::with_capacity(64));
+        let (mut clear, mut all) = (0.0, 0.0);
+        for (k, weight) in weights.into_iter().enumerate() {
+            all += weight;
+            clear += if blocked >> k & 1 == 1 { 0.0 } else { weight };
+        }
+        (clear / all, GROUP_SEGMENTS)
     }
 
     /// Whether what is at or below a node may be in the way of facets that see the other end: not what a convex group
@@ -59,55 +72,83 @@ impl GroupSight<'_> {
         })
     }
 
-    fn is_blocked(
+    /// Which of at most sixteen lines of sight are blocked: a bit each.
+    fn blocked(
         &self,
         candidates: &[u32],
-        [(p, on_p), (q, on_q)]: [(DVec3, u32); 2],
-        (a, b): (&Spread<'_>, &Spread<'_>),
+        lines: &[Line],
+        ends: (&Spread<'_>, &Spread<'_>),
         stack: &mut Vec<ElementId>,
-    ) -> bool {
+    ) -> u16 {
         let (forest, view) = (self.forest, self.view);
         let pose = self.common.map(|body| view.poses()[body.0 as usize].unwrap_or(Pose::IDENTITY));
-        let world = match &pose {
-            Some(pose) => (pose.point(p), pose.point(q)),
-            None => (p, q),
+        let in_world = |line: &Line| match &pose {
+            Some(pose) => line.points.map(|p| pose.point(p)),
+            None => line.points,
         };
-        let rounding = |patch: u32| match patch {
-            u32::MAX => 0.0,
-            patch => view.patch(PatchId(patch)).rounding_m,
-        };
-        let slack_m = 4.0 * (rounding(on_p) + rounding(on_q));
-        let segment = ShaftOfBoxes::new(&Aabb::of([world.0]), &Aabb::of([world.1]));
+        let mut world = [[DVec3::ZERO; 2]; SEGMENTS];
+        world.iter_mut().zip(lines).for_each(|(world, line)| *world = in_world(line));
+        let bundle = SegmentBundle::of_ends(&world);
+        let margin_m = lines.iter().map(|line| line.slack_m(view)).fold(0.0, f64::max);
+        let all = u16::MAX >> (SEGMENTS - lines.len());
+        let mut clear = all;
         stack.clear();
         stack.extend(candidates.iter().map(|&id| ElementId(id)));
-        while let Some(id) = stack.pop() {
+        while let Some(id) = stack.pop().filter(|_| clear != 0) {
             let bounds = view.fixed_box(id);
-            if bounds.is_empty() || !segment.meets(bounds, slack_m) || !self.may_block(id.0, a, b) {
+            if bounds.is_empty() {
+                continue;
+            }
+            let met = bundle.that_meet(self.simd, bounds, margin_m) & clear;
+            if met == 0 || !self.may_block(id.0, ends.0, ends.1) {
                 continue;
             }
             let Some(patch) = forest.patch(id) else {
                 stack.extend(forest.children(id).map(ElementId));
                 continue;
             };
-            if patch.0 == on_p || patch.0 == on_q || view.is_hidden_twin(patch) {
+            if view.is_hidden_twin(patch) {
                 continue;
             }
             let rides = self.common.is_some() && Some(view.patch(patch).body) == self.common;
-            let (polygon, (p, q)) = match rides {
-                true => (view.occluder_in_body(patch), (p, q)),
-                false => (view.occluder(patch), world),
-            };
-            let (s0, s1) = (polygon.plane.distance(p), polygon.plane.distance(q));
-            if s0.min(s1) >= -slack_m || s0.max(s1) <= slack_m {
-                continue;
-            }
-            let x = p + (q - p) * (s0 / (s0 - s1));
-            if polygon.edges.iter().all(|e| e.distance(x) >= -EDGE_OVERLAP * slack_m) {
-                return true;
+            let polygon = if rides { view.occluder_in_body(patch) } else { view.occluder(patch) };
+            for k in (0..lines.len()).filter(|k| met >> k & 1 == 1) {
+                let line = &lines[k];
+                let ends = if rides { line.points } else { world[k] };
+                let blocks =
+                    !line.patches.contains(&patch.0) && crosses(&polygon, ends, line.slack_m(view));
+                clear &= !(u16::from(blocks) << k);
             }
         }
-        false
+        all & !clear
     }
+}
+
+/// A line of sight in the frame of a pair: its ends, and the patches that they are on.
+#[derive(Clone, Copy)]
+struct Line {
+    points: [DVec3; 2],
+    patches: [u32; 2],
+}
+
+impl Line {
+    fn slack_m(&self, view: &WorldView) -> f64 {
+        let rounding = |patch: u32| match patch {
+            u32::MAX => 0.0,
+            patch => view.patch(PatchId(patch)).rounding_m,
+        };
+        4.0 * (rounding(self.patches[0]) + rounding(self.patches[1]))
+    }
+}
+
+/// Whether a segment crosses a polygon, and not only comes close to it.
+fn crosses(polygon: &OccluderPolygon<'_>, [p, q]: [DVec3; 2], slack_m: f64) -> bool {
+    let (s0, s1) = (polygon.plane.distance(p), polygon.plane.distance(q));
+    if s0.min(s1) >= -slack_m || s0.max(s1) <= slack_m {
+        return false;
+    }
+    let x = p + (q - p) * (s0 / (s0 - s1));
+    polygon.edges.iter().all(|e| e.distance(x) >= -EDGE_OVERLAP * slack_m)
 }
 
 /// Visibilities between the facets of two ends.
@@ -207,6 +248,13 @@ struct Ray {
     to: Aim,
 }
 
+impl Ray {
+    fn line(&self) -> Line {
+        let Ray { from, to, .. } = self;
+        Line { points: [from.at, to.at], patches: [from.patch, to.patch] }
+    }
+}
+
 /// The rays of a pair.
 struct Rays<'a> {
     /// The end that has more facets, and the other.
@@ -259,15 +307,20 @@ impl GroupSight<'_> {
         let (mut seen_many, mut seen_few) =
             (Tally::new(of_many.facets.len()), Tally::new(of_few.facets.len()));
         let (mut stack, mut clear_sum, mut sum) = (Vec::with_capacity(64), 0.0, 0.0);
-        for Ray { facets: (k, j), from, to } in rays.all(self) {
-            let ends = [(from.at, from.patch), (to.at, to.patch)];
-            let clear = !self.is_blocked(self.candidates, ends, (many, few), &mut stack);
-            let weight = from.weight * to.weight;
-            let of_ray = weight * of_many.weights[k];
-            seen_many.add(k, weight, clear);
-            seen_few.add(j, of_ray, clear);
-            sum += of_ray;
-            clear_sum += if clear { of_ray } else { 0.0 };
+        let mut all = rays.all(self).peekable();
+        while all.peek().is_some() {
+            let bundle: Vec<Ray> = all.by_ref().take(SEGMENTS).collect();
+            let lines: Vec<Line> = bundle.iter().map(Ray::line).collect();
+            let blocked = self.blocked(self.candidates, &lines, (many, few), &mut stack);
+            for (n, Ray { facets: (k, j), from, to }) in bundle.into_iter().enumerate() {
+                let clear = blocked >> n & 1 == 0;
+                let weight = from.weight * to.weight;
+                let of_ray = weight * of_many.weights[k];
+                seen_many.add(k, weight, clear);
+                seen_few.add(j, of_ray, clear);
+                sum += of_ray;
+                clear_sum += if clear { of_ray } else { 0.0 };
+            }
         }
         if sum <= 0.0 {
             return FacetSight::default();

@@ -467,8 +467,16 @@ fn the_floor_under_a_crate_that_is_taken_away_is_lit() {
     assert!((floor(&mut session, 3.0) / beside - 1.0).abs() < 1e-3);
 }
 
+/// What stands in a hall.
+#[derive(Clone, Copy, PartialEq)]
+enum Contents {
+    Boxes,
+    /// Every other one a ball of many patches, which are grouped.
+    BallsToo,
+}
+
 /// A room with many boxes, a small one among them; its fifth body.
-fn hall(boxes: u32) -> Scene {
+fn hall(boxes: u32, what: Contents) -> Scene {
     let mut b = SceneBuilder::new("hall");
     let grey = b.material("grey", [0.5; 3], [0.0; 3]);
     let glow = b.material("glow", [0.1; 3], [9.0, 8.0, 7.0]);
@@ -480,7 +488,10 @@ fn hall(boxes: u32) -> Scene {
     for k in 0..boxes {
         let half = if k == 3 { 0.02 } else { 0.04 + 0.04 * r.unit() };
         let at = [k % 4, k / 4 % 4, k / 16].map(|n| 0.42 * f64::from(n) - 0.63 + 0.1 * r.unit());
-        let (corners, triangles) = cube(half, false);
+        let (corners, triangles) = match k % 2 == 0 && what == Contents::BallsToo {
+            true => ball(DVec3::ZERO, half),
+            false => cube(half, false),
+        };
         let corners: Vec<[f64; 3]> =
             corners.iter().map(|c| [0, 1, 2].map(|axis| c[axis] + at[axis])).collect();
         let body = b.body(&format!("box {k}"));
@@ -489,63 +500,105 @@ fn hall(boxes: u32) -> Scene {
     b.build().unwrap()
 }
 
-/// Solves, and says what it cost: pairs looked at, and seconds.
+/// Cost of a frame.
+#[derive(Clone, Copy)]
+struct Cost {
+    /// Pairs looked at.
+    pairs: u64,
+    seconds: f64,
+}
+
+/// Solves, and says what it cost.
 #[allow(clippy::disallowed_methods)] // seconds are printed, and decide nothing
-fn cost(session: &mut Session, what: &str) -> u64 {
+fn cost(session: &mut Session, what: &str) -> Cost {
     let start = Instant::now();
     let report = session.solve().unwrap().report().clone();
-    let (pairs, all) =
-        (report.work.examined + report.work.coarse_examined, start.elapsed().as_secs_f64());
-    let (links, of_pairs) = (report.links, report.seconds.evaluate);
-    println!("{what}: {pairs} pairs looked at, {of_pairs:.2} s; {all:.2} s in all, {links} links");
-    pairs
+    let cost = Cost {
+        pairs: report.work.examined + report.work.coarse_examined,
+        seconds: start.elapsed().as_secs_f64(),
+    };
+    let s = report.seconds;
+    println!(
+        "{what}: {} pairs looked at, {:.2} s (move {:.2}, predict {:.2}, pairs {:.2}, edit {:.2}, solve {:.2}), {} links",
+        cost.pairs, cost.seconds, s.moving, s.predict, s.evaluate, s.edit, s.solve, report.links
+    );
+    cost
 }
 
-/// Costs of a cold build; of moving, inserting and removing a small body; of taking a box up and putting it down again.
-fn costs_of_edits(scene: &Scene, options: Options) -> [u64; 8] {
+/// Costs of edits of a scene.
+struct Costs {
+    cold: Cost,
+    /// Of moving the box that comes and goes.
+    moved: Cost,
+    edits: Vec<Cost>,
+}
+
+/// Costs of a small box that comes, moves and leaves, and of another one that is taken up, moved, taken out, put back, and put
+/// down where it was.
+fn costs_of_edits(scene: &Scene, options: Options) -> [Costs; 2] {
     let mut session = Session::new(scene.clone(), options).unwrap();
-    let all = cost(&mut session, "cold");
-    let move_to = |session: &mut Session, x: f64, what: &str| {
-        let pose = Pose::translation([x, 0.02, -0.01]);
-        session.apply(Command::set_pose(BodyId(4), pose)).unwrap();
-        cost(session, what)
+    let cold = cost(&mut session, "cold");
+    let place = |session: &mut Session, body: BodyId, to: Option<DVec3>| {
+        let pose = to.map(Pose::translation);
+        session.apply(Command::SetPose(body, pose)).unwrap();
     };
-    let first = move_to(&mut session, 0.03, "take hold of it");
-    let again = move_to(&mut session, 0.06, "move it");
     let (corners, triangles) = cube(0.02, false);
-    let shifted: Vec<[f64; 3]> = corners.iter().map(|c| [c[0] + 0.05, c[1], c[2]]).collect();
-    let new = NewBody::new("new").with_mesh("new", MaterialId(0), &shifted, &triangles);
-    let back = session.apply(Command::Insert(new)).unwrap();
-    let inserted = cost(&mut session, "insert one");
-    session.apply(back).unwrap();
+    let new = NewBody::new("new").with_mesh("new", MaterialId(0), &corners, &triangles);
+    let new_body = BodyId(scene.bodies.len() as u32);
+    let out = session.apply(Command::Insert(new)).unwrap();
+    place(&mut session, new_body, Some(v(0.05, 0.0, 0.0)));
+    let inserted = cost(&mut session, "insert a box");
+    place(&mut session, new_body, Some(v(0.08, 0.02, -0.01)));
+    let moved = cost(&mut session, "move it");
+    session.apply(out).unwrap();
     let removed = cost(&mut session, "remove it");
-    let back = session.apply(Command::Remove(BodyId(4))).unwrap();
-    let made = cost(&mut session, "remove the other");
+    let of_new = Costs { cold, moved, edits: vec![inserted, removed] };
+
+    let own = BodyId(4);
+    place(&mut session, own, Some(v(0.03, 0.02, -0.01)));
+    let hold = cost(&mut session, "take hold of another one");
+    place(&mut session, own, Some(v(0.06, 0.02, -0.01)));
+    let moved = cost(&mut session, "move it");
+    let back = session.apply(Command::Remove(own)).unwrap();
+    let removed = cost(&mut session, "remove it");
     session.apply(back).unwrap();
     let returned = cost(&mut session, "put it back");
-    session.apply(Command::SetPose(BodyId(4), None)).unwrap();
-    [all, first, again, inserted, removed, made, returned, cost(&mut session, "let it go")]
+    place(&mut session, own, None);
+    let release = cost(&mut session, "let it go");
+    [of_new, Costs { cold, moved, edits: vec![hold, removed, returned, release] }]
 }
 
-/// Asserts that no edit of a scene costs more than twice what moving its small body does.
-fn edits_cost_as_moves(scene: &Scene, options: Options) {
-    let [cold, hold, moved, inserted, removed, taken, back, release] =
-        costs_of_edits(scene, options);
-    assert!(4 * moved < cold, "{moved} of {cold} pairs");
-    for cost in [hold, inserted, removed, taken, back, release] {
-        assert!(cost <= 2 * moved, "{cost}, and {moved} for a move");
+/// Asserts that no edit of a scene costs more than twice the pairs that moving its small body does; returns by how much more
+/// time the dearest one takes.
+fn edits_cost_as_moves(scene: &Scene, options: Options) -> f64 {
+    let mut most = 0.0_f64;
+    for Costs { cold, moved, edits } in costs_of_edits(scene, options) {
+        assert!(4 * moved.pairs < cold.pairs, "{} of {} pairs", moved.pairs, cold.pairs);
+        for edit in edits {
+            assert!(
+                edit.pairs <= 2 * moved.pairs,
+                "{} pairs, and {} for a move",
+                edit.pairs,
+                moved.pairs
+            );
+            most = most.max(edit.seconds / moved.seconds);
+        }
+    }
+    most
+}
+
+#[test]
+#[ignore = "minutes: two million links"]
+fn edits_in_a_scene_of_two_million_links_cost_as_moves() {
+    for (what, tolerance) in [(Contents::Boxes, 0.001), (Contents::BallsToo, 0.02)] {
+        let times = edits_cost_as_moves(&hall(60, what), at_tolerance(tolerance));
+        assert!(times < 2.0, "{times} times the seconds of a move");
     }
 }
 
 #[test]
-#[ignore = "minutes: a million links"]
-fn edits_in_a_scene_of_a_million_links_cost_as_moves() {
-    edits_cost_as_moves(&hall(60), Options { groups: false, ..at_tolerance(0.002) });
-}
-
-#[test]
 fn a_body_that_comes_or_goes_costs_as_one_that_moves() {
-    edits_cost_as_moves(&hall(8), at_tolerance(0.1));
+    edits_cost_as_moves(&hall(8, Contents::Boxes), at_tolerance(0.1));
 }
 
 #[test]
@@ -607,7 +660,7 @@ fn edits_come_to_the_same_on_any_number_of_threads() {
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let mut session = Session::new(hall(5), at_tolerance(0.2)).unwrap();
+            let mut session = Session::new(hall(5, Contents::Boxes), at_tolerance(0.2)).unwrap();
             let mut r = Random(9);
             let mut hashes = vec![session.solve().unwrap().hash()];
             let mut inverses = Vec::new();

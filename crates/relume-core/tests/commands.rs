@@ -199,6 +199,18 @@ fn bodies_come_and_go() {
 }
 
 #[test]
+fn a_lamp_behind_one_end_of_a_pair_lights_the_other_unevenly_however_it_was_found() {
+    follow(&room(), 1_370..1_371, 4, 0.15);
+    follow(&room(), 1_612..1_613, 8, 0.15);
+}
+
+#[test]
+fn light_that_grows_changes_which_side_of_a_steep_pair_is_refined() {
+    // A lamp that sticks in a wall; a crate comes into its light.
+    follow(&room(), 1_122..1_123, 8, 0.15);
+}
+
+#[test]
 fn hands_take_hold_of_a_clip_that_plays() {
     for name in ["box_room.glb", "cornell_moving_box_and_lamp.glb"] {
         follow(&shipped(name), 200..202, 5, 0.1);
@@ -387,12 +399,27 @@ fn a_solve_is_called_off_and_the_next_one_is_not() {
     check(&mut session, "called off while bodies come and go");
 }
 
+/// All logs, or those of `RELUME_SEEDS=first..end`.
 #[test]
 #[ignore = "minutes: a thousand logs"]
 fn a_thousand_logs() {
-    follow(&room(), 1_000..1_800, 8, 0.15);
-    follow(&shipped("box_room.glb"), 2_000..2_100, 8, 0.1);
-    follow(&shipped("cornell_moving_box_and_lamp.glb"), 3_000..3_100, 8, 0.1);
+    let wanted = std::env::var("RELUME_SEEDS").map_or(0..u64::MAX, |seeds| {
+        let (first, end) = seeds.split_once("..").expect("RELUME_SEEDS=first..end");
+        first.parse().unwrap()..end.parse().unwrap()
+    });
+    let scenes = [
+        (room(), 1_000..1_800, 0.15),
+        (shipped("box_room.glb"), 2_000..2_100, 0.1),
+        (shipped("cornell_moving_box_and_lamp.glb"), 3_000..3_100, 0.1),
+    ];
+    let mut failed = Vec::new();
+    for (scene, seeds, insert) in scenes {
+        for seed in seeds.filter(|seed| wanted.contains(seed)) {
+            let one = || follow(&scene, seed..seed + 1, 8, insert);
+            failed.extend(std::panic::catch_unwind(one).is_err().then_some(seed));
+        }
+    }
+    assert_eq!(failed, Vec::<u64>::new());
 }
 
 #[test]
@@ -501,7 +528,7 @@ fn hall(boxes: u32, what: Contents) -> Scene {
 }
 
 /// Cost of a frame.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Cost {
     /// Pairs looked at.
     pairs: u64,
@@ -533,72 +560,79 @@ struct Costs {
     edits: Vec<Cost>,
 }
 
-/// Costs of a small box that comes, moves and leaves, and of another one that is taken up, moved, taken out, put back, and put
-/// down where it was.
-fn costs_of_edits(scene: &Scene, options: Options) -> [Costs; 2] {
-    let mut session = Session::new(scene.clone(), options).unwrap();
-    let cold = cost(&mut session, "cold");
-    let place = |session: &mut Session, body: BodyId, to: Option<DVec3>| {
-        let pose = to.map(Pose::translation);
-        session.apply(Command::SetPose(body, pose)).unwrap();
-    };
+fn place(session: &mut Session, body: BodyId, to: Option<DVec3>) {
+    session.apply(Command::SetPose(body, to.map(Pose::translation))).unwrap();
+}
+
+/// Costs of a small box that comes, moves and leaves.
+fn costs_of_a_new_box(session: &mut Session) -> Costs {
+    let cold = cost(session, "cold");
     let (corners, triangles) = cube(0.02, false);
     let new = NewBody::new("new").with_mesh("new", MaterialId(0), &corners, &triangles);
-    let new_body = BodyId(scene.bodies.len() as u32);
+    let body = BodyId(session.scene().bodies.len() as u32);
     let out = session.apply(Command::Insert(new)).unwrap();
-    place(&mut session, new_body, Some(v(0.05, 0.0, 0.0)));
-    let inserted = cost(&mut session, "insert a box");
-    place(&mut session, new_body, Some(v(0.08, 0.02, -0.01)));
-    let moved = cost(&mut session, "move it");
-    session.apply(out).unwrap();
-    let removed = cost(&mut session, "remove it");
-    let of_new = Costs { cold, moved, edits: vec![inserted, removed] };
-
-    let own = BodyId(4);
-    place(&mut session, own, Some(v(0.03, 0.02, -0.01)));
-    let hold = cost(&mut session, "take hold of another one");
-    place(&mut session, own, Some(v(0.06, 0.02, -0.01)));
-    let moved = cost(&mut session, "move it");
-    let back = session.apply(Command::Remove(own)).unwrap();
-    let removed = cost(&mut session, "remove it");
+    place(session, body, Some(v(0.05, 0.0, 0.0)));
+    let inserted = cost(session, "insert a box");
+    place(session, body, Some(v(0.08, 0.02, -0.01)));
+    let moved = cost(session, "move it");
+    let back = session.apply(out).unwrap();
+    let removed = cost(session, "remove it");
     session.apply(back).unwrap();
-    let returned = cost(&mut session, "put it back");
-    place(&mut session, own, None);
-    let release = cost(&mut session, "let it go");
-    [of_new, Costs { cold, moved, edits: vec![hold, removed, returned, release] }]
+    let returned = cost(session, "put it back");
+    Costs { cold, moved, edits: vec![inserted, removed, returned] }
+}
+
+/// Costs of a small box of the scene that is taken up, moved, taken out, put back, and put down where it was.
+fn costs_of_a_box_of_the_scene(session: &mut Session) -> Costs {
+    let body = BodyId(4);
+    let cold = cost(session, "cold");
+    place(session, body, Some(v(0.03, 0.02, -0.01)));
+    let hold = cost(session, "take hold of one");
+    place(session, body, Some(v(0.06, 0.02, -0.01)));
+    let moved = cost(session, "move it");
+    let back = session.apply(Command::Remove(body)).unwrap();
+    let removed = cost(session, "remove it");
+    session.apply(back).unwrap();
+    let returned = cost(session, "put it back");
+    place(session, body, None);
+    let release = cost(session, "let it go");
+    Costs { cold, moved, edits: vec![hold, removed, returned, release] }
 }
 
 /// Asserts that no edit of a scene costs more than twice the pairs that moving its small body does; returns by how much more
 /// time the dearest one takes.
-fn edits_cost_as_moves(scene: &Scene, options: Options) -> f64 {
-    let mut most = 0.0_f64;
-    for Costs { cold, moved, edits } in costs_of_edits(scene, options) {
-        assert!(4 * moved.pairs < cold.pairs, "{} of {} pairs", moved.pairs, cold.pairs);
-        for edit in edits {
-            assert!(
-                edit.pairs <= 2 * moved.pairs,
-                "{} pairs, and {} for a move",
-                edit.pairs,
-                moved.pairs
-            );
-            most = most.max(edit.seconds / moved.seconds);
-        }
-    }
-    most
+fn edits_cost_as_moves(Costs { cold, moved, edits }: &Costs) -> f64 {
+    assert!(4 * moved.pairs < cold.pairs, "{} of {} pairs", moved.pairs, cold.pairs);
+    let is_cheap = |edit: &Cost| edit.pairs <= 2 * moved.pairs;
+    assert!(edits.iter().all(is_cheap), "{edits:?}, and {moved:?} for a move");
+    edits.iter().map(|edit| edit.seconds / moved.seconds).fold(0.0, f64::max)
 }
 
 #[test]
 #[ignore = "minutes: two million links"]
 fn edits_in_a_scene_of_two_million_links_cost_as_moves() {
-    for (what, tolerance) in [(Contents::Boxes, 0.001), (Contents::BallsToo, 0.02)] {
-        let times = edits_cost_as_moves(&hall(60, what), at_tolerance(tolerance));
-        assert!(times < 2.0, "{times} times the seconds of a move");
+    let session = |what: Contents, tolerance: f64, groups: bool| {
+        let options = Options { groups, ..at_tolerance(tolerance) };
+        Session::new(hall(60, what), options).unwrap()
+    };
+    for costs in [
+        costs_of_a_new_box(&mut session(Contents::Boxes, 0.001, false)),
+        costs_of_a_box_of_the_scene(&mut session(Contents::Boxes, 0.001, false)),
+        // With groups, a box of the scene that rests is grouped with others: taking it up is a cold build.
+        costs_of_a_new_box(&mut session(Contents::Boxes, 0.001, true)),
+        costs_of_a_new_box(&mut session(Contents::BallsToo, 0.02, true)),
+    ] {
+        let times = edits_cost_as_moves(&costs);
+        println!("{times:.2} times the seconds of a move");
+        assert!(times < 2.0);
     }
 }
 
 #[test]
 fn a_body_that_comes_or_goes_costs_as_one_that_moves() {
-    edits_cost_as_moves(&hall(8, Contents::Boxes), at_tolerance(0.1));
+    let session = || Session::new(hall(8, Contents::Boxes), at_tolerance(0.1)).unwrap();
+    edits_cost_as_moves(&costs_of_a_new_box(&mut session()));
+    edits_cost_as_moves(&costs_of_a_box_of_the_scene(&mut session()));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use crate::element::{Forest, WorldView, old_coarse_numbers};
 use crate::geometry::Pose;
 use crate::scene::{BodyId, Held, Patch, Scene};
-use crate::space::{Bed, Before, Solved, group_links};
+use crate::space::{Bed, Before, Solved, group_links, replanted_links};
 
 use super::{Session, Update};
 
@@ -215,8 +215,18 @@ fn replanted(
     for world in [&mut space.world, &mut space.sound_world] {
         *world = world.of_bodies(&from);
     }
-    space.view = WorldView::new(&new.scene, &space.forest, &space.world);
-    space.groups = group_links((&space.forest, &space.view), &last.tree, &Before::default());
+    let view = WorldView::new(&new.scene, &space.forest, &space.world);
+    let was = std::mem::replace(&mut space.view, view);
+    let links = std::mem::take(&mut space.groups);
+    // Links that carry otherwise over what is covered otherwise, or is rounded otherwise, are found anew.
+    let keeps_links = space.touched.is_empty() && was.far_m() == space.view.far_m();
+    space.groups = match keeps_links {
+        true => replanted_links(links, &to, &space.forest),
+        false => {
+            let places = (&space.forest, &space.view);
+            group_links(places, &last.tree, &Before::default())
+        }
+    };
     let mut report = std::mem::take(&mut last.report);
     last.count(&mut report);
     last.report = report;

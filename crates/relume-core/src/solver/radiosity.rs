@@ -210,7 +210,7 @@ impl Radiosity {
         visit: &mut dyn FnMut(u32, &Linear),
     ) {
         let own = |id: u32| self.gathered.get(id);
-        push(surfaces, (facet, &surfaces.place(facet)), &Linear::default(), &own, &mut |id, h| {
+        push(surfaces, facet, &surfaces.place(facet), &Linear::default(), &own, &mut |id, h| {
             match self.limits.get(id as usize) {
                 Some(&limit) => visit(id, &h.divided(limit)),
                 None => visit(id, h),

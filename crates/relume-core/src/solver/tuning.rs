@@ -75,3 +75,19 @@ pub(super) const UNBALANCED_MAX: f64 = 0.005;
 /// - Larger: light is unaccounted for in bright scenes that move
 /// - Smaller: time: full sweeps where little moved
 pub(super) const UNKNOWN_MAX: f64 = 0.08;
+
+/// Sweeps after which a solve is given up as not converging (reflectances are below 1).
+///
+/// - Unit: sweeps
+/// - Tried: not varied
+/// - Larger: time until an error is said
+/// - Smaller: solutions between very bright surfaces are refused
+pub(super) const SWEEPS_MAX: u32 = 2_000;
+
+/// Sweeps over everything by which a solution is settled further, at most: beyond that it is said that light is unaccounted for.
+///
+/// - Unit: sweeps
+/// - Tried: not varied
+/// - Larger: time of scenes of white surfaces
+/// - Smaller: light of white scenes stays unaccounted for
+pub(super) const FURTHER_MAX: u32 = 32;

@@ -22,6 +22,7 @@ mod notes;
 mod output;
 mod outside;
 mod paper;
+mod plan;
 mod preview;
 mod probe;
 mod progress;

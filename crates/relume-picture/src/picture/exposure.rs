@@ -11,7 +11,7 @@ use super::assemble::Drawing;
 use super::camera::View;
 use super::project::Projector;
 use super::raster::{Grid, rasterise};
-use super::render::Shading;
+use super::shading::Shading;
 use super::tone::luminance;
 
 /// How bright pictures are.

@@ -15,7 +15,7 @@ use relume_core::scene::{BodyId, PatchId, Scene};
 use super::camera::View;
 use super::exposure::{Exposure, Metered};
 use super::image::Image;
-use super::overview::candidates::Bounds;
+use super::overview::bounds::Bounds;
 use super::overview::caster::{Caster, Hit, LIFT};
 use super::overview::preview::Preview;
 use super::project::Projector;

@@ -13,7 +13,8 @@
 //! Cost: bounded but for a hierarchy of boxes over all patches: some million rays for each of up to three
 //! instants.
 
-pub(super) mod candidates;
+pub(super) mod bounds;
+mod candidates;
 pub(super) mod caster;
 pub(super) mod preview;
 mod score;
@@ -23,7 +24,8 @@ use rayon::prelude::*;
 use relume_core::scene::Scene;
 
 use super::camera::View;
-use candidates::{Bounds, Candidate};
+use bounds::Bounds;
+use candidates::Candidate;
 use score::{Size, Stage};
 
 /// A view chosen for a scene, and whether there is light in it.

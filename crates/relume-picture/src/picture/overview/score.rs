@@ -14,7 +14,7 @@ use relume_core::scene::outside::Outside;
 use relume_core::scene::{BodyId, Projection, Scene};
 
 use super::super::camera::View;
-use super::candidates::{ASPECT, Bounds};
+use super::bounds::{ASPECT, Bounds};
 use super::caster::{Caster, Hit};
 use super::preview::Preview;
 

@@ -9,9 +9,16 @@ use std::path::{Path, PathBuf};
 
 use crate::layers::{crates_dir, sources, without_comments};
 
-/// Circles that there are, by crate: the engine has none.
-const CIRCLES: [(&str, usize); 4] =
-    [("relume-core", 0), ("relume-io", 0), ("relume-picture", 0), ("relume-cli", 1)];
+/// Circles that there are, by crate: what ends a run early (failures, messages, interrupts, limits) and the flags of the command
+/// are in one.
+const CIRCLES: [(&str, usize); 6] = [
+    ("relume-core", 0),
+    ("relume-io", 0),
+    ("relume", 0),
+    ("relume-picture", 0),
+    ("relume-judge", 0),
+    ("relume-cli", 1),
+];
 
 /// A module, as its path from the crate's root.
 type Module = Vec<String>;
@@ -212,7 +219,7 @@ fn circles_between_files_do_not_come_back() {
     let mut wrong = Vec::new();
     for (dir, allowed) in CIRCLES {
         let modules = modules(&crates_dir().join(dir).join("src"));
-        assert!(modules.text.len() > 10, "{dir}: its source was not found");
+        assert!(!modules.text.is_empty(), "{dir}: its source was not found");
         let found = circles(&modules);
         if found.len() != allowed {
             wrong.push(format!("{dir}: {} circles, not {allowed}: {found:?}", found.len()));

@@ -9,7 +9,8 @@ use relume::session::Session;
 use relume_picture::picture::{self, Exposure};
 
 use crate::args::{BenchArgs, ExposureFlag, PictureFlags, UpdateChoice, UpdateFlag};
-use crate::clip::{self, Clip, fixed, now};
+use crate::clip::{self, Clip, fixed};
+use crate::clock::now;
 use crate::failure::Failure;
 use crate::figures::{Cold, Figures, Held, Measured};
 use crate::interrupt;

@@ -3,7 +3,6 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::DVec3;
 use indicatif::HumanBytes;
@@ -314,11 +313,6 @@ pub(crate) fn picture_settings(
 /// Display value = radiance (W/m2/sr) x 2^EV.
 pub(crate) fn fixed(stops: f64) -> Exposure {
     Exposure::Fixed(stops.exp2())
-}
-
-/// Wall-clock time, for summaries and measurements; no result of the engine uses it.
-pub(crate) fn now() -> Instant {
-    Instant::now()
 }
 
 /// Sets the number of threads of the process; the number in use.

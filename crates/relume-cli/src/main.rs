@@ -5,6 +5,7 @@ mod args;
 mod bench;
 mod check;
 mod clip;
+mod clock;
 mod demo;
 mod edits;
 mod events;
@@ -36,6 +37,7 @@ mod sequence;
 mod shell;
 mod size;
 mod strategies;
+mod text;
 mod verify;
 mod viewing;
 
@@ -49,7 +51,7 @@ use failure::Failure;
 fn main() -> ExitCode {
     let cli = Cli::parse();
     // Before anything is read.
-    memory::keep_below(cli.max_memory);
+    memory::keep_below(cli.max_memory.map(|size| size.bytes));
     match execute(cli.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

@@ -7,7 +7,7 @@ use relume::session::{missed, radiosity_error};
 use serde::Serialize;
 
 use crate::args::{UpdateChoice, UpdateFlag};
-use crate::clip::now;
+use crate::clock::now;
 use crate::failure::Failure;
 use crate::figures::{mean, ratio, standard_deviation, time, times, whole};
 use crate::interrupt;

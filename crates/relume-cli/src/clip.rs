@@ -20,18 +20,7 @@ use crate::memory;
 use crate::output::{self, count, counted};
 use crate::outside;
 use crate::scene_file;
-
-/// Default tolerance, relative error of irradiance, of what makes numbers.
-pub(crate) const TOLERANCE: f64 = 0.02;
-
-/// The same of pictures: beside one at 0.02 the eye finds no difference but along some edges, at a tenth to a quarter of
-/// the time (docs/tolerance.md).
-pub(crate) const PICTURE_TOLERANCE: f64 = 0.1;
-
-/// Share of the scene's area below which the form-factor oracle does not refine, unless it is told
-/// an area. A share, so that a scene in other units gives the same elements; with it a closed cube
-/// has at most 6 x 4^5 elements, about as many as the paper draws.
-const MIN_AREA_SHARE: f64 = 1.0 / 5_000.0;
+pub(crate) use crate::tuning::{MIN_AREA_SHARE, PICTURE_TOLERANCE, TOLERANCE};
 
 /// A scene with the frames asked for.
 pub(crate) struct Clip {

@@ -38,6 +38,7 @@ mod shell;
 mod size;
 mod strategies;
 mod text;
+mod tuning;
 mod verify;
 mod viewing;
 

@@ -35,6 +35,7 @@ mod shading;
 mod sketch;
 mod smooth;
 mod tone;
+mod tuning;
 
 pub use camera::{View, ViewError, Viewpoint};
 pub use exposure::{Exposure, Metered};

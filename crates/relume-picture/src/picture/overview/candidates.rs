@@ -5,29 +5,14 @@
 use glam::{DVec2, DVec3};
 
 use super::super::camera::View;
+use super::super::tuning::{INSIDE, OPEN, ROOM, SPAN, YFOV_INSIDE, YFOV_OUTSIDE};
 use super::bounds::{ASPECT, Bounds};
 use super::score::Stage;
-
-/// Vertical field of view from outside and from inside, radians.
-const YFOV_OUTSIDE: f64 = 0.7;
-const YFOV_INSIDE: f64 = 1.1;
-
-/// A point that sees fronts in this share of directions is in a room.
-const ROOM: f64 = 0.45;
-
-/// A point in a room must also see things this far apart, in units of the scene: the inside of a
-/// double-sided object is no room.
-const SPAN: f32 = 0.4;
 
 /// Heights per length of views from outside, and what each is worth less than those that people would choose;
 /// the last ones are for what is open or lit at the top or from below only.
 const SLOPES: [(f64, f64); 7] =
     [(0.5, 0.0), (0.3, 0.0), (0.8, 0.05), (0.12, 0.02), (0.0, 0.1), (1.8, 0.2), (-0.5, 0.2)];
-
-/// What views from inside, which fill the picture whatever they show, are worth less: for what is lit on the inside only; and
-/// how much less where nothing is around the eye: what is open, as a cup, is looked into from outside.
-const INSIDE: f64 = 0.2;
-const OPEN: f64 = 1.5;
 
 /// A view that may be chosen.
 #[derive(Clone, Copy)]

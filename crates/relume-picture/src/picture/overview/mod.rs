@@ -24,6 +24,7 @@ use rayon::prelude::*;
 use relume_core::scene::Scene;
 
 use super::camera::View;
+use super::tuning::{FINALISTS, INSTANTS};
 use bounds::Bounds;
 use candidates::Candidate;
 use score::{Size, Stage};
@@ -37,12 +38,6 @@ pub struct Overview {
     /// animation; `None` where nothing emits. An estimate.
     pub lit: Option<f64>,
 }
-
-/// Instants of an animation at which views are judged.
-const INSTANTS: u32 = 3;
-
-/// Views that are looked at closely.
-const FINALISTS: usize = 8;
 
 /// Differences of scores that are none: nearly equal candidates, as in a symmetric room, are not told
 /// apart by rounding, and the first one wins.

@@ -7,7 +7,7 @@ use crate::common::{Random, at_tolerance, form_factor_oracle, shipped, v};
 use glam::{DQuat, DVec3};
 use relume_core::geometry::Pose;
 use relume_core::scene::{BodyId, LightId, LightKind, MaterialId, NewBody, Scene, SceneBuilder};
-use relume_core::session::{Command, CommandError, Frame, Options, Session};
+use relume_core::session::{Command, CommandError, Frame, Options, Session, compare};
 use relume_io::Log;
 
 /// A cube about the origin, seen from outside or from inside.
@@ -662,6 +662,10 @@ fn a_body_of_many_patches_is_taken_up_where_it_rests() {
     let new = NewBody::new("new").with_mesh("new", MaterialId(0), &points, &faces);
     let out = session.apply(Command::Insert(new)).unwrap();
     check(&mut session, "another one comes");
+    let mut anew = cold(&session);
+    anew.solve().unwrap();
+    let found = compare(session.solved().unwrap(), anew.solved().unwrap());
+    assert_eq!(found, None, "links of groups are carried over as they are");
     session.apply(out).unwrap();
     session.apply(undo).unwrap();
     check(&mut session, "and leaves, and the first is put down");

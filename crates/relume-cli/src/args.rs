@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::edits::EditFlags;
 use crate::frames::FrameSpec;
 use crate::outside::OutsideFlags;
+use crate::scene_file::AnimationFlag;
 use crate::viewing::ViewFlags;
 
 mod values;
@@ -415,43 +415,6 @@ pub(crate) struct CheckArgs {
     /// Print every finding, also where many are of one kind.
     #[arg(long)]
     pub(crate) verbose: bool,
-}
-
-/// `--deform`
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(crate) enum DeformFlag {
-    /// One shape.
-    #[default]
-    Hold,
-    /// A shape for each frame.
-    Rebuild,
-}
-
-/// Which animation plays, what a scene may be read from, and what of it is changed.
-#[derive(Clone, Debug, Default, Args)]
-pub(crate) struct AnimationFlag {
-    /// Name of the animation to play; if left out all of them together, but of those that move the same things the
-    /// first alone.
-    #[arg(long = "animation", value_name = "NAME")]
-    pub(crate) name: Option<String>,
-    /// Read buffers and images of a glTF file wherever they are: outside its folder, devices, pipes.
-    #[arg(long)]
-    pub(crate) allow_outside: bool,
-    /// What becomes of meshes that change their shape (skins that bend, morph targets): `hold` keeps them in their shape at
-    /// the start; `rebuild` makes each a body of its own at each of the frames, which costs as much memory, and most of a
-    /// cold build of what it touches, a frame.
-    #[arg(long, value_name = "HOW", value_enum, default_value_t = DeformFlag::Hold)]
-    pub(crate) deform: DeformFlag,
-    #[command(flatten)]
-    pub(crate) edits: EditFlags,
-}
-
-impl AnimationFlag {
-    /// What is changed of a scene, as on the command line, for reports.
-    pub(crate) fn described(&self) -> Vec<String> {
-        let rebuilt = (self.deform == DeformFlag::Rebuild).then(|| "--deform rebuild".to_owned());
-        rebuilt.into_iter().chain(self.edits.described()).collect()
-    }
 }
 
 /// What is solved, and how finely: what every command that solves takes.

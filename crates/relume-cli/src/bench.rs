@@ -4,45 +4,23 @@
 //! one that follows the motion, and one set up for this frame alone. So whatever else the machine
 //! does hits both alike, and ratios hold where seconds do not.
 
-use std::path::Path;
-
 use relume::export::{probe, write_atomically};
 use relume::session::Session;
 use relume_picture::picture::{self, Exposure};
 
-use crate::args::{BenchArgs, ExposureFlag, MeasureFlags, PictureFlags, UpdateChoice, UpdateFlag};
-use crate::clip::{self, Clip, fixed, now};
+use crate::args::{BenchArgs, ExposureFlag, PictureFlags, UpdateChoice, UpdateFlag};
+use crate::clip::{self, Clip, fixed};
+use crate::clock::now;
 use crate::failure::Failure;
 use crate::figures::{Cold, Figures, Held, Measured};
 use crate::interrupt;
 use crate::memory;
 use crate::output::{self, count, counted};
+use crate::plan::Plan;
 use crate::progress::Progress;
 use crate::sequence::{Sequence, Stepping};
 use crate::strategies;
 use crate::viewing::Viewing;
-
-/// What is measured, and what becomes of it.
-pub(crate) struct Plan<'a> {
-    /// How the links follow the motion.
-    pub(crate) update: UpdateChoice,
-    /// Of this many frames one is built from scratch too.
-    pub(crate) every: usize,
-    /// All strategies instead.
-    pub(crate) compare: bool,
-    /// File for the numbers.
-    pub(crate) json: Option<&'a Path>,
-    /// Neither tables nor a progress bar.
-    pub(crate) quiet: bool,
-}
-
-impl<'a> Plan<'a> {
-    /// From the command line.
-    pub(crate) fn new(flags: &'a MeasureFlags, update: UpdateChoice, quiet: bool) -> Plan<'a> {
-        let MeasureFlags { every, compare, json } = flags;
-        Plan { update, every: *every, compare: *compare, json: json.as_deref(), quiet }
-    }
-}
 
 /// Draws the present frame of a session, at a time; the seconds that took.
 pub(crate) type Draw<'a, S> = Box<dyn FnMut(&S, f64) -> Result<f64, Failure> + 'a>;

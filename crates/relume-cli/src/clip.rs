@@ -3,7 +3,6 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::DVec3;
 use indicatif::HumanBytes;
@@ -21,18 +20,7 @@ use crate::memory;
 use crate::output::{self, count, counted};
 use crate::outside;
 use crate::scene_file;
-
-/// Default tolerance, relative error of irradiance, of what makes numbers.
-pub(crate) const TOLERANCE: f64 = 0.02;
-
-/// The same of pictures: beside one at 0.02 the eye finds no difference but along some edges, at a tenth to a quarter of
-/// the time (docs/tolerance.md).
-pub(crate) const PICTURE_TOLERANCE: f64 = 0.1;
-
-/// Share of the scene's area below which the form-factor oracle does not refine, unless it is told
-/// an area. A share, so that a scene in other units gives the same elements; with it a closed cube
-/// has at most 6 x 4^5 elements, about as many as the paper draws.
-const MIN_AREA_SHARE: f64 = 1.0 / 5_000.0;
+pub(crate) use crate::tuning::{MIN_AREA_SHARE, PICTURE_TOLERANCE, TOLERANCE};
 
 /// A scene with the frames asked for.
 pub(crate) struct Clip {
@@ -314,11 +302,6 @@ pub(crate) fn picture_settings(
 /// Display value = radiance (W/m2/sr) x 2^EV.
 pub(crate) fn fixed(stops: f64) -> Exposure {
     Exposure::Fixed(stops.exp2())
-}
-
-/// Wall-clock time, for summaries and measurements; no result of the engine uses it.
-pub(crate) fn now() -> Instant {
-    Instant::now()
 }
 
 /// Sets the number of threads of the process; the number in use.

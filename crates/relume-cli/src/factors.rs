@@ -10,7 +10,8 @@ use relume::session::{self, Closure, Factors, FrameReport, Grouping, PartFactors
 use serde::Serialize;
 
 use crate::args::{By, ClosureFlag, FactorFormat, FactorsArgs};
-use crate::clip::{Clip, TOLERANCE, now, solved, step_failure};
+use crate::clip::{Clip, TOLERANCE, solved, step_failure};
+use crate::clock::now;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::notes;

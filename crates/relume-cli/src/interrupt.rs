@@ -9,9 +9,9 @@ use std::time::Duration;
 
 use relume::export::settle_unfinished;
 
+use crate::clock;
 use crate::failure::Failure;
-use crate::output;
-use crate::progress;
+use crate::text;
 
 /// How long a run may take to notice by itself.
 const GRACE: Duration = Duration::from_millis(600);
@@ -28,11 +28,11 @@ pub(crate) fn listen() -> Result<(), Failure> {
     ctrlc::set_handler(|| {
         REQUESTED.store(true, Ordering::SeqCst);
         std::thread::sleep(GRACE);
-        let (done, wanted) = progress::finished();
+        let (done, wanted) = clock::finished();
         end(&Failure::interrupted(format_args!(
             "stopped: {} of {} finished, the one under way is left out",
-            output::count(done),
-            output::counted(wanted as usize, "frame")
+            text::count(done),
+            text::counted(wanted as usize, "frame")
         )));
     })
     .map_err(|error| Failure::new(format_args!("cannot listen for Ctrl-C: {error}")))
@@ -44,12 +44,12 @@ pub(crate) fn end(why: &Failure) -> ! {
     if let Some(keep) = &*locked(&KEEP)
         && let Err(failure) = keep()
     {
-        output::complain(&failure.to_string());
+        text::complain(&failure.to_string());
     }
     // Not in the middle of a file.
     let _guard = writing();
     settle_unfinished();
-    output::complain(&format!("\n{why}"));
+    text::complain(&format!("\n{why}"));
     std::process::exit(i32::from(why.exit_code()));
 }
 

@@ -8,14 +8,11 @@ use crate::clip::Clip;
 use crate::failure::Failure;
 use crate::output;
 use crate::outside::{self, Unlit};
+use crate::tuning::LIT_MIN;
 use crate::viewing::{ViewFlags, Viewing};
 
 /// Most materials that are named.
 const NAMED: usize = 5;
-
-/// Share of what is seen of surfaces that has to be lit at some time, so that a picture shows what it is of: eyes that glow
-/// and headlights light less, lamps in rooms and streets more.
-const LIT_MIN: f64 = 0.5;
 
 /// How far a default sun is to the left of where the view is from, degrees.
 const BESIDE: f64 = 50.0;

@@ -5,6 +5,7 @@ mod args;
 mod bench;
 mod check;
 mod clip;
+mod clock;
 mod demo;
 mod edits;
 mod events;
@@ -22,6 +23,7 @@ mod notes;
 mod output;
 mod outside;
 mod paper;
+mod plan;
 mod preview;
 mod probe;
 mod progress;
@@ -35,6 +37,8 @@ mod sequence;
 mod shell;
 mod size;
 mod strategies;
+mod text;
+mod tuning;
 mod verify;
 mod viewing;
 
@@ -48,7 +52,7 @@ use failure::Failure;
 fn main() -> ExitCode {
     let cli = Cli::parse();
     // Before anything is read.
-    memory::keep_below(cli.max_memory);
+    memory::keep_below(cli.max_memory.map(|size| size.bytes));
     match execute(cli.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

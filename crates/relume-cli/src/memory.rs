@@ -14,7 +14,6 @@ use std::time::Duration;
 
 use indicatif::HumanBytes;
 
-use crate::args::MemorySize;
 use crate::failure::Failure;
 use crate::interrupt;
 
@@ -30,9 +29,9 @@ static LIMIT: OnceLock<u64> = OnceLock::new();
 /// What is under way, for messages.
 static NOW: Mutex<String> = Mutex::new(String::new());
 
-/// Sets the limit of the process, before anything is read, and starts to watch it.
-pub(crate) fn keep_below(limit: Option<MemorySize>) {
-    let Some(MemorySize { bytes }) = limit else { return };
+/// Sets the limit of the process, bytes, before anything is read, and starts to watch it.
+pub(crate) fn keep_below(limit: Option<u64>) {
+    let Some(bytes) = limit else { return };
     if LIMIT.set(bytes).is_err() || held_bytes().is_none() {
         return;
     }

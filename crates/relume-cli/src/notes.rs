@@ -2,7 +2,7 @@
 
 use relume::scene::{Note, Severity};
 
-use crate::output;
+use crate::text;
 
 /// As many of one kind are one line.
 const MANY: usize = 3;
@@ -32,9 +32,9 @@ pub(crate) fn line(note: &Note) -> String {
     let subject = if note.subject.is_empty() {
         String::new()
     } else {
-        format!("{}: ", output::name(&note.subject))
+        format!("{}: ", text::name(&note.subject))
     };
-    output::one_line(&format!("{}: {subject}{}{count}", head(note), note.message))
+    text::one_line(&format!("{}: {subject}{}{count}", head(note), note.message))
 }
 
 /// One line about many notes of one kind: how many, whose they are, and what the first says.
@@ -42,7 +42,7 @@ fn folded(alike: &[&Note]) -> String {
     let first = alike[0];
     let mut names: Vec<String> = Vec::new();
     for note in alike {
-        let name = output::name(&note.subject);
+        let name = text::name(&note.subject);
         if !name.is_empty() && !names.contains(&name) {
             names.push(name);
         }
@@ -54,15 +54,14 @@ fn folded(alike: &[&Note]) -> String {
         whose += &format!(" and {others} more");
     }
     let same = alike.iter().all(|note| note.message == first.message);
-    let of_first =
-        if same { String::new() } else { format!(" ({})", output::name(&first.subject)) };
+    let of_first = if same { String::new() } else { format!(" ({})", text::name(&first.subject)) };
     let text = format!(
         "{} ({} of this kind, --verbose lists all): {whose}: {}{of_first}",
         head(first),
         alike.len(),
         first.message
     );
-    output::one_line(&text)
+    text::one_line(&text)
 }
 
 fn head(note: &Note) -> String {

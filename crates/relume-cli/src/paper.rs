@@ -13,7 +13,7 @@ use relume_picture::drawing::{Drawing, Pen};
 use relume_picture::picture::{self, Exposure, Outlines, View, Viewpoint};
 
 use crate::args::{DemoScene, Figure, FigureArgs, PictureFlags, Size, UpdateChoice, UpdateFlag};
-use crate::bench::{self, Plan};
+use crate::bench;
 use crate::clip::{Clip, picture_settings, solved, step_failure};
 use crate::failure::Failure;
 use crate::figures::{Row, time, times};
@@ -21,6 +21,7 @@ use crate::flat::draw::{BLACK, GREY, PINK, table};
 use crate::interrupt;
 use crate::memory;
 use crate::output;
+use crate::plan::Plan;
 
 /// Largest form factor of a link, as in the tables of docs/prediction.md.
 const EPSILON: f64 = 0.02;

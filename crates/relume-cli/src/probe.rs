@@ -8,7 +8,8 @@ use relume::session::{Frame, Sensor, Session};
 
 use crate::accuracy::Estimates;
 use crate::args::ProbeArgs;
-use crate::clip::{Clip, TOLERANCE, now, solved, step_failure};
+use crate::clip::{Clip, TOLERANCE, solved, step_failure};
+use crate::clock::now;
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::light;

@@ -1,25 +1,16 @@
 //! The progress bar: on stderr, and only where that is a terminal.
 
 use std::io::IsTerminal;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanBytes, HumanCount, HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use relume::session::Watch;
 
-use crate::clip::now;
+use crate::clock::{self, now};
 use crate::interrupt;
 use crate::memory;
 use crate::output;
-
-static DONE: AtomicU64 = AtomicU64::new(0);
-static WANTED: AtomicU64 = AtomicU64::new(0);
-
-/// Frames finished, and wanted, whether or not anybody watches.
-pub(crate) fn finished() -> (u64, u64) {
-    (DONE.load(Ordering::SeqCst), WANTED.load(Ordering::SeqCst))
-}
 
 /// What is known of the time left once `done` frames of this run took `elapsed` and `left` remain;
 /// nothing before the first is finished.
@@ -62,8 +53,7 @@ fn so_far(pairs: u64, expected: f64, bytes: u64) -> String {
 impl Progress {
     /// A bar over `frames` frames, of which `done` are finished already.
     pub(crate) fn new(frames: usize, done: usize, quiet: bool) -> Progress {
-        DONE.store(done as u64, Ordering::SeqCst);
-        WANTED.store(frames as u64, Ordering::SeqCst);
+        clock::begin(frames as u64, done as u64);
         let (started, before, watched) = (now(), done as u64, Watched::default());
         if quiet || !std::io::stderr().is_terminal() {
             return Progress { bar: ProgressBar::hidden(), started, before, watched };
@@ -111,10 +101,10 @@ impl Progress {
 
     /// A frame is finished.
     pub(crate) fn finish_frame(&self) {
-        let done = DONE.fetch_add(1, Ordering::SeqCst) + 1;
+        let (done, wanted) = clock::finish_one();
         *interrupt::locked(&self.watched) = None;
         self.bar.inc(1);
-        let left = WANTED.load(Ordering::SeqCst).saturating_sub(done);
+        let left = wanted.saturating_sub(done);
         self.bar.set_prefix(time_left(done - self.before, left, self.started.elapsed()));
     }
 

@@ -19,7 +19,8 @@ use crate::accuracy::Estimates;
 use crate::args::{
     DemoArgs, ExposureFlag, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags, UpdateFlag,
 };
-use crate::clip::{self, Clip, PICTURE_TOLERANCE, TOLERANCE, fixed, now};
+use crate::clip::{self, Clip, PICTURE_TOLERANCE, TOLERANCE, fixed};
+use crate::clock::now;
 use crate::demo;
 use crate::events::EventTable;
 use crate::failure::Failure;

@@ -2,14 +2,52 @@
 
 use std::path::Path;
 
+use clap::{Args, ValueEnum};
 use indicatif::HumanBytes;
 use relume::scene::{ImportOptions, Instants, Note, Scene, SceneError, Severity, check, import};
 
-use crate::args::{AnimationFlag, DeformFlag};
+use crate::edits::EditFlags;
 use crate::failure::Failure;
 use crate::memory;
 use crate::notes;
 use crate::output;
+
+/// `--deform`
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DeformFlag {
+    /// One shape.
+    #[default]
+    Hold,
+    /// A shape for each frame.
+    Rebuild,
+}
+
+/// Which animation plays, what a scene may be read from, and what of it is changed.
+#[derive(Clone, Debug, Default, Args)]
+pub(crate) struct AnimationFlag {
+    /// Name of the animation to play; if left out all of them together, but of those that move the same things the
+    /// first alone.
+    #[arg(long = "animation", value_name = "NAME")]
+    pub(crate) name: Option<String>,
+    /// Read buffers and images of a glTF file wherever they are: outside its folder, devices, pipes.
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
+    /// What becomes of meshes that change their shape (skins that bend, morph targets): `hold` keeps them in their shape at
+    /// the start; `rebuild` makes each a body of its own at each of the frames, which costs as much memory, and most of a
+    /// cold build of what it touches, a frame.
+    #[arg(long, value_name = "HOW", value_enum, default_value_t = DeformFlag::Hold)]
+    pub(crate) deform: DeformFlag,
+    #[command(flatten)]
+    pub(crate) edits: EditFlags,
+}
+
+impl AnimationFlag {
+    /// What is changed of a scene, as on the command line, for reports.
+    pub(crate) fn described(&self) -> Vec<String> {
+        let rebuilt = (self.deform == DeformFlag::Rebuild).then(|| "--deform rebuild".to_owned());
+        rebuilt.into_iter().chain(self.edits.described()).collect()
+    }
+}
 
 /// Reads a scene; with its images, if it is for pictures. Meshes that change their shape are read at these instants, if they
 /// are to be rebuilt.

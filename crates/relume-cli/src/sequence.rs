@@ -11,6 +11,7 @@ use crate::args::UpdateChoice;
 use crate::clip::{Clip, step_failure};
 use crate::failure::Failure;
 use crate::memory;
+use crate::tuning::UNBALANCED_MAX;
 
 /// A session that goes from frame to frame.
 pub(crate) trait Stepping {
@@ -90,9 +91,6 @@ impl Stepping for FlatSession {
         self.memory()
     }
 }
-
-/// Share of what is emitted that may be unaccounted for in a result.
-const UNBALANCED_MAX: f64 = 0.1;
 
 /// Light that grows from sweep to sweep: between bright walls that cross or lie on each other.
 fn unsettled(frame: Option<FlatFrame<'_>>, report: &FrameReport) -> Failure {

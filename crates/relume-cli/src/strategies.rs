@@ -7,12 +7,12 @@ use relume::session::{missed, radiosity_error};
 use serde::Serialize;
 
 use crate::args::{UpdateChoice, UpdateFlag};
-use crate::bench::Plan;
-use crate::clip::now;
+use crate::clock::now;
 use crate::failure::Failure;
 use crate::figures::{mean, ratio, standard_deviation, time, times, whole};
 use crate::interrupt;
 use crate::output;
+use crate::plan::Plan;
 use crate::progress::Progress;
 use crate::sequence::{Sequence, Stepping, solved};
 

@@ -7,7 +7,7 @@ use crate::common::{Random, at_tolerance, form_factor_oracle, shipped, v};
 use glam::{DQuat, DVec3};
 use relume_core::geometry::Pose;
 use relume_core::scene::{BodyId, LightId, LightKind, MaterialId, NewBody, Scene, SceneBuilder};
-use relume_core::session::{Command, CommandError, Frame, Options, Session};
+use relume_core::session::{Command, CommandError, Frame, Options, Session, compare};
 use relume_io::Log;
 
 /// A cube about the origin, seen from outside or from inside.
@@ -199,6 +199,18 @@ fn bodies_come_and_go() {
 }
 
 #[test]
+fn a_lamp_behind_one_end_of_a_pair_lights_the_other_unevenly_however_it_was_found() {
+    follow(&room(), 1_370..1_371, 4, 0.15);
+    follow(&room(), 1_612..1_613, 8, 0.15);
+}
+
+#[test]
+fn light_that_grows_changes_which_side_of_a_steep_pair_is_refined() {
+    // A lamp that sticks in a wall; a crate comes into its light.
+    follow(&room(), 1_122..1_123, 8, 0.15);
+}
+
+#[test]
 fn hands_take_hold_of_a_clip_that_plays() {
     for name in ["box_room.glb", "cornell_moving_box_and_lamp.glb"] {
         follow(&shipped(name), 200..202, 5, 0.1);
@@ -387,12 +399,27 @@ fn a_solve_is_called_off_and_the_next_one_is_not() {
     check(&mut session, "called off while bodies come and go");
 }
 
+/// All logs, or those of `RELUME_SEEDS=first..end`.
 #[test]
 #[ignore = "minutes: a thousand logs"]
 fn a_thousand_logs() {
-    follow(&room(), 1_000..1_800, 8, 0.15);
-    follow(&shipped("box_room.glb"), 2_000..2_100, 8, 0.1);
-    follow(&shipped("cornell_moving_box_and_lamp.glb"), 3_000..3_100, 8, 0.1);
+    let wanted = std::env::var("RELUME_SEEDS").map_or(0..u64::MAX, |seeds| {
+        let (first, end) = seeds.split_once("..").expect("RELUME_SEEDS=first..end");
+        first.parse().unwrap()..end.parse().unwrap()
+    });
+    let scenes = [
+        (room(), 1_000..1_800, 0.15),
+        (shipped("box_room.glb"), 2_000..2_100, 0.1),
+        (shipped("cornell_moving_box_and_lamp.glb"), 3_000..3_100, 0.1),
+    ];
+    let mut failed = Vec::new();
+    for (scene, seeds, insert) in scenes {
+        for seed in seeds.filter(|seed| wanted.contains(seed)) {
+            let one = || follow(&scene, seed..seed + 1, 8, insert);
+            failed.extend(std::panic::catch_unwind(one).is_err().then_some(seed));
+        }
+    }
+    assert_eq!(failed, Vec::<u64>::new());
 }
 
 #[test]
@@ -467,8 +494,16 @@ fn the_floor_under_a_crate_that_is_taken_away_is_lit() {
     assert!((floor(&mut session, 3.0) / beside - 1.0).abs() < 1e-3);
 }
 
+/// What stands in a hall.
+#[derive(Clone, Copy, PartialEq)]
+enum Contents {
+    Boxes,
+    /// Every other one a ball of many patches, which are grouped.
+    BallsToo,
+}
+
 /// A room with many boxes, a small one among them; its fifth body.
-fn hall(boxes: u32) -> Scene {
+fn hall(boxes: u32, what: Contents) -> Scene {
     let mut b = SceneBuilder::new("hall");
     let grey = b.material("grey", [0.5; 3], [0.0; 3]);
     let glow = b.material("glow", [0.1; 3], [9.0, 8.0, 7.0]);
@@ -480,7 +515,10 @@ fn hall(boxes: u32) -> Scene {
     for k in 0..boxes {
         let half = if k == 3 { 0.02 } else { 0.04 + 0.04 * r.unit() };
         let at = [k % 4, k / 4 % 4, k / 16].map(|n| 0.42 * f64::from(n) - 0.63 + 0.1 * r.unit());
-        let (corners, triangles) = cube(half, false);
+        let (corners, triangles) = match k % 2 == 0 && what == Contents::BallsToo {
+            true => ball(DVec3::ZERO, half),
+            false => cube(half, false),
+        };
         let corners: Vec<[f64; 3]> =
             corners.iter().map(|c| [0, 1, 2].map(|axis| c[axis] + at[axis])).collect();
         let body = b.body(&format!("box {k}"));
@@ -489,63 +527,112 @@ fn hall(boxes: u32) -> Scene {
     b.build().unwrap()
 }
 
-/// Solves, and says what it cost: pairs looked at, and seconds.
+/// Cost of a frame.
+#[derive(Clone, Copy, Debug)]
+struct Cost {
+    /// Pairs looked at.
+    pairs: u64,
+    seconds: f64,
+}
+
+/// Solves, and says what it cost.
 #[allow(clippy::disallowed_methods)] // seconds are printed, and decide nothing
-fn cost(session: &mut Session, what: &str) -> u64 {
+fn cost(session: &mut Session, what: &str) -> Cost {
     let start = Instant::now();
     let report = session.solve().unwrap().report().clone();
-    let (pairs, all) =
-        (report.work.examined + report.work.coarse_examined, start.elapsed().as_secs_f64());
-    let (links, of_pairs) = (report.links, report.seconds.evaluate);
-    println!("{what}: {pairs} pairs looked at, {of_pairs:.2} s; {all:.2} s in all, {links} links");
-    pairs
-}
-
-/// Costs of a cold build; of moving, inserting and removing a small body; of taking a box up and putting it down again.
-fn costs_of_edits(scene: &Scene, options: Options) -> [u64; 8] {
-    let mut session = Session::new(scene.clone(), options).unwrap();
-    let all = cost(&mut session, "cold");
-    let move_to = |session: &mut Session, x: f64, what: &str| {
-        let pose = Pose::translation([x, 0.02, -0.01]);
-        session.apply(Command::set_pose(BodyId(4), pose)).unwrap();
-        cost(session, what)
+    let cost = Cost {
+        pairs: report.work.examined + report.work.coarse_examined,
+        seconds: start.elapsed().as_secs_f64(),
     };
-    let first = move_to(&mut session, 0.03, "take hold of it");
-    let again = move_to(&mut session, 0.06, "move it");
-    let (corners, triangles) = cube(0.02, false);
-    let shifted: Vec<[f64; 3]> = corners.iter().map(|c| [c[0] + 0.05, c[1], c[2]]).collect();
-    let new = NewBody::new("new").with_mesh("new", MaterialId(0), &shifted, &triangles);
-    let back = session.apply(Command::Insert(new)).unwrap();
-    let inserted = cost(&mut session, "insert one");
-    session.apply(back).unwrap();
-    let removed = cost(&mut session, "remove it");
-    let back = session.apply(Command::Remove(BodyId(4))).unwrap();
-    let made = cost(&mut session, "remove the other");
-    session.apply(back).unwrap();
-    let returned = cost(&mut session, "put it back");
-    session.apply(Command::SetPose(BodyId(4), None)).unwrap();
-    [all, first, again, inserted, removed, made, returned, cost(&mut session, "let it go")]
+    let s = report.seconds;
+    println!(
+        "{what}: {} pairs looked at, {:.2} s (move {:.2}, predict {:.2}, pairs {:.2}, edit {:.2}, solve {:.2}), {} links",
+        cost.pairs, cost.seconds, s.moving, s.predict, s.evaluate, s.edit, s.solve, report.links
+    );
+    cost
 }
 
-/// Asserts that no edit of a scene costs more than twice what moving its small body does.
-fn edits_cost_as_moves(scene: &Scene, options: Options) {
-    let [cold, hold, moved, inserted, removed, taken, back, release] =
-        costs_of_edits(scene, options);
-    assert!(4 * moved < cold, "{moved} of {cold} pairs");
-    for cost in [hold, inserted, removed, taken, back, release] {
-        assert!(cost <= 2 * moved, "{cost}, and {moved} for a move");
+/// Costs of edits of a scene.
+struct Costs {
+    cold: Cost,
+    /// Of moving the box that comes and goes.
+    moved: Cost,
+    edits: Vec<Cost>,
+}
+
+fn place(session: &mut Session, body: BodyId, to: Option<DVec3>) {
+    session.apply(Command::SetPose(body, to.map(Pose::translation))).unwrap();
+}
+
+/// Costs of a small box that comes, moves and leaves.
+fn costs_of_a_new_box(session: &mut Session) -> Costs {
+    let cold = cost(session, "cold");
+    let (corners, triangles) = cube(0.02, false);
+    let new = NewBody::new("new").with_mesh("new", MaterialId(0), &corners, &triangles);
+    let body = BodyId(session.scene().bodies.len() as u32);
+    let out = session.apply(Command::Insert(new)).unwrap();
+    place(session, body, Some(v(0.05, 0.0, 0.0)));
+    let inserted = cost(session, "insert a box");
+    place(session, body, Some(v(0.08, 0.02, -0.01)));
+    let moved = cost(session, "move it");
+    let back = session.apply(out).unwrap();
+    let removed = cost(session, "remove it");
+    session.apply(back).unwrap();
+    let returned = cost(session, "put it back");
+    Costs { cold, moved, edits: vec![inserted, removed, returned] }
+}
+
+/// Costs of a small box of the scene that is taken up, moved, taken out, put back, and put down where it was.
+fn costs_of_a_box_of_the_scene(session: &mut Session) -> Costs {
+    let body = BodyId(4);
+    let cold = cost(session, "cold");
+    place(session, body, Some(v(0.03, 0.02, -0.01)));
+    let hold = cost(session, "take hold of one");
+    place(session, body, Some(v(0.06, 0.02, -0.01)));
+    let moved = cost(session, "move it");
+    let back = session.apply(Command::Remove(body)).unwrap();
+    let removed = cost(session, "remove it");
+    session.apply(back).unwrap();
+    let returned = cost(session, "put it back");
+    place(session, body, None);
+    let release = cost(session, "let it go");
+    Costs { cold, moved, edits: vec![hold, removed, returned, release] }
+}
+
+/// Asserts that no edit of a scene costs more than twice the pairs that moving its small body does; returns by how much more
+/// time the dearest one takes.
+fn edits_cost_as_moves(Costs { cold, moved, edits }: &Costs) -> f64 {
+    assert!(4 * moved.pairs < cold.pairs, "{} of {} pairs", moved.pairs, cold.pairs);
+    let is_cheap = |edit: &Cost| edit.pairs <= 2 * moved.pairs;
+    assert!(edits.iter().all(is_cheap), "{edits:?}, and {moved:?} for a move");
+    edits.iter().map(|edit| edit.seconds / moved.seconds).fold(0.0, f64::max)
+}
+
+#[test]
+#[ignore = "minutes: two million links"]
+fn edits_in_a_scene_of_two_million_links_cost_as_moves() {
+    let session = |what: Contents, tolerance: f64, groups: bool| {
+        let options = Options { groups, ..at_tolerance(tolerance) };
+        Session::new(hall(60, what), options).unwrap()
+    };
+    for costs in [
+        costs_of_a_new_box(&mut session(Contents::Boxes, 0.001, false)),
+        costs_of_a_box_of_the_scene(&mut session(Contents::Boxes, 0.001, false)),
+        // With groups, a box of the scene that rests is grouped with others: taking it up is a cold build.
+        costs_of_a_new_box(&mut session(Contents::Boxes, 0.001, true)),
+        costs_of_a_new_box(&mut session(Contents::BallsToo, 0.02, true)),
+    ] {
+        let times = edits_cost_as_moves(&costs);
+        println!("{times:.2} times the seconds of a move");
+        assert!(times < 2.0);
     }
 }
 
 #[test]
-#[ignore = "minutes: a million links"]
-fn edits_in_a_scene_of_a_million_links_cost_as_moves() {
-    edits_cost_as_moves(&hall(60), Options { groups: false, ..at_tolerance(0.002) });
-}
-
-#[test]
 fn a_body_that_comes_or_goes_costs_as_one_that_moves() {
-    edits_cost_as_moves(&hall(8), at_tolerance(0.1));
+    let session = || Session::new(hall(8, Contents::Boxes), at_tolerance(0.1)).unwrap();
+    edits_cost_as_moves(&costs_of_a_new_box(&mut session()));
+    edits_cost_as_moves(&costs_of_a_box_of_the_scene(&mut session()));
 }
 
 #[test]
@@ -575,6 +662,10 @@ fn a_body_of_many_patches_is_taken_up_where_it_rests() {
     let new = NewBody::new("new").with_mesh("new", MaterialId(0), &points, &faces);
     let out = session.apply(Command::Insert(new)).unwrap();
     check(&mut session, "another one comes");
+    let mut anew = cold(&session);
+    anew.solve().unwrap();
+    let found = compare(session.solved().unwrap(), anew.solved().unwrap());
+    assert_eq!(found, None, "links of groups are carried over as they are");
     session.apply(out).unwrap();
     session.apply(undo).unwrap();
     check(&mut session, "and leaves, and the first is put down");
@@ -607,7 +698,7 @@ fn edits_come_to_the_same_on_any_number_of_threads() {
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let mut session = Session::new(hall(5), at_tolerance(0.2)).unwrap();
+            let mut session = Session::new(hall(5, Contents::Boxes), at_tolerance(0.2)).unwrap();
             let mut r = Random(9);
             let mut hashes = vec![session.solve().unwrap().hash()];
             let mut inverses = Vec::new();

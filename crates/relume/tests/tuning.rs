@@ -1,4 +1,4 @@
-//! docs/tuning.md: the calibration constants of the engine, made of the files `tuning.rs` of its rooms.
+//! docs/tuning.md: the calibration constants, made of the files `tuning.rs` of the engine's rooms, of pictures and of the command.
 //!
 //! `RELUME_DOCS=1 cargo test -p relume tuning::` writes the page anew.
 
@@ -87,19 +87,22 @@ fn rooms() -> Vec<(String, Vec<Constant>)> {
     let mut dirs: Vec<PathBuf> =
         fs::read_dir(engine()).unwrap().map(|entry| entry.unwrap().path()).collect();
     dirs.sort();
+    let name = |dir: &PathBuf| dir.file_name().unwrap().to_str().unwrap().to_owned();
+    let mut rooms: Vec<(String, PathBuf)> = dirs.into_iter().map(|dir| (name(&dir), dir)).collect();
+    rooms.push(("pictures".into(), engine().join("../../relume-picture/src/picture")));
+    rooms.push(("the command".into(), engine().join("../../relume-cli/src")));
     let mut found = Vec::new();
-    for dir in dirs {
+    for (room, dir) in rooms {
         let Ok(text) = fs::read_to_string(dir.join("tuning.rs")) else { continue };
-        let room = dir.file_name().unwrap().to_str().unwrap().to_owned();
-        let constants = constants(&text).unwrap_or_else(|flaw| panic!("{room}/tuning.rs: {flaw}"));
+        let constants = constants(&text).unwrap_or_else(|flaw| panic!("{room}: {flaw}"));
         found.push((room, constants));
     }
     found
 }
 
 const HEAD: &str = "# Calibration constants\n\n\
-    Numbers of the engine that were chosen, not derived: each trades accuracy against time or memory. The page is made of the\n\
-    files `tuning.rs` of the engine's rooms; a test holds the two equal (`RELUME_DOCS=1 cargo test -p relume tuning::` writes it).\n\
+    Numbers that were chosen, not derived: each trades accuracy against time or memory. The page is made of the files\n\
+    `tuning.rs` of the engine's rooms, of pictures and of the command; a test holds the two equal (`RELUME_DOCS=1 cargo test -p relume tuning::` writes it).\n\
     \"Not varied\": no other value is on record. What was measured is in [tolerance.md](tolerance.md), [exchange.md](exchange.md)\n\
     and [decisions](decisions).\n";
 

@@ -25,6 +25,7 @@ use crate::interrupt;
 use crate::memory;
 use crate::output;
 use crate::paper::make;
+use crate::plan::Plan;
 use crate::sequence::{Sequence, Stepping};
 use crate::verify;
 
@@ -91,7 +92,7 @@ pub(crate) fn flat(args: &FlatArgs) -> Result<(), Failure> {
     let run = Run { scene: Arc::new(scene), name, args, frames };
     let measure = &args.measure;
     if args.bench {
-        return bench::measure(&bench::Plan::new(measure, args.update, false), &run, None);
+        return bench::measure(&Plan::new(measure, args.update, false), &run, None);
     }
     if measure.compare || measure.json.is_some() || measure.every != 1 {
         return Err(Failure::usage("--compare, --json and --every go with --bench")

@@ -19,7 +19,7 @@ mod pool;
 mod replant;
 
 use super::tuning::EXPOSED_LEAST;
-pub use replant::old_coarse_numbers;
+pub use replant::{Seeds, old_coarse_numbers};
 
 /// What differs between siblings: 20 bytes.
 #[derive(Clone, Copy, Debug)]

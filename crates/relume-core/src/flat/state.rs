@@ -154,8 +154,8 @@ impl Space for PlaneState {
     fn balance(state: &FlatSolved) -> Balance {
         let PlaneState { scene, forest, .. } = &state.space;
         let facets = forest.facets().iter().copied();
-        let solution = (&state.links, &state.radiosity);
-        let (rows, energy) = balance_of(&LitPlane::new(scene, forest), solution, facets, &|_| true);
+        let (lit, Follower { links, radiosity, .. }) = (LitPlane::new(scene, forest), state);
+        let (rows, energy) = balance_of(&lit, links, radiosity, facets, &|_| true);
         Balance { rows, energy, suspects: Vec::new() }
     }
 

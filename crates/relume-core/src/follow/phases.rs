@@ -310,8 +310,8 @@ impl<S: Space> Follower<S> {
             // Light of earlier frames would decay without end.
             self.radiosity = dark;
         } else if self.is_settled() {
-            let bound = (residual, mean_radiosity_limit(bound_w_m2));
-            self.radiosity.solve_bounded(&surfaces, &self.links, dirty, bound);
+            let most = mean_radiosity_limit(bound_w_m2);
+            self.radiosity.solve_bounded(&surfaces, &self.links, dirty, residual, most);
         } else {
             let mean = self.last_exact_mean_w_m2 * self.space.brightened(goal);
             // If the last exact solution was black, there is no growth bound.

@@ -8,7 +8,8 @@ use super::report::{Energy, RowSumError};
 /// Row sums and energies of some facets.
 pub(crate) fn balance_of(
     surfaces: &impl Surfaces,
-    (links, radiosity): (&Links, &Radiosity),
+    links: &Links,
+    radiosity: &Radiosity,
     facets: impl Iterator<Item = ElementId>,
     is_surface: &(dyn Fn(u32) -> bool + Sync),
 ) -> (RowSumError, Energy) {
@@ -20,7 +21,7 @@ pub(crate) fn balance_of(
     for facet in facets {
         let material = surfaces.material(facet.0);
         sums.clear();
-        row_sums(surfaces, (links, linear), is_surface, facet.0, &mut |_, sum| sums.push(*sum));
+        row_sums(surfaces, links, linear, is_surface, facet.0, &mut |_, sum| sums.push(*sum));
         let mut next = sums.iter();
         radiosity.irradiances(surfaces, facet.0, &mut |id, h| {
             let a = surfaces.area_m2(id);

@@ -114,12 +114,14 @@ impl<'a> BoxShaft<'a> {
         !world.is_empty() && shaft.meets(bounds, self.margin_m)
     }
 
-    /// Whether a patch blocks no segment of this pair or of one below it though its box may meet the shaft.
+    /// Whether a patch blocks no segment of this pair or of one below it though its box may meet the shaft. A lamp behind one end
+    /// may light the other one unevenly.
     fn is_spared_by(&self, patch: PatchId) -> bool {
         if self.view.is_hidden_twin(patch) {
             return true;
         }
-        self.patches.iter().flatten().any(|&end| patch == end || self.is_behind(patch, end))
+        let is_behind = |end| !self.forest.glows(patch) && self.is_behind(patch, end);
+        self.patches.iter().flatten().any(|&end| patch == end || is_behind(end))
     }
 
     /// Whether a patch is wholly behind the plane of another, and does not lie in it.

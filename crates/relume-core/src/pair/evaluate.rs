@@ -41,6 +41,14 @@ pub(super) enum Outcome {
     Judged(Judgement, Stale, Below, Option<Tick>),
 }
 
+/// Lists of candidate occluders of a task.
+struct Lists<'a> {
+    /// Those of all pairs of the wave.
+    candidates: &'a [u32],
+    /// Those of the children of the task's pairs.
+    narrowed: &'a mut Vec<u32>,
+}
+
 /// Evaluates a block of pairs in parallel, in chunks whose order is that of the pairs.
 pub(super) fn judge_block<'a, J: Judge>(
     tree: &PairTree,
@@ -53,7 +61,9 @@ pub(super) fn judge_block<'a, J: Judge>(
         let mut narrowed = Vec::new();
         let outcomes = items
             .iter()
-            .map(|item| evaluate(tree, judge, item, (candidates, &mut narrowed), fresh))
+            .map(|item| {
+                evaluate(tree, judge, item, Lists { candidates, narrowed: &mut narrowed }, fresh)
+            })
             .collect();
         let ends = items.iter().map(|item| tree.ends(item.pair)).collect();
         Chunk { items, ends, outcomes, candidates: narrowed }
@@ -66,7 +76,7 @@ fn evaluate<J: Judge>(
     tree: &PairTree,
     judge: &J,
     item: &Item,
-    (candidates, narrowed): (&[u32], &mut Vec<u32>),
+    Lists { candidates, narrowed }: Lists<'_>,
     fresh: &[PairId],
 ) -> Outcome {
     let (a, b) = tree.ends(item.pair);
@@ -107,7 +117,7 @@ fn evaluate<J: Judge>(
         }
         _ => {}
     }
-    judge_again(tree, judge, item, stale, (candidates, narrowed), &unaffected)
+    judge_again(tree, judge, item, stale, Lists { candidates, narrowed }, &unaffected)
 }
 
 /// Judges a pair of which something changed; `unaffected` is its certificate where nothing but the light did.
@@ -116,7 +126,7 @@ fn judge_again<J: Judge>(
     judge: &J,
     item: &Item,
     stale: Stale,
-    (candidates, narrowed): (&[u32], &mut Vec<u32>),
+    Lists { candidates, narrowed }: Lists<'_>,
     unaffected: &dyn Fn() -> Option<Tick>,
 ) -> Outcome {
     let ((a, b), state) = (tree.ends(item.pair), tree.state(item.pair));
@@ -145,7 +155,7 @@ fn judge_again<J: Judge>(
     }
     let expiry = match stale == Stale::Brightness {
         true if !matches!(found.verdict, Verdict::Cull(_) | Verdict::CoarseLink) => unaffected(),
-        _ => certificate(judge, (a, b), (found.verdict, stale), may_be_clear),
+        _ => certificate(judge, (a, b), found.verdict, stale, may_be_clear),
     };
     let list = match stale {
         Stale::Followed => Below::Own(List::CLEAR),
@@ -158,10 +168,11 @@ fn judge_again<J: Judge>(
 fn certificate<J: Judge>(
     judge: &J,
     (a, b): (ElementId, ElementId),
-    found: (Verdict, Stale),
+    verdict: Verdict,
+    stale: Stale,
     may_be_clear: bool,
 ) -> Option<Tick> {
-    match found {
+    match (verdict, stale) {
         // What covers it may leave.
         (Verdict::Cull(CullReason::Covered), _) => Some(judge.expiry(a, b, Finding::Unaffected)),
         (Verdict::Cull(_), _) => Some(judge.expiry(a, b, Finding::Culled)),

@@ -435,6 +435,8 @@ impl SpaceJudge<'_> {
         }
         // How many times too large the area is that verdicts are first made with.
         let mut overstated = 1.0;
+        // The errors of those verdicts, where they were not enough to refine.
+        let mut by_points: Option<Estimate> = None;
         if x.is_steep {
             // What the smaller area by points is enough to refine needs no better one.
             if let (Stage::Fine(brightness), Oracle::Error { threshold }) =
@@ -449,6 +451,7 @@ impl SpaceJudge<'_> {
                 if let Some(refined) = refined(&e, wish, threshold, Margin::ENDLESS, 0) {
                     return refined;
                 }
+                by_points = Some(e);
             }
             let exact = x.along_outlines(place_a, place_b);
             overstated = (x.area_m2 / exact.area_m2.max(f64::MIN_POSITIVE)).max(1.0);
@@ -545,14 +548,21 @@ impl SpaceJudge<'_> {
         let stake = factor / threshold.max(FINEST);
         let both_ways = way != Margin::ENDLESS;
         let wish = self.wish((a, b), &ends, &e);
-        if let Some(refined) = refined(&e, wish, threshold, way, v.segments) {
+        // In another light the errors by points may be enough to refine, and that perhaps the other side.
+        let until_points = by_points
+            .map_or(Margin::ENDLESS, |e| Margin::between(threshold, e.error().min(threshold)));
+        if let Some(refined) = refined(&e, wish, threshold, way.min(until_points), v.segments) {
             return refined;
         }
-        let below = |error: f64| match wish {
-            Some(_) => way.min(Margin::between(threshold, (overstated * error).min(threshold))),
+        let below = |side: usize| match wish {
+            Some(_) => {
+                let by_points = by_points.map_or(0.0, |e| e.on[side]);
+                let error = (overstated * e.on[side]).max(by_points);
+                way.min(Margin::between(threshold, error.min(threshold)))
+            }
             None => way,
         };
-        let margin = Margin::Link { on: e.on.map(below), both_ways };
+        let margin = Margin::Link { on: [below(0), below(1)], both_ways };
         // How V is found may depend on the light.
         if let Some(&carried) = known.filter(|_| !both_ways) {
             return Judgement { verdict: Verdict::Link, carried, margin, segments: v.segments };

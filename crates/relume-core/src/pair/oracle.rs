@@ -123,8 +123,10 @@ pub(super) fn estimate(
         leverage: blockers.leverage.0,
     };
     let back = LinkSize { leverage: blockers.leverage.1, ..link };
-    let (on_a, by_a, by_b) = one_way(&link, (a, &over_a), (b, &over_b));
-    let (on_b, cy_b, cy_a) = one_way(&back, (b, &over_b), (a, &over_a));
+    let (on_a, by_a, by_b) =
+        one_way(&link, Over { end: a, uneven: &over_a }, Over { end: b, uneven: &over_b });
+    let (on_b, cy_b, cy_a) =
+        one_way(&back, Over { end: b, uneven: &over_b }, Over { end: a, uneven: &over_a });
     Estimate { on: [on_a, on_b], mends: (by_a + cy_a, by_b + cy_b) }
 }
 
@@ -180,11 +182,18 @@ struct Uneven {
     jump: f64,
 }
 
+/// An end, and how unevenly light crosses a link over it.
+#[derive(Clone, Copy)]
+struct Over<'a> {
+    end: &'a End,
+    uneven: &'a Uneven,
+}
+
 /// Error on the receiver, and the parts of it that splitting receiver and source would mend.
 fn one_way(
     link: &LinkSize,
-    (receiver, over_receiver): (&End, &Uneven),
-    (source, over_source): (&End, &Uneven),
+    Over { end: receiver, uneven: over_receiver }: Over<'_>,
+    Over { end: source, uneven: over_source }: Over<'_>,
 ) -> (f64, f64, f64) {
     if receiver.area <= 0.0 {
         return (0.0, 0.0, 0.0);

@@ -12,10 +12,11 @@ use crate::scene::{BodyId, Scene};
 
 use crate::element::{distant_parts, grouped_patches};
 
+use super::tuning::{
+    BYTES, FITTED_AT, GROUPED_AT, GROUPS, PAIRS_OF_FACING, PAIRS_OF_GROUPED, PAIRS_OF_PATCHES,
+    REFINED, REFINED_MOST, SECONDS, TRIED,
+};
 use super::{Options, Oracle};
-
-/// Pairs of patches that are tried at most: of more, an even share.
-const TRIED: u64 = 4_000_000;
 
 /// Estimated work of one frame from scratch: rough ranges from low to high, which do not bound every scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,28 +134,6 @@ impl Estimate {
         }
     }
 }
-
-/// Pairs for each pair of patches, low and high; those that face each other bring some more.
-const PAIRS_OF_PATCHES: [f64; 2] = [0.8, 1.3];
-const PAIRS_OF_FACING: f64 = 1.7;
-
-/// Pairs that refinement adds at the tolerance [`FITTED_AT`], and for each patch: low and high. In inverse proportion
-/// to the tolerance; for each pair that faces at most [`REFINED_MOST`].
-const REFINED: [(f64, f64); 2] = [(0.0, 100.0), (70_000.0, 2_000.0)];
-const FITTED_AT: f64 = 0.02;
-const REFINED_MOST: f64 = 1e4;
-
-/// Groups that are in no other, low and high.
-const GROUPS: [f64; 2] = [50.0, 600.0];
-
-/// Pairs for each patch of groups, low and high; the latter at the tolerance [`GROUPED_AT`], of finer ones in inverse
-/// proportion.
-const PAIRS_OF_GROUPED: [f64; 2] = [40.0, 700.0];
-const GROUPED_AT: f64 = 0.1;
-
-/// Bytes and seconds of one core for a pair, low and high.
-const BYTES: [f64; 2] = [55.0, 200.0];
-const SECONDS: [f64; 2] = [8e-6, 45e-6];
 
 #[cfg(test)]
 mod tests {

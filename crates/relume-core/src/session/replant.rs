@@ -7,10 +7,10 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::element::{Forest, WorldView, old_coarse_numbers};
+use crate::element::{Forest, Seeds, WorldView, old_coarse_numbers};
 use crate::geometry::Pose;
 use crate::scene::{BodyId, Held, Patch, Scene};
-use crate::space::{Bed, Before, Solved, group_links};
+use crate::space::{Bed, Before, Solved, group_links, replanted_links};
 
 use super::{Session, Update};
 
@@ -89,7 +89,7 @@ impl Session {
         let last = from.and_then(|from| {
             let Moved { last, was, body, .. } = from;
             let old = Bed { scene: was, ..self.bed.clone() };
-            replanted(last, (&old, &bed), &body)
+            replanted(last, &old, &bed, &body)
         });
         let remains = (!Arc::ptr_eq(&onto, &scene)).then(|| Arc::clone(&scene));
         self.bed = match (&last, &remains) {
@@ -146,7 +146,7 @@ impl Session {
         let bed = self.plant(scene, &self.displaced, &self.held);
         let count = bed.scene.bodies.len();
         let body = |body: BodyId| ((body.0 as usize) < count).then_some(body);
-        let mut last = replanted(last, (&self.bed, &bed), &body).expect("the same but for bodies");
+        let mut last = replanted(last, &self.bed, &bed, &body).expect("the same but for bodies");
         debug_assert!(last.space.touched.is_empty(), "what has left covers nothing");
         last.compact();
         self.bed = bed;
@@ -187,10 +187,11 @@ struct Moved {
 /// A state in the scene of another bed: what is new there is absent. `None` if what they have in common is not alike.
 fn replanted(
     mut last: Solved,
-    (old, new): (&Bed, &Bed),
+    old: &Bed,
+    new: &Bed,
     body: &dyn Fn(BodyId) -> Option<BodyId>,
 ) -> Option<Solved> {
-    let seeds = (&old.seed, &new.seed);
+    let seeds = Seeds { old: &old.seed, new: &new.seed };
     let to = last.space.forest.renumbering_to(seeds, body)?;
     let (forest, touched) = last.space.forest.replanted(seeds, &to);
     last.space.scene = Arc::clone(&new.scene);
@@ -215,8 +216,18 @@ fn replanted(
     for world in [&mut space.world, &mut space.sound_world] {
         *world = world.of_bodies(&from);
     }
-    space.view = WorldView::new(&new.scene, &space.forest, &space.world);
-    space.groups = group_links((&space.forest, &space.view), &last.tree, &Before::default());
+    let view = WorldView::new(&new.scene, &space.forest, &space.world);
+    let was = std::mem::replace(&mut space.view, view);
+    let links = std::mem::take(&mut space.groups);
+    // Links that carry otherwise over what is covered otherwise, or is rounded otherwise, are found anew.
+    let keeps_links = space.touched.is_empty() && was.far_m() == space.view.far_m();
+    space.groups = match keeps_links {
+        true => replanted_links(links, &to, &space.forest),
+        false => {
+            let places = (&space.forest, &space.view);
+            group_links(places, &last.tree, &Before::default())
+        }
+    };
     let mut report = std::mem::take(&mut last.report);
     last.count(&mut report);
     last.report = report;

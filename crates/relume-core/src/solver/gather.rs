@@ -6,20 +6,34 @@ use super::field::{Field, Linear};
 use super::links::{Link, Links};
 use super::surfaces::Surfaces;
 
+/// Scales of the lines of a receiver and its sources.
+#[derive(Clone, Copy)]
+struct Scales {
+    /// Inverse of the receiver's radius, 1/m.
+    per_radius: f32,
+    /// See [`Surfaces::source_moment`].
+    source_moment: f32,
+}
+
 /// Everything some receivers gather; each in the order of its links.
 #[inline(always)]
 pub(super) fn gather_some<S: Simd>(
     simd: S,
-    (radiosity, links): (&Field, &Links),
+    radiosity: &Field,
+    links: &Links,
     surfaces: &impl Surfaces,
-    (receivers, linear): (&[u32], bool),
+    receivers: &[u32],
+    linear: bool,
     out: &mut [Linear],
 ) {
     for (&id, h) in receivers.iter().zip(out) {
         *h = match links.of(id) {
             [] => Linear::default(),
             list => {
-                let scales = (1.0 / surfaces.place(id).radius, surfaces.source_moment());
+                let scales = Scales {
+                    per_radius: 1.0 / surfaces.place(id).radius,
+                    source_moment: surfaces.source_moment(),
+                };
                 match linear {
                     true => gather_one(simd, radiosity, list, scales),
                     false => gather_means(radiosity, list),
@@ -47,7 +61,7 @@ fn gather_one<S: Simd>(
     simd: S,
     radiosity: &Field,
     list: &[Link],
-    (per_radius, source_moment): (f32, f32),
+    Scales { per_radius, source_moment }: Scales,
 ) -> Linear {
     let zero = f32x4::splat(simd, 0.0);
     let (mut mean, mut gx, mut gy) = (zero, zero, zero);

@@ -219,6 +219,28 @@ impl GroupLinks {
         self.rows = OnceLock::new();
     }
 
+    /// The same links where the forest grows from another seed: elements have other ids, facets of groups other places. `facets`
+    /// and `roots` are as in [`GroupLinks::new`]; `leaves` gives the places of the facets of a group by its new id.
+    pub fn replanted(
+        self,
+        to: &Renumbering,
+        facets: Vec<(u32, f32)>,
+        roots: Vec<Range<u32>>,
+        leaves: &dyn Fn(u32) -> Range<u32>,
+    ) -> GroupLinks {
+        let GroupLinks { mut links, mut ids, factors, moment, .. } = self;
+        for (link, ids) in links.iter_mut().zip(&mut ids) {
+            *ids = ids.map(|id| to.new_of(id));
+            for (end, &new) in link.ends.iter_mut().zip(&*ids) {
+                match end {
+                    GroupEnd::Element { id, .. } => *id = new,
+                    GroupEnd::Group { facets, .. } => *facets = leaves(new),
+                }
+            }
+        }
+        GroupLinks::new(facets, roots, PlacedLinks { links, ids, factors }, moment)
+    }
+
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.links.is_empty()

@@ -18,7 +18,8 @@ pub struct RowSum {
 /// ancestors' links: as lines, or as means alone unless `linear`.
 pub fn row_sums(
     surfaces: &impl Surfaces,
-    (links, linear): (&Links, bool),
+    links: &Links,
+    linear: bool,
     counts: &(dyn Fn(u32) -> bool + Sync),
     facet: u32,
     visit: &mut dyn FnMut(u32, &RowSum),
@@ -45,7 +46,7 @@ pub fn row_sums(
         }
     };
     let place = surfaces.place(facet);
-    push(surfaces, (facet, &place), &Linear::default(), &own, &mut |id, sum| {
+    push(surfaces, facet, &place, &Linear::default(), &own, &mut |id, sum| {
         visit(id, &RowSum { mean: sum.mean[0], gradient: sum.gradient.map(|g| g[0]) });
     });
 }
@@ -53,7 +54,8 @@ pub fn row_sums(
 /// Adds `own` up from the root of a quadtree down to its leaves.
 pub(super) fn push(
     surfaces: &impl Surfaces,
-    (id, place): (u32, &Place),
+    id: u32,
+    place: &Place,
     inherited: &Linear,
     own: &dyn Fn(u32) -> Linear,
     visit: &mut dyn FnMut(u32, &Linear),
@@ -65,6 +67,6 @@ pub(super) fn push(
     }
     for child in children {
         let at = surfaces.place(child);
-        push(surfaces, (child, &at), &whole.about(place, &at), own, visit);
+        push(surfaces, child, &at, &whole.about(place, &at), own, visit);
     }
 }

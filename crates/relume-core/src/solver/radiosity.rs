@@ -212,7 +212,7 @@ impl Radiosity {
         visit: &mut dyn FnMut(u32, &Linear),
     ) {
         let own = |id: u32| self.gathered.get(id);
-        push(surfaces, (facet, &surfaces.place(facet)), &Linear::default(), &own, &mut |id, h| {
+        push(surfaces, facet, &surfaces.place(facet), &Linear::default(), &own, &mut |id, h| {
             match self.scaling.factors.get(id as usize) {
                 Some(&factor) => visit(id, &h.times(factor)),
                 None => visit(id, h),

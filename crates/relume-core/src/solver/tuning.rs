@@ -92,7 +92,7 @@ pub(super) const GAIN_MAX: f64 = 0.0015;
 /// - Smaller: time: a pass over all links where nothing can grow
 pub(super) const WHITE: f32 = 0.85;
 
-/// Least share of a leaf; the largest is its inverse.
+/// Least factor of a leaf; the largest is its inverse.
 ///
 /// - Unit: 1
 /// - Tried: 0.25
@@ -107,3 +107,19 @@ pub(super) const FACTOR_LEAST: f32 = 0.25;
 /// - Larger: time, in white scenes
 /// - Smaller: rows above 1
 pub(super) const SCALING_ROUNDS: u32 = 32;
+
+/// Sweeps after which a solve is given up as not converging (reflectances are below 1).
+///
+/// - Unit: sweeps
+/// - Tried: not varied
+/// - Larger: time until an error is said
+/// - Smaller: solutions between very bright surfaces are refused
+pub(super) const SWEEPS_MAX: u32 = 2_000;
+
+/// Sweeps over everything by which a solution is settled further, at most: beyond that it is said that light is unaccounted for.
+///
+/// - Unit: sweeps
+/// - Tried: not varied
+/// - Larger: time of scenes of white surfaces
+/// - Smaller: light of white scenes stays unaccounted for
+pub(super) const FURTHER_MAX: u32 = 32;

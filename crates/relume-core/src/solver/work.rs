@@ -106,8 +106,10 @@ impl Work {
     /// Marks who gathers from an element that changed, as soon as the changes add up to something.
     pub(super) fn mark_neighbours(
         &mut self,
-        (surfaces, links): (&impl Surfaces, &Links),
-        (id, change): (u32, f32),
+        surfaces: &impl Surfaces,
+        links: &Links,
+        id: u32,
+        change: f32,
         limit: f32,
         pending: &mut [f32],
     ) {
@@ -157,8 +159,8 @@ impl Work {
             // From now on only what depends on a change.
             self.all = false;
             self.batches.iter_mut().for_each(|b| b.receivers.clear());
-            for change in std::mem::take(&mut self.changed) {
-                self.mark_neighbours((surfaces, links), change, limit, pending);
+            for (id, change) in std::mem::take(&mut self.changed) {
+                self.mark_neighbours(surfaces, links, id, change, limit, pending);
             }
         } else if many && !self.all {
             self.start_all(surfaces);

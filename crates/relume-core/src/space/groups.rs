@@ -1,10 +1,11 @@
 //! Links that end on groups of patches, as numbers for the solver: from the pair tree and the poses.
 
 use std::f64::consts::FRAC_1_PI;
+use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::element::{ElementId, Forest, WorldView};
+use crate::element::{ElementId, Forest, Renumbering, WorldView};
 use crate::geometry::Aabb;
 use crate::pair::{self, PairTree};
 use crate::scene::{BodyId, PatchId, Scene};
@@ -112,10 +113,38 @@ pub(crate) fn group_links(
     let parts: Vec<PlacedLinks> = all.par_chunks(LINKS_AT_ONCE).map(place).collect();
     let mut links = PlacedLinks::default();
     parts.into_iter().for_each(|part| links.extend(part));
-    let facets = groups.leaves().iter().map(|leaf| (leaf.facet.0, leaf.area_m2 as f32)).collect();
-    let root = |&root: &ElementId| forest.group(root).expect("a root is a group").leaves.clone();
-    let roots = groups.roots().iter().map(root).collect();
+    let Facets { facets, roots } = facets_of(forest);
     GroupLinks::new(facets, roots, links, SQUARE_MOMENT)
+}
+
+/// The group links of a forest that grew from one seed, as it grows from another: each as it was.
+pub(crate) fn replanted_links(links: GroupLinks, to: &Renumbering, forest: &Forest) -> GroupLinks {
+    if links.is_empty() {
+        return GroupLinks::default();
+    }
+    let Facets { facets, roots } = facets_of(forest);
+    links.replanted(to, facets, roots, &|id| leaves_of(forest, ElementId(id)))
+}
+
+/// Facets of the groups of a forest.
+struct Facets {
+    /// Ids and areas, m2, those of each group side by side.
+    facets: Vec<(u32, f32)>,
+    /// Places of those of each group that is in no other.
+    roots: Vec<Range<u32>>,
+}
+
+fn facets_of(forest: &Forest) -> Facets {
+    let groups = forest.groups();
+    let leaves = groups.leaves().iter();
+    Facets {
+        facets: leaves.map(|leaf| (leaf.facet.0, leaf.area_m2 as f32)).collect(),
+        roots: groups.roots().iter().map(|&root| leaves_of(forest, root)).collect(),
+    }
+}
+
+fn leaves_of(forest: &Forest, id: ElementId) -> Range<u32> {
+    forest.group(id).expect("it is a group").leaves.clone()
 }
 
 /// A link from the poses; with rays where something is in its way.

@@ -12,7 +12,7 @@ use super::surfaces::LitForest;
 /// Row sums and energies: a pass over all links and elements.
 pub(super) fn balance(solved: &Solved) -> Balance {
     let (rows, energy) = flux(solved);
-    let is_off = energy.unbalanced() > UNBALANCED || solved.radiosity.is_bounded();
+    let is_off = energy.unbalanced() > UNBALANCED || !solved.radiosity.is_linear();
     Balance { rows, energy, suspects: if is_off { suspects(solved) } else { Vec::new() } }
 }
 
@@ -28,8 +28,8 @@ fn flux(solved: &Solved) -> (RowSumError, Energy) {
     };
     let facets = forest.near_facets().iter().copied().filter(present);
     let is_surface = |id: u32| forest.receives(ElementId(id));
-    let solution = (&solved.links, &solved.radiosity);
-    let (rows, mut energy) = balance_of(&surfaces, solution, facets, &is_surface);
+    let Solved { links, radiosity, .. } = solved;
+    let (rows, mut energy) = balance_of(&surfaces, links, radiosity, facets, &is_surface);
     let lights = lights_w(solved);
     energy.emitted_w += lights.0 + from_outside_w(&surfaces, solved);
     energy.escaped_w += lights.0 - lights.1;
@@ -116,8 +116,8 @@ pub(crate) fn row_sums_of(solved: &Solved) -> Vec<(ElementId, f64)> {
     let is_surface = |id: u32| forest.receives(ElementId(id));
     let mut out = Vec::with_capacity(forest.counts().leaves as usize);
     for facet in forest.near_facets() {
-        let links = (&solved.links, solved.radiosity.is_linear());
-        row_sums(&surfaces, links, &is_surface, facet.0, &mut |id, sum| {
+        let linear = solved.radiosity.is_linear();
+        row_sums(&surfaces, &solved.links, linear, &is_surface, facet.0, &mut |id, sum| {
             out.push((ElementId(id), f64::from(sum.mean)));
         });
     }

@@ -5,7 +5,7 @@
 use std::cell::OnceCell;
 use std::path::Path;
 
-use super::draco::Streams;
+use super::streams::Streams;
 use super::{base64, json};
 use crate::ImportOptions;
 use crate::folder::{Folder, read_scene, unless_fits};

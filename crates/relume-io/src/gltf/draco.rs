@@ -4,17 +4,14 @@
 //! holds, or its corners. Which, is noted when the file is opened, so that whoever reads an accessor need not know.
 //! Must not know what the numbers mean.
 
-use std::cell::OnceCell;
-use std::collections::BTreeMap;
-
 use draco_core::{
     DataType, DecodeLimits, DecoderBuffer, DracoError, ErrorKind, Mesh, MeshDecoder,
     PointAttribute, PointIndex,
 };
 
-use super::accessor::Component;
+use super::component::Component;
 use super::document::Document;
-use super::json;
+use super::streams::{Content, Stored};
 use crate::guard::guarded;
 use relume_core::scene::SceneError;
 
@@ -24,84 +21,6 @@ const COUNT_MAX: u64 = 1 << 24;
 
 /// Bytes of the numbers of one stream at most, if no limit of memory says less.
 const BYTES_MAX: u64 = 1 << 30;
-
-/// The streams of a file, decoded when first asked for.
-#[derive(Default)]
-pub(super) struct Streams {
-    /// What the numbers of an accessor are.
-    of_accessor: BTreeMap<usize, Stored>,
-    /// By buffer view.
-    decoded: BTreeMap<usize, OnceCell<Mesh>>,
-}
-
-/// Where in the streams numbers are.
-#[derive(Clone, Copy, PartialEq)]
-struct Stored {
-    view: usize,
-    what: Content,
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Content {
-    /// An attribute, by its unique id.
-    Attribute(u32),
-    /// Three vertices for each triangle.
-    Corners,
-}
-
-impl Streams {
-    /// Notes for each accessor of a compressed primitive where its numbers are. Primitives whose plain numbers are
-    /// all in the file too are left as they are; the others become lists of triangles, which is what streams hold.
-    pub(super) fn of(root: &mut json::Root) -> Streams {
-        let mut streams = Streams::default();
-        let json::Root { meshes, accessors, .. } = root;
-        for primitive in meshes.iter_mut().flat_map(|mesh| &mut mesh.primitives) {
-            let Some(draco) = primitive.extensions.draco.take() else { continue };
-            let plain =
-                |index: &usize| accessors.get(*index).is_none_or(|a| a.buffer_view.is_some());
-            let attributes =
-                || draco.attributes.keys().filter_map(|name| primitive.attributes.get(name));
-            if attributes().chain(&primitive.indices).all(plain) {
-                continue;
-            }
-            primitive.mode = Some(4);
-            for (name, &id) in &draco.attributes {
-                if let Some(index) = primitive.attributes.get_mut(name) {
-                    let stored = Stored { view: draco.buffer_view, what: Content::Attribute(id) };
-                    *index = streams.claim(*index, stored, accessors);
-                }
-            }
-            let stored = Stored { view: draco.buffer_view, what: Content::Corners };
-            let index = primitive.indices.unwrap_or_else(|| {
-                accessors.push(json::Accessor::of_corners());
-                accessors.len() - 1
-            });
-            primitive.indices = Some(streams.claim(index, stored, accessors));
-        }
-        streams
-    }
-
-    /// Says where the numbers of an accessor are; of a copy, if that one's are elsewhere already.
-    fn claim(
-        &mut self,
-        index: usize,
-        stored: Stored,
-        accessors: &mut Vec<json::Accessor>,
-    ) -> usize {
-        let free = self.of_accessor.get(&index).is_none_or(|known| *known == stored);
-        let index = match accessors.get(index) {
-            Some(shared) if !free => {
-                let copy = shared.clone();
-                accessors.push(copy);
-                accessors.len() - 1
-            }
-            _ => index,
-        };
-        self.of_accessor.insert(index, stored);
-        self.decoded.entry(stored.view).or_default();
-        index
-    }
-}
 
 impl Document {
     /// The elements of an accessor that are in a compressed stream, if they are.

@@ -9,6 +9,7 @@ mod accessor;
 mod animation;
 mod base64;
 mod clock;
+mod component;
 mod document;
 mod draco;
 mod images;
@@ -22,6 +23,8 @@ mod meshopt;
 mod packed;
 mod sizes;
 mod skin;
+mod skinned;
+mod streams;
 mod tree;
 
 use document::Document;

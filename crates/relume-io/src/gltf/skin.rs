@@ -8,24 +8,12 @@ use std::collections::BTreeSet;
 use glam::{DAffine3, DMat4, DVec3};
 
 use super::mesh::{Polygons, by_joint, check_places, soups, vertex_weights};
+use super::skinned::Skinned;
 use super::tree::{Tree, both, placed, shaped, weights_at};
 use super::{json, node_name};
 use crate::options::Span;
 use relume_core::scene::draft::DraftNode;
-use relume_core::scene::{SceneError, Severity, Track, check_track};
-
-/// A node of the file with a skinned mesh.
-pub(super) struct Skinned {
-    /// In the file.
-    pub(super) index: usize,
-    /// In the draft.
-    pub(super) me: usize,
-    pub(super) mesh: usize,
-    pub(super) skin: usize,
-    pub(super) weights: Vec<f64>,
-    /// Its weights one by one, where they change.
-    pub(super) morphs: Vec<Track>,
-}
+use relume_core::scene::{SceneError, Severity, check_track};
 
 /// A skin's joints as the file has them.
 struct Joints {

@@ -8,7 +8,7 @@ use super::animation::{GlowKeys, Moves, played};
 use super::document::Document;
 use super::look::Looks;
 use super::mesh::{Polygons, polygons};
-use super::skin::Skinned;
+use super::skinned::Skinned;
 use super::{json, light, material, node_name, note};
 use crate::ImportOptions;
 use crate::options::Span;

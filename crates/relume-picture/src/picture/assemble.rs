@@ -16,7 +16,7 @@ use super::gouraud::{self, Triangle};
 use super::printed::Shown;
 use super::project::{Projector, SeenPlane, clip_to_pixels};
 use super::raster::{Grid, Primitive};
-use super::render::Shading;
+use super::shading::Shading;
 use super::smooth::Smooth;
 
 /// Depth of the near plane as a share of the distance to the farthest point of the scene.

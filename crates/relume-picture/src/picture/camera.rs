@@ -2,12 +2,11 @@
 //!
 //! Must not know pixels, leaves or light.
 
-use glam::{DMat3, DQuat, DVec2, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use relume_core::geometry::Pose;
 use relume_core::scene::{Projection, Scene};
 
 use super::overview::Overview;
-use super::project::Projector;
 
 /// A camera at one instant: a placement and a projection.
 ///
@@ -138,12 +137,5 @@ impl View {
             Projection::Perspective { aspect, .. } => aspect,
             Projection::Orthographic { xmag, ymag } => Some(xmag / ymag),
         }
-    }
-
-    /// Position of a world point (metres) in a picture of `width` x `height` pixels: x to the
-    /// right, y down, the centre of the first pixel at (0.5, 0.5). `None` behind the camera.
-    pub fn project(&self, world: DVec3, width: u32, height: u32) -> Option<DVec2> {
-        let projected = Projector::new(self, width, height).project(world);
-        (projected.w > 0.0).then(|| DVec2::new(projected.x, projected.y) / projected.z)
     }
 }

@@ -11,8 +11,9 @@ use super::assemble::Drawing;
 use super::camera::View;
 use super::project::Projector;
 use super::raster::{Grid, rasterise};
-use super::render::Shading;
+use super::shading::Shading;
 use super::tone::luminance;
+use super::tuning::{BRIGHT, MIDDLE, UNTOLD};
 
 /// How bright pictures are.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -23,15 +24,6 @@ pub enum Exposure {
     /// Linear display value per radiance, 1/(W/m2/sr).
     Fixed(f64),
 }
-
-/// Display value of the log-average luminance.
-const MIDDLE: f64 = 0.2;
-
-/// Display value that all but the brightest 2 % stay below.
-const BRIGHT: f64 = 0.9;
-
-/// Display value that what the solution does not tell stays below.
-const UNTOLD: f64 = 0.1;
 
 /// An exposure, and how much there is to see with it.
 #[derive(Clone, Copy, Debug, PartialEq)]

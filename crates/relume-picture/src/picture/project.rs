@@ -11,6 +11,15 @@ use relume_core::scene::Projection;
 
 use super::camera::View;
 
+impl View {
+    /// Position of a world point (metres) in a picture of `width` x `height` pixels: x to the
+    /// right, y down, the centre of the first pixel at (0.5, 0.5). `None` behind the camera.
+    pub fn project(&self, world: DVec3, width: u32, height: u32) -> Option<DVec2> {
+        let projected = Projector::new(self, width, height).project(world);
+        (projected.w > 0.0).then(|| DVec2::new(projected.x, projected.y) / projected.z)
+    }
+}
+
 /// A view together with the size of its picture.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Projector {

@@ -13,17 +13,8 @@ use super::exposure::Exposure;
 use super::image::Image;
 use super::project::Projector;
 use super::raster::{Fragment, Grid, rasterise};
+use super::shading::Shading;
 use super::tone::{SrgbEncoder, Tone};
-
-/// How the elements' constant radiosities are shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Shading {
-    /// Every leaf in its one radiosity.
-    Flat,
-    /// Linear over a Delaunay triangulation of the sample points, patch by patch.
-    #[default]
-    Gouraud,
-}
 
 /// How a picture is made.
 #[derive(Clone, Debug, PartialEq)]

@@ -15,12 +15,13 @@ use relume_core::scene::{BodyId, PatchId, Scene};
 use super::camera::View;
 use super::exposure::{Exposure, Metered};
 use super::image::Image;
-use super::overview::candidates::Bounds;
+use super::overview::bounds::Bounds;
 use super::overview::caster::{Caster, Hit, LIFT};
 use super::overview::preview::Preview;
 use super::project::Projector;
 use super::render::Settings;
 use super::tone::{SrgbEncoder, luminance};
+use super::tuning::{LIT, RAYS};
 
 /// Places within a pixel that are looked at.
 const WITHIN: [DVec2; 4] = [
@@ -30,14 +31,8 @@ const WITHIN: [DVec2; 4] = [
     DVec2::new(0.625, 0.875),
 ];
 
-/// Rays from what a pixel shows to what lights it, lamps aside.
-const RAYS: u32 = 16;
-
 /// Pixels across and down of the picture that light is metered by.
 const METERED: (u32, u32) = (96, 72);
-
-/// Brightness (of the rough solution) above which a surface counts as lit: six stops below the typical.
-const LIT: f64 = 0.25;
 
 /// Steps of an even sequence in two dimensions (M. Roberts, 2018), and of one in one.
 const PLASTIC: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];

@@ -5,19 +5,13 @@
 
 use std::collections::BTreeMap;
 
+use super::tuning::{LARGE, SMOOTH};
 use glam::{DVec2, DVec3};
 use relume_core::scene::{BodyId, PatchId};
 use relume_core::session::{Leaf, Snapshot};
 
-/// Cosine of the angle between neighbours up to which they stand for one curved surface: 35 degrees. A prism of twelve sides
-/// is a cylinder, a bevel of 45 degrees is an edge.
-const SMOOTH: f64 = 0.819;
-
 /// Cosine above which neighbours lie in one plane: light on a plane is left as it is.
 const FLAT: f64 = 0.999_99;
-
-/// Share of the scene's area above which a patch is a surface of its own, and is left as it is.
-const LARGE: f64 = 0.1;
 
 /// Corners are one if they are no further apart than this, in extents of the scene.
 const SAME: f64 = 1e-6;

@@ -2,6 +2,7 @@
 //!
 //! Must not know where on the screen, or on which patch.
 
+use super::tuning::KNEE;
 use std::f64::consts::PI;
 
 /// How exposed radiance becomes a display value in [0, 1], channel by channel.
@@ -14,8 +15,6 @@ pub enum Tone {
     #[default]
     Shoulder,
 }
-
-const KNEE: f64 = 0.6;
 
 impl Tone {
     /// Display value in [0, 1] of an exposed radiance `x`, both linear; no transcendental function.

@@ -6,13 +6,22 @@
 use super::{BodyId, ChildRange, ElementId, Forest, NONE, Node, Renumbering, Siblings, exposed_m2};
 use crate::scene::FIRST_NAME;
 
+/// Initial forests of two scenes.
+#[derive(Clone, Copy)]
+pub struct Seeds<'a> {
+    /// That of the scene before.
+    pub old: &'a Forest,
+    /// That of the scene now.
+    pub new: &'a Forest,
+}
+
 impl Forest {
     /// Where the elements of this forest, which grew from one seed, go in one that grows from another; `body` says which
     /// body of the new scene one of the old is. What is new stands in `old_of` as the root, which has neither links nor
     /// light. `None` where what both have in common was planted in another way, or glows at other times.
     pub fn renumbering_to(
         &self,
-        (old, new): (&Forest, &Forest),
+        Seeds { old, new }: Seeds<'_>,
         body: &dyn Fn(BodyId) -> Option<BodyId>,
     ) -> Option<Renumbering> {
         let mut new_of = vec![NONE; old.kept_len as usize];
@@ -30,7 +39,7 @@ impl Forest {
         while let Some((was, is)) = stack.pop() {
             let (one, two) = (ElementId(was), ElementId(is));
             let (below, then) = (old.children(one), new.children(two));
-            if !old.is_like((new, two), one) || below.len() != then.len() {
+            if !old.is_like(one, new, two) || below.len() != then.len() {
                 return None;
             }
             new_of[was as usize] = is;
@@ -49,7 +58,7 @@ impl Forest {
     }
 
     /// Whether a node of the kept part is what one of another forest is.
-    fn is_like(&self, (other, id): (&Forest, ElementId), own: ElementId) -> bool {
+    fn is_like(&self, own: ElementId, other: &Forest, id: ElementId) -> bool {
         let alike = match (self.group(own), other.group(id)) {
             (None, None) => true,
             (Some(a), Some(b)) => a.centre == b.centre && a.radius == b.radius,
@@ -76,13 +85,10 @@ impl Forest {
 
     /// This forest, which grew from one seed, as it grows from another, with ids as [`Forest::renumbering_to`] says; and
     /// the facets of which another part is covered. Elements of bodies that left must have been reaped.
-    pub fn replanted(
-        &self,
-        (old, new): (&Forest, &Forest),
-        to: &Renumbering,
-    ) -> (Forest, Vec<ElementId>) {
+    pub fn replanted(&self, seeds: Seeds<'_>, to: &Renumbering) -> (Forest, Vec<ElementId>) {
+        let Seeds { old, new } = seeds;
         let mut out = new.clone();
-        let numbers = coarse_numbers((old, new), to);
+        let numbers = coarse_numbers(seeds, to);
         let children = |children: ChildRange| match children.range() {
             _ if children.is_other() => children,
             below if below.is_empty() => children,
@@ -115,13 +121,13 @@ impl Forest {
         out.counts.leaves += self.counts.leaves - old.counts.leaves;
         let beyond = self.exposed.range(old.kept_len..);
         out.exposed.extend(beyond.map(|(&old, &m2)| (id(old), m2)));
-        let touched = self.touched((old, new), to);
+        let touched = Forest::touched(seeds, to);
         touched.iter().for_each(|&facet| out.expose(facet));
         (out, touched)
     }
 
     /// The facets of what a scene was made with of which another part is covered than before.
-    fn touched(&self, (old, new): (&Forest, &Forest), to: &Renumbering) -> Vec<ElementId> {
+    fn touched(Seeds { old, new }: Seeds<'_>, to: &Renumbering) -> Vec<ElementId> {
         let facets = old.facets().iter().filter(|facet| old.is_made(**facet));
         let both = facets.map(|&facet| (facet, ElementId(to.new_of(facet.0))));
         let differs = |&(was, is): &(ElementId, ElementId)| old.covered(was) != new.covered(is);
@@ -147,7 +153,7 @@ impl Forest {
 }
 
 /// New numbers of the coarse elements of an old seed, by number.
-fn coarse_numbers((old, new): (&Forest, &Forest), to: &Renumbering) -> Vec<u32> {
+fn coarse_numbers(Seeds { old, new }: Seeds<'_>, to: &Renumbering) -> Vec<u32> {
     let mut out = Vec::new();
     for (id, &number) in (0..).zip(&old.fixed.coarse).filter(|(_, number)| **number != NONE) {
         out.resize(out.len().max(number as usize + 1), NONE);
@@ -160,13 +166,9 @@ fn coarse_numbers((old, new): (&Forest, &Forest), to: &Renumbering) -> Vec<u32> 
 }
 
 /// Old numbers of the coarse elements of a new seed, by number; `None` for those that are new.
-pub fn old_coarse_numbers(
-    (old, new): (&Forest, &Forest),
-    to: &Renumbering,
-    count: usize,
-) -> Vec<Option<usize>> {
+pub fn old_coarse_numbers(seeds: Seeds<'_>, to: &Renumbering, count: usize) -> Vec<Option<usize>> {
     let mut out = vec![None; count];
-    for (was, is) in coarse_numbers((old, new), to).into_iter().enumerate() {
+    for (was, is) in coarse_numbers(seeds, to).into_iter().enumerate() {
         if is != NONE {
             out[is as usize] = Some(was);
         }

@@ -152,8 +152,7 @@ impl RowScaling {
         gathered.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
             let first = (chunk * CHUNK) as u32;
             let ids: Vec<u32> = (first..first + out.len() as u32).collect();
-            let gather = (ids.as_slice(), self.linear);
-            dispatch!(level, simd => gather_some(simd, (&sent, links), surfaces, gather, out));
+            dispatch!(level, simd => gather_some(simd, &sent, links, surfaces, &ids, self.linear, out));
         });
         if let Some(groups) = surfaces.groups() {
             let arriving = groups.arriving(&|id| sent.get(id), surfaces.source_moment());
@@ -164,7 +163,7 @@ impl RowScaling {
         let own = |id: u32| gathered[id as usize];
         for facet in surfaces.facets() {
             let at = surfaces.place(facet.0);
-            push(surfaces, (facet.0, &at), &Linear::default(), &own, &mut |leaf, h| {
+            push(surfaces, facet.0, &at, &Linear::default(), &own, &mut |leaf, h| {
                 let factor = self.factors[leaf as usize];
                 let gradient = h.gradient.map(|g| factor * g[0]);
                 self.rows[leaf as usize] = RowSum { mean: factor * h.mean[0], gradient };
@@ -192,11 +191,6 @@ impl RowScaling {
 }
 
 impl Radiosity {
-    /// Whether factors of leaves count, so that the solution does not grow.
-    pub fn is_bounded(&self) -> bool {
-        !self.scaling.is_none()
-    }
-
     /// Whether light varies linearly over elements, as it does unless it would grow.
     pub fn is_linear(&self) -> bool {
         !self.constant

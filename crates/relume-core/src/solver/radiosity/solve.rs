@@ -16,7 +16,8 @@ use crate::solver::settle::{Below, IrradianceChange, Settled};
 use crate::solver::surfaces::{FacetMaterial, Surfaces, for_each_below};
 use crate::solver::trend::Trend;
 use crate::solver::tuning::{
-    GAIN_MAX, PENDING_SHARE, SKIPPED_MAX, UNBALANCED_MAX, UNKNOWN_MAX, WHITE,
+    FURTHER_MAX, GAIN_MAX, PENDING_SHARE, SKIPPED_MAX, SWEEPS_MAX, UNBALANCED_MAX, UNKNOWN_MAX,
+    WHITE,
 };
 use crate::solver::work::{Dirty, Work};
 use crate::transport;
@@ -62,14 +63,15 @@ struct Fluxes {
     passed: f64,
 }
 
-/// Links of elements, and what comes to an element over groups, if there are any.
-type Sources<'a> = (&'a Links, &'a dyn Fn(u32) -> Option<Linear>);
-
-/// Sweeps after which a solve is given up as not converging (reflectances are below 1).
-const SWEEPS_MAX: u32 = 2_000;
-
-/// Sweeps over everything by which a solution is settled further, at most: beyond that it is said that light is unaccounted for.
-const FURTHER_MAX: u32 = 32;
+/// A sweep that is done.
+#[derive(Clone, Copy)]
+struct Swept {
+    /// Mean radiosity after it, W/m2.
+    mean_w_m2: f64,
+    /// Change that counted as little before it, and counts so now; W/m2.
+    before: f32,
+    limit: f32,
+}
 
 /// Receivers gathered by one task.
 pub(super) const CHUNK: usize = 256;
@@ -83,7 +85,8 @@ impl Radiosity {
         surfaces: &impl Surfaces,
         links: &Links,
         dirty: Dirty,
-        (residual, most_mean_w_m2): (f64, f64),
+        residual: f64,
+        most_mean_w_m2: f64,
     ) {
         let stop = Stop::Bounded { residual, mean_w_m2: most_mean_w_m2 };
         if !self.has_settled() {
@@ -196,16 +199,16 @@ impl Radiosity {
                 jump.before(&self.radiosity);
             }
             let over_groups = arriving.take().or_else(|| self.arriving(surfaces));
-            let small = self.sweep((surfaces, links, over_groups.as_ref()), &mut work, limit);
+            let small = self.sweep(surfaces, links, over_groups.as_ref(), &mut work, limit);
             self.sweeps += 1;
             (self.skipped_in_full_sweep, self.skipped) = match all {
                 true => (small, 0.0),
                 false => (self.skipped_in_full_sweep, self.skipped.max(limit)),
             };
             let mean = self.mean_w_m2(surfaces);
-            let limits = (limit, stop.limit_w_m2(mean));
-            limit = limits.1;
-            if self.is_done((surfaces, links), stop, &mut work, (mean, limits), &mut arriving) {
+            let swept = Swept { mean_w_m2: mean, before: limit, limit: stop.limit_w_m2(mean) };
+            limit = swept.limit;
+            if self.is_done(surfaces, links, stop, &mut work, swept, &mut arriving) {
                 let change = all.then_some(mean - last_mean);
                 if further == FURTHER_MAX || !self.may_be_unbalanced(surfaces, stop, change) {
                     break;
@@ -280,16 +283,17 @@ impl Radiosity {
         Fluxes { sent: sum(0), passed: sum(1).max(sum(2)) }
     }
 
-    /// Whether a sweep was the last one, by the mean radiosity after it and what counted as little before and counts so now;
-    /// if not, what is left is marked.
+    /// Whether a sweep was the last one; if not, what is left is marked.
     fn is_done<S: Surfaces>(
         &mut self,
-        (surfaces, links): (&S, &Links),
+        surfaces: &S,
+        links: &Links,
         stop: Stop,
         work: &mut Work,
-        (mean, (before, limit)): (f64, (f32, f32)),
+        swept: Swept,
         arriving: &mut Option<Arriving>,
     ) -> bool {
+        let Swept { mean_w_m2: mean, before, limit } = swept;
         // A radiosity stays, what its ancestors gathered is deferred for it, and they may gather other values.
         let gathered = if surfaces.groups().is_some() { 2.0 } else { 1.0 };
         let left =
@@ -317,7 +321,9 @@ impl Radiosity {
     /// One pass over all batches; returns the largest change that is too small to be followed.
     fn sweep(
         &mut self,
-        (surfaces, links, arriving): (&impl Surfaces, &Links, Option<&Arriving>),
+        surfaces: &impl Surfaces,
+        links: &Links,
+        arriving: Option<&Arriving>,
         work: &mut Work,
         limit: f32,
     ) -> f32 {
@@ -328,10 +334,10 @@ impl Radiosity {
             let mut now = work.take(surfaces, batch);
             let most_deferred = if work.all { None } else { Some(limit) };
             let over_groups = |id: u32| Some(surfaces.groups()?.at(arriving?, id));
-            let sources = (links, &over_groups as &dyn Fn(u32) -> Option<Linear>);
-            self.gather((surfaces, sources), &mut now, most_deferred, &mut scratch.gathered);
+            let found = &mut scratch.gathered;
+            self.gather(surfaces, links, &over_groups, &mut now, most_deferred, found);
             let path = if work.all { None } else { Some(work.path.mark(surfaces, &mut now)) };
-            self.settle(surfaces, &now.facets, (limit, path), &mut scratch.settled);
+            self.settle(surfaces, &now.facets, limit, path, &mut scratch.settled);
             for settled in &scratch.settled[..now.facets.len()] {
                 small = small.max(settled.small);
                 for &(id, deferred) in &settled.deferred {
@@ -343,8 +349,8 @@ impl Radiosity {
                         work.changed.push((*id, *difference));
                     }
                     if !work.all {
-                        let change = (*id, *difference);
-                        work.mark_neighbours((surfaces, links), change, limit, &mut self.pending);
+                        let pending = &mut self.pending;
+                        work.mark_neighbours(surfaces, links, *id, *difference, limit, pending);
                     }
                 }
             }
@@ -396,7 +402,9 @@ impl Radiosity {
     /// `most_deferred` is deferred after that are left out of it.
     fn gather(
         &mut self,
-        (surfaces, (links, over_groups)): (&impl Surfaces, Sources<'_>),
+        surfaces: &impl Surfaces,
+        links: &Links,
+        over_groups: &dyn Fn(u32) -> Option<Linear>,
         batch: &mut Batch,
         most_deferred: Option<f32>,
         found: &mut Vec<Linear>,
@@ -409,7 +417,7 @@ impl Radiosity {
         found.resize(found.len().max(receivers.len()), Linear::default());
         let level = transport::Simd::detect().level();
         let gather = |ids: &[u32], out: &mut [Linear]| {
-            dispatch!(level, simd => gather_some(simd, (radiosity, links), surfaces, (ids, linear), out));
+            dispatch!(level, simd => gather_some(simd, radiosity, links, surfaces, ids, linear, out));
         };
         if receivers.len() <= CHUNK {
             gather(receivers, found);
@@ -454,7 +462,8 @@ impl Radiosity {
         &self,
         surfaces: &impl Surfaces,
         facets: &[u32],
-        (limit, path): (f32, Option<&DirtyPath>),
+        limit: f32,
+        path: Option<&DirtyPath>,
         settled: &mut Vec<Settled>,
     ) {
         settled.resize_with(settled.len().max(facets.len()), Settled::default);
@@ -621,8 +630,8 @@ mod tests {
             assert!((scaling.rows[leaf].mean - 1.0).abs() < 1e-3, "{:?}", scaling.rows);
         }
         let mut b = Radiosity::new(&plates);
-        b.solve_bounded(&plates, &links, Dirty::All, (1e-7, 2e2));
-        assert!(b.is_bounded() && b.has_settled());
+        b.solve_bounded(&plates, &links, Dirty::All, 1e-7, 2e2);
+        assert!(!b.scaling.is_none() && b.has_settled());
         for id in 0..4 {
             assert!((b.radiosity(id)[0] - 100.0).abs() < 0.5, "{id}: {:?}", b.radiosity(id));
         }

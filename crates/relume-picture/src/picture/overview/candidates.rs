@@ -3,37 +3,16 @@
 //! Must not know how they are judged, apart from what is in sight around a point.
 
 use glam::{DVec2, DVec3};
-use relume_core::scene::{BodyId, Scene};
 
 use super::super::camera::View;
+use super::super::tuning::{INSIDE, OPEN, ROOM, SPAN, YFOV_INSIDE, YFOV_OUTSIDE};
+use super::bounds::{ASPECT, Bounds};
 use super::score::Stage;
-
-/// Vertical field of view from outside and from inside, radians.
-const YFOV_OUTSIDE: f64 = 0.7;
-const YFOV_INSIDE: f64 = 1.1;
-
-/// Width : height that candidates are framed for.
-pub(super) const ASPECT: f64 = 4.0 / 3.0;
-
-/// A point that sees fronts in this share of directions is in a room.
-const ROOM: f64 = 0.45;
-
-/// A point in a room must also see things this far apart, in units of the scene: the inside of a
-/// double-sided object is no room.
-const SPAN: f32 = 0.4;
-
-/// Instants at which the swept bounds are taken.
-const SWEEP_STEPS: u32 = 64;
 
 /// Heights per length of views from outside, and what each is worth less than those that people would choose;
 /// the last ones are for what is open or lit at the top or from below only.
 const SLOPES: [(f64, f64); 7] =
     [(0.5, 0.0), (0.3, 0.0), (0.8, 0.05), (0.12, 0.02), (0.0, 0.1), (1.8, 0.2), (-0.5, 0.2)];
-
-/// What views from inside, which fill the picture whatever they show, are worth less: for what is lit on the inside only; and
-/// how much less where nothing is around the eye: what is open, as a cup, is looked into from outside.
-const INSIDE: f64 = 0.2;
-const OPEN: f64 = 1.5;
 
 /// A view that may be chosen.
 #[derive(Clone, Copy)]
@@ -43,47 +22,7 @@ pub(super) struct Candidate {
     pub(super) oddness: f64,
 }
 
-/// An axis-aligned box, metres.
-#[derive(Clone, Copy, Debug)]
-pub(in super::super) struct Bounds {
-    low: DVec3,
-    high: DVec3,
-}
-
 impl Bounds {
-    /// Of everything, over the whole animation; `None` if there is nothing.
-    pub(in super::super) fn swept(scene: &Scene) -> Option<Bounds> {
-        let mut bounds: Option<Bounds> = None;
-        for body in (0..scene.bodies.len() as u32).map(BodyId) {
-            let steps = if scene.moves(body) { SWEEP_STEPS } else { 0 };
-            for step in 0..=steps {
-                let time = scene.motion.duration_s * f64::from(step) / f64::from(steps.max(1));
-                let Some(pose) = scene.pose(body, time) else { continue };
-                for p in scene.patches_of(body).flat_map(|(_, patch)| patch.corners_in_body()) {
-                    let p = pose.point(p);
-                    let b = bounds.unwrap_or(Bounds { low: p, high: p });
-                    bounds = Some(Bounds { low: b.low.min(p), high: b.high.max(p) });
-                }
-            }
-        }
-        bounds
-    }
-
-    /// Middle and diagonal, metres.
-    pub(in super::super) fn unit(&self) -> (DVec3, f64) {
-        (self.at(0.5, 0.5, 0.5), self.low.distance(self.high).max(f64::MIN_POSITIVE))
-    }
-
-    /// The point at the given shares of the three sides.
-    fn at(&self, x: f64, y: f64, z: f64) -> DVec3 {
-        self.low + (self.high - self.low) * DVec3::new(x, y, z)
-    }
-
-    fn corners(&self) -> impl Iterator<Item = DVec3> + '_ {
-        let side = |i: u32, bit: u32| f64::from(i >> bit & 1);
-        (0..8).map(move |i| self.at(side(i, 0), side(i, 1), side(i, 2)))
-    }
-
     /// Views from outside that just hold the bounds, all around at several heights.
     pub(super) fn outside(&self) -> Vec<Candidate> {
         let around = |(slope, oddness)| {

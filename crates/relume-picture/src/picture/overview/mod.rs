@@ -13,7 +13,8 @@
 //! Cost: bounded but for a hierarchy of boxes over all patches: some million rays for each of up to three
 //! instants.
 
-pub(super) mod candidates;
+pub(super) mod bounds;
+mod candidates;
 pub(super) mod caster;
 pub(super) mod preview;
 mod score;
@@ -23,7 +24,9 @@ use rayon::prelude::*;
 use relume_core::scene::Scene;
 
 use super::camera::View;
-use candidates::{Bounds, Candidate};
+use super::tuning::{FINALISTS, INSTANTS};
+use bounds::Bounds;
+use candidates::Candidate;
 use score::{Size, Stage};
 
 /// A view chosen for a scene, and whether there is light in it.
@@ -35,12 +38,6 @@ pub struct Overview {
     /// animation; `None` where nothing emits. An estimate.
     pub lit: Option<f64>,
 }
-
-/// Instants of an animation at which views are judged.
-const INSTANTS: u32 = 3;
-
-/// Views that are looked at closely.
-const FINALISTS: usize = 8;
 
 /// Differences of scores that are none: nearly equal candidates, as in a symmetric room, are not told
 /// apart by rounding, and the first one wins.

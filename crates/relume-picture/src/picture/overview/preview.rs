@@ -14,27 +14,13 @@ use relume_core::scene::outside::OutsideNow;
 use relume_core::scene::{Light, LightKind, Patch, PatchId, Scene};
 
 use super::super::tone::luminance;
+use super::super::tuning::{
+    BOUNCES, CELLS, LAMP_POINTS, LIGHTS, MANY, POINTS, POINTS_OF_PATCH, STOPS,
+};
 use super::caster::{Caster, LIFT};
-
-/// Points on surfaces, besides one on every patch or group of neighbours; and on one patch at most.
-const POINTS: f64 = 4096.0;
-const POINTS_OF_PATCH: usize = 64;
-
-/// Patches above which neighbours that face alike share a point, and in how many cells a unit of the scene is divided for it.
-const MANY: usize = 8192;
-const CELLS: f32 = 40.0;
-
-/// Points on lamps.
-const LAMP_POINTS: usize = 32;
-
-/// The strongest punctual lights, those that count.
-const LIGHTS: usize = 64;
 
 /// Rays for bounces: from each point, and from all of them.
 const RAYS: (usize, usize) = (16, 1 << 17);
-
-/// Bounces that are followed.
-const BOUNCES: usize = 4;
 
 /// Lamps are no nearer than this to what they light, in units of the scene.
 const NEAREST: f32 = 1e-3;
@@ -71,9 +57,6 @@ pub(in super::super) struct Preview {
 
 /// Rays that look for the sky: from a point, at least and at most, and from all of them.
 const SKY_RAYS: (usize, usize, usize) = (4, 16, 1 << 19);
-
-/// Stops below the typical radiosity at which a surface counts as black.
-const STOPS: f64 = 8.0;
 
 impl Preview {
     /// Of a scene and the light from outside at `time_s`; `poses` by body.

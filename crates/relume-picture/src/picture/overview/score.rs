@@ -14,24 +14,10 @@ use relume_core::scene::outside::Outside;
 use relume_core::scene::{BodyId, Projection, Scene};
 
 use super::super::camera::View;
-use super::candidates::{ASPECT, Bounds};
+use super::super::tuning::{BLACK, CLOSE, LIT, PIXELS, SURFACES};
+use super::bounds::{ASPECT, Bounds};
 use super::caster::{Caster, Hit};
 use super::preview::Preview;
-
-/// What is nearer than this is right in front of the camera, in units of the scene.
-const CLOSE: f32 = 0.06;
-
-/// Weight of black surfaces among those that a view is to show: where everything is dark, geometry decides.
-const BLACK: f64 = 0.05;
-
-/// Of more surfaces than this no view need show more.
-const SURFACES: usize = 24;
-
-/// Of a surface that is seen, pixels at least.
-const PIXELS: u32 = 2;
-
-/// Brightness above which a pixel counts as lit.
-const LIT: f64 = 0.25;
 
 /// Pixels across and down of pictures that are scored.
 #[derive(Clone, Copy)]

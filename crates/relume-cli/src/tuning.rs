@@ -1,0 +1,44 @@
+//! Calibration constants of the command: each with its unit, the range tried, and what gets worse either way.
+//!
+//! `docs/tuning.md` is made of this file. Constants that are exact, guard a representation or stand for rounding stay where
+//! they are used.
+
+/// Default tolerance of what makes numbers.
+///
+/// - Unit: relative error of irradiance
+/// - Tried: docs/tolerance.md
+/// - Larger: errors
+/// - Smaller: time and memory
+pub(crate) const TOLERANCE: f64 = 0.02;
+
+/// Default tolerance of pictures: beside one at 0.02 the eye finds no difference but along some edges, at a tenth to a quarter of the time (docs/tolerance.md).
+///
+/// - Unit: relative error of irradiance
+/// - Tried: 0.02 to 0.2
+/// - Larger: errors are seen
+/// - Smaller: time
+pub(crate) const PICTURE_TOLERANCE: f64 = 0.1;
+
+/// Share of the area of the scene below which the form-factor oracle does not refine, unless it is told an area.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: coarse elements
+/// - Smaller: time and memory; with it a closed cube has at most 6 x 4^5 elements, about as many as the paper draws
+pub(crate) const MIN_AREA_SHARE: f64 = 1.0 / 5_000.0;
+
+/// Share of what is seen of surfaces that has to be lit at some time, so that a picture shows what it is of.
+///
+/// - Unit: 1
+/// - Tried: eyes that glow and headlights light less, lamps in rooms and streets more
+/// - Larger: dim scenes get a sky
+/// - Smaller: pictures are dark
+pub(crate) const LIT_MIN: f64 = 0.5;
+
+/// Share of what is emitted that may be unaccounted for in a result of the plane.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: wrong numbers are not noticed
+/// - Smaller: coarse solutions are refused
+pub(crate) const UNBALANCED_MAX: f64 = 0.1;

@@ -92,6 +92,14 @@ pub(super) const GAIN_MAX: f64 = 0.0015;
 /// - Smaller: time: a pass over all links where nothing can grow
 pub(super) const WHITE: f32 = 0.85;
 
+/// Flux that scaled rows may lose or make where lines reach below zero, over what is emitted, before elements are taken to be constant.
+///
+/// - Unit: 1
+/// - Tried: 0.01 (a white room with a closet 13 % too dark), 0.1
+/// - Larger: light is unaccounted for in white scenes
+/// - Smaller: constant elements, and their errors, where lines would do
+pub(super) const LOST_MAX: f64 = 0.1;
+
 /// Least factor of a leaf; the largest is its inverse.
 ///
 /// - Unit: 1
@@ -99,6 +107,14 @@ pub(super) const WHITE: f32 = 0.85;
 /// - Larger: rows above 1
 /// - Smaller: light that comes from a few neighbours only
 pub(super) const FACTOR_LEAST: f32 = 0.25;
+
+/// Most that the row of a leaf is raised to, over what it sums to.
+///
+/// - Unit: 1
+/// - Tried: 1.25, 2, 4, no limit (leaves hidden by a lamp were raised to 1)
+/// - Larger: leaves that see little are too bright
+/// - Smaller: light is lost where rows of the same facet are above 1 elsewhere
+pub(super) const RAISED_MOST: f32 = 2.0;
 
 /// Rounds of the search for factors.
 ///

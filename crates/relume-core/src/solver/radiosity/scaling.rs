@@ -18,7 +18,7 @@ use crate::solver::place::Place;
 use crate::solver::push::{RowSum, push};
 use crate::solver::settle::Fit;
 use crate::solver::surfaces::{Surfaces, for_each_below};
-use crate::solver::tuning::{FACTOR_LEAST, SCALING_ROUNDS};
+use crate::solver::tuning::{FACTOR_LEAST, RAISED_MOST, SCALING_ROUNDS};
 use crate::transport;
 
 /// Factors of leaves, and the sums of their rows with them; by id, of no meaning for what is no leaf.
@@ -41,8 +41,12 @@ const ROUNDED: f64 = 1e-3;
 impl RowScaling {
     /// Factors of 1, with the sums of rows as lines or as means alone unless `linear`.
     pub(super) fn none(surfaces: &impl Surfaces, links: &Links, linear: bool) -> RowScaling {
-        let len = surfaces.len();
-        let (factors, rows) = (vec![1.0; len], vec![RowSum::default(); len]);
+        RowScaling::of(surfaces, links, linear, vec![1.0; surfaces.len()])
+    }
+
+    /// Given factors, with the sums of rows.
+    fn of(surfaces: &impl Surfaces, links: &Links, linear: bool, factors: Vec<f32>) -> RowScaling {
+        let rows = vec![RowSum::default(); factors.len()];
         let mut scaling = RowScaling { factors, rows, linear };
         scaling.sum_rows(surfaces, links);
         scaling
@@ -54,16 +58,21 @@ impl RowScaling {
     }
 
     /// Flux that leaves with rows above 1 would make of nothing, over what all surfaces absorb, in light that is even: 1.
+    /// Rows are summed between surfaces weighed by the roots of their reflectances: light grows only where both ends reflect.
     /// Of links and materials alone, so that it is the same however links came about.
-    pub(super) fn gain(&self, surfaces: &impl Surfaces) -> f64 {
+    pub(super) fn gain(surfaces: &impl Surfaces, links: &Links) -> f64 {
+        let mut roots = vec![0.0; surfaces.len()];
+        for facet in surfaces.facets() {
+            let root = most(surfaces, facet.0).sqrt();
+            for_each_below(surfaces, facet.0, &mut |id| roots[id as usize] = root);
+        }
+        let weighed = RowScaling::of(surfaces, links, true, roots);
         let (mut made, mut absorbed) = (0.0, 0.0);
         for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
-            let [r, g, b] = surfaces.material(facet.0).reflectance.map(f64::from);
-            let most = r.max(g).max(b);
-            absorbed += surfaces.area_m2(facet.0) * (1.0 - most);
+            absorbed += surfaces.area_m2(facet.0) * f64::from(1.0 - most(surfaces, facet.0));
             for_each_leaf(surfaces, facet.0, &mut |leaf| {
-                let row = f64::from(self.rows[leaf as usize].mean);
-                made += surfaces.area_m2(leaf) * (most * row - 1.0 - ROUNDED).max(0.0);
+                let row = f64::from(weighed.rows[leaf as usize].mean);
+                made += surfaces.area_m2(leaf) * (row - 1.0 - ROUNDED).max(0.0);
             });
         }
         made / absorbed
@@ -122,7 +131,8 @@ impl RowScaling {
         }
     }
 
-    /// Sums that the rows of leaves should have: at most 1, and over each facet together as much as they have.
+    /// Sums that the rows of leaves should have: at most 1, and over each facet together as much as they have, unless that would
+    /// take more than twice as much of some leaf.
     fn wanted(&self, surfaces: &impl Surfaces) -> Vec<f32> {
         let mut wanted = vec![0.0; surfaces.len()];
         for facet in surfaces.facets() {
@@ -133,8 +143,9 @@ impl RowScaling {
             });
             let left = if below > above { (1.0 - above / below) as f32 } else { 0.0 };
             for_each_leaf(surfaces, facet.0, &mut |leaf| {
-                let short = (1.0 - self.rows[leaf as usize].mean).max(0.0);
-                wanted[leaf as usize] = 1.0 - left * short;
+                let row = self.rows[leaf as usize].mean;
+                let short = (1.0 - row).max(0.0);
+                wanted[leaf as usize] = (1.0 - left * short).min(RAISED_MOST * row);
             });
         }
         wanted
@@ -233,6 +244,11 @@ impl Radiosity {
         self.radiosity.set(id, &own);
         (own, place)
     }
+}
+
+/// Largest reflectance of a facet over all channels, 1.
+pub(super) fn most(surfaces: &impl Surfaces, facet: u32) -> f32 {
+    surfaces.material(facet).reflectance.into_iter().fold(0.0, f32::max)
 }
 
 fn for_each_leaf(surfaces: &impl Surfaces, facet: u32, visit: &mut dyn FnMut(u32)) {

@@ -3,7 +3,7 @@
 use fearless_simd::dispatch;
 use rayon::prelude::*;
 
-use super::scaling::{CLOSE, RowScaling};
+use super::scaling::{CLOSE, RowScaling, most};
 use super::{OverGroups, Radiosity};
 use crate::element::ElementId;
 use crate::solver::dirty_path::{Batch, DirtyPath};
@@ -16,8 +16,8 @@ use crate::solver::settle::{Below, IrradianceChange, Settled};
 use crate::solver::surfaces::{FacetMaterial, Surfaces, for_each_below};
 use crate::solver::trend::Trend;
 use crate::solver::tuning::{
-    FURTHER_MAX, GAIN_MAX, PENDING_SHARE, SKIPPED_MAX, SWEEPS_MAX, UNBALANCED_MAX, UNKNOWN_MAX,
-    WHITE,
+    FURTHER_MAX, GAIN_MAX, LOST_MAX, PENDING_SHARE, SKIPPED_MAX, SWEEPS_MAX, UNBALANCED_MAX,
+    UNKNOWN_MAX, WHITE,
 };
 use crate::solver::work::{Dirty, Work};
 use crate::transport;
@@ -93,31 +93,68 @@ impl Radiosity {
             self.start_anew(surfaces);
         }
         let was = (std::mem::take(&mut self.scaling), std::mem::take(&mut self.constant));
-        let rows = is_white(surfaces).then(|| RowScaling::none(surfaces, links, true));
-        match rows.filter(|rows| rows.gain(surfaces) > GAIN_MAX) {
-            Some(rows) => {
-                self.scaling = rows.found(surfaces, links, &was.0);
-                self.solve_scaled(surfaces, links, stop);
-            }
-            None if was.0.is_none() => self.solve(surfaces, links, dirty, stop),
-            None => {
-                self.forget(surfaces);
-                self.solve(surfaces, links, Dirty::All, stop);
-            }
+        if is_white(surfaces) && RowScaling::gain(surfaces, links) > GAIN_MAX {
+            self.scaling = RowScaling::none(surfaces, links, true).found(surfaces, links, &was.0);
+            self.solve_scaled(surfaces, links, stop);
+        } else if was.0.is_none() {
+            self.solve(surfaces, links, dirty, stop);
+        } else {
+            self.forget(surfaces);
+            self.solve(surfaces, links, Dirty::All, stop);
         }
-        for constant in [false, true] {
-            if self.has_settled() {
+        for (linear, strict) in [(true, false), (false, false), (false, true)] {
+            if self.has_settled() && self.keeps_light(surfaces, links) {
                 return;
             }
-            self.constant = constant;
-            let rows = RowScaling::none(surfaces, links, !constant);
-            self.scaling = match constant {
+            self.constant = !linear;
+            let rows = RowScaling::none(surfaces, links, linear);
+            self.scaling = match strict {
                 false => rows.found(surfaces, links, &RowScaling::default()),
                 true => rows.strict(surfaces, links),
             };
             self.start_anew(surfaces);
             self.solve_scaled(surfaces, links, stop);
         }
+    }
+
+    /// Whether surfaces receive of each other what they send, but for `LOST_MAX` of what is emitted: with factors, as lines may
+    /// reach below zero.
+    fn keeps_light(&self, surfaces: &impl Surfaces, links: &Links) -> bool {
+        if self.scaling.is_none() {
+            return true;
+        }
+        let (mut sent, mut arriving, mut emitted) = (0.0, 0.0, 0.0);
+        for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
+            let exitance = surfaces.material(facet.0).exitance;
+            self.irradiances(surfaces, facet.0, &mut |leaf, h| {
+                let area = surfaces.area_m2(leaf);
+                let row = f64::from(self.scaling.rows[leaf as usize].mean);
+                let b = self.radiosity(leaf);
+                for c in 0..3 {
+                    sent += area * row * f64::from(b[c]);
+                    arriving += area * f64::from(h.mean[c].max(0.0));
+                    emitted += area * f64::from(exitance[c]);
+                }
+            });
+        }
+        let lights = self.from_lights_w(surfaces, links);
+        (arriving - lights - sent).abs() <= LOST_MAX * (emitted + lights)
+    }
+
+    /// Flux that arrives from what is no surface, W.
+    fn from_lights_w(&self, surfaces: &impl Surfaces, links: &Links) -> f64 {
+        let mut sum = 0.0;
+        for facet in surfaces.facets() {
+            for_each_below(surfaces, facet.0, &mut |id| {
+                let lights = links.of(id).iter().filter(|link| !surfaces.is_surface(link.source));
+                let each = lights.map(|link| {
+                    let b = self.radiosity(link.source);
+                    f64::from(link.coupling * (b[0] + b[1] + b[2]))
+                });
+                sum += surfaces.area_m2(id) * each.sum::<f64>();
+            });
+        }
+        sum
     }
 
     /// Solves with factors, from what surfaces send as it was found last.
@@ -496,10 +533,8 @@ impl Radiosity {
 /// Whether some surface reflects so much that rows above 1 may make light of nothing, and none so much that no rows are known as
 /// well as that.
 fn is_white(surfaces: &impl Surfaces) -> bool {
-    let most =
-        |facet: &ElementId| surfaces.material(facet.0).reflectance.into_iter().fold(0.0, f32::max);
-    let most = surfaces.facets().iter().map(most).fold(0.0, f32::max);
-    (WHITE..1.0 - CLOSE).contains(&most)
+    let all = surfaces.facets().iter().map(|facet| most(surfaces, facet.0));
+    (WHITE..1.0 - CLOSE).contains(&all.fold(0.0, f32::max))
 }
 
 /// Adds `change` to the deferred error of an element and of those above it.

@@ -79,10 +79,11 @@ pub(super) const UNKNOWN_MAX: f64 = 0.08;
 /// Flux that rows above 1 would make in even light, over what surfaces absorb, from which factors of leaves count.
 ///
 /// - Unit: 1
-/// - Tried: 0.005, 0.0015; white closets were off by 2 to 60 % without, and bodies of reflectance 0.9 in motion by 2.4 %
+/// - Tried: 0.0015 (coarse links of the form-factor oracle beside a white lamp were scaled, and its room became darker), 0.005; white
+///   closets have 0.06 to 0.1 and were off by 2 to 60 % without
 /// - Larger: light is unaccounted for in white gaps
 /// - Smaller: time: factors where rows are only a little off
-pub(super) const GAIN_MAX: f64 = 0.0015;
+pub(super) const GAIN_MAX: f64 = 0.005;
 
 /// Largest reflectance of a scene from which it is looked whether rows above 1 make light of nothing.
 ///
@@ -115,6 +116,14 @@ pub(super) const FACTOR_LEAST: f32 = 0.25;
 /// - Larger: leaves that see little are too bright
 /// - Smaller: light is lost where rows of the same facet are above 1 elsewhere
 pub(super) const RAISED_MOST: f32 = 2.0;
+
+/// Residual of a solution with factors, over that of others: changes that go one way add up where hardly any light is absorbed.
+///
+/// - Unit: 1
+/// - Tried: 1 (two solutions of one scene 15 % apart), 0.1
+/// - Larger: a frame that follows others differs from a cold build
+/// - Smaller: time, in white scenes
+pub(super) const SCALED_RESIDUAL: f64 = 0.1;
 
 /// Rounds of the search for factors.
 ///

@@ -135,7 +135,6 @@ a_few! {
     a_panel_that_slides_off_what_touches_shows_it: "motion", 197..198;
     a_box_that_moves_into_another_that_a_third_sticks_in: "motion", 155..156;
     a_crate_that_slides_over_panels_in_the_floor_holds_no_light: "motion", 181..182;
-    a_white_box_just_above_a_panel_of_two_sides: "motion", 436..437;
     white_closets: "closet", 0..8;
     white_tables: "table", 0..2;
     small_devices: "device", 0..5;

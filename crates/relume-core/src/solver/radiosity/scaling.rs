@@ -28,6 +28,8 @@ pub(super) struct RowScaling {
     pub(super) factors: Vec<f32>,
     /// Sums of rows, 1 and 1/m.
     pub(super) rows: Vec<RowSum>,
+    /// Sums that rows should have, 1; none unless factors were looked for.
+    wanted: Vec<f32>,
     /// Whether rows are taken as lines.
     linear: bool,
 }
@@ -47,7 +49,7 @@ impl RowScaling {
     /// Given factors, with the sums of rows.
     fn of(surfaces: &impl Surfaces, links: &Links, linear: bool, factors: Vec<f32>) -> RowScaling {
         let rows = vec![RowSum::default(); factors.len()];
-        let mut scaling = RowScaling { factors, rows, linear };
+        let mut scaling = RowScaling { factors, rows, wanted: Vec::new(), linear };
         scaling.sum_rows(surfaces, links);
         scaling
     }
@@ -78,22 +80,15 @@ impl RowScaling {
         made / absorbed
     }
 
-    /// Factors with which these rows have the sums that they should, beginning with those of another time if there were any.
-    pub(super) fn found(
-        mut self,
-        surfaces: &impl Surfaces,
-        links: &Links,
-        from: &RowScaling,
-    ) -> RowScaling {
-        let wanted = self.wanted(surfaces);
-        if !from.is_none() {
-            let last = |id: usize| from.factors.get(id).copied().unwrap_or(1.0);
-            self.factors = (0..self.factors.len()).map(last).collect();
-            self.sum_rows(surfaces, links);
-        }
+    /// Factors with which these rows have the sums that they should. They are always looked for from 1, so that they are those of a
+    /// cold build also where the rounds end before rows are close.
+    pub(super) fn found(mut self, surfaces: &impl Surfaces, links: &Links) -> RowScaling {
+        self.wanted = self.wanted(surfaces);
         for _ in 0..SCALING_ROUNDS {
             let mut off = 0.0_f32;
-            for ((factor, row), &wanted) in self.factors.iter_mut().zip(&self.rows).zip(&wanted) {
+            for ((factor, row), &wanted) in
+                self.factors.iter_mut().zip(&self.rows).zip(&self.wanted)
+            {
                 if row.mean > 0.0 && wanted > 0.0 {
                     off = off.max((row.mean - wanted).abs());
                     let better = *factor * (wanted / row.mean).sqrt();
@@ -110,6 +105,7 @@ impl RowScaling {
 
     /// Factors with which none of these rows sums to more than 1, whatever is lost.
     pub(super) fn strict(mut self, surfaces: &impl Surfaces, links: &Links) -> RowScaling {
+        self.wanted = self.wanted(surfaces);
         for (factor, row) in self.factors.iter_mut().zip(&self.rows) {
             *factor = 1.0 / row.mean.max(1.0);
         }
@@ -128,6 +124,7 @@ impl RowScaling {
         if !self.factors.is_empty() {
             self.factors = to.old_of().iter().map(|&old| self.factors[old as usize]).collect();
             self.rows = to.old_of().iter().map(|&old| self.rows[old as usize]).collect();
+            self.wanted = to.old_of().iter().map(|&old| self.wanted[old as usize]).collect();
         }
     }
 
@@ -207,9 +204,13 @@ impl Radiosity {
         !self.constant
     }
 
-    /// Sum of the form factors from a leaf as they count, of what its links sum to.
+    /// Sum of the form factors from a leaf as it should be where rows are scaled, so that light that factors lose counts as
+    /// unaccounted for; else what its links sum to.
     pub fn row(&self, leaf: u32, links: &RowSum) -> RowSum {
-        self.scaling.rows.get(leaf as usize).copied().unwrap_or(*links)
+        match self.scaling.wanted.get(leaf as usize) {
+            Some(&mean) => RowSum { mean, ..self.scaling.rows[leaf as usize] },
+            None => *links,
+        }
     }
 
     /// Changes what leaves send, by their factors, and what elements above them send with it.

@@ -16,8 +16,8 @@ use crate::solver::settle::{Below, IrradianceChange, Settled};
 use crate::solver::surfaces::{FacetMaterial, Surfaces, for_each_below};
 use crate::solver::trend::Trend;
 use crate::solver::tuning::{
-    FURTHER_MAX, GAIN_MAX, LOST_MAX, PENDING_SHARE, SKIPPED_MAX, SWEEPS_MAX, UNBALANCED_MAX,
-    UNKNOWN_MAX, WHITE,
+    FURTHER_MAX, GAIN_MAX, LOST_MAX, PENDING_SHARE, SCALED_RESIDUAL, SKIPPED_MAX, SWEEPS_MAX,
+    UNBALANCED_MAX, UNKNOWN_MAX, WHITE,
 };
 use crate::solver::work::{Dirty, Work};
 use crate::transport;
@@ -92,15 +92,18 @@ impl Radiosity {
         if !self.has_settled() {
             self.start_anew(surfaces);
         }
-        let was = (std::mem::take(&mut self.scaling), std::mem::take(&mut self.constant));
+        let was_scaled = !std::mem::take(&mut self.scaling).is_none();
+        self.constant = false;
         if is_white(surfaces) && RowScaling::gain(surfaces, links) > GAIN_MAX {
-            self.scaling = RowScaling::none(surfaces, links, true).found(surfaces, links, &was.0);
+            self.scaling = RowScaling::none(surfaces, links, true).found(surfaces, links);
+            // Light that hardly loses anything settles slowly: begun as a cold build does, it ends where that ends.
+            self.start_anew(surfaces);
             self.solve_scaled(surfaces, links, stop);
-        } else if was.0.is_none() {
-            self.solve(surfaces, links, dirty, stop);
-        } else {
+        } else if was_scaled {
             self.forget(surfaces);
             self.solve(surfaces, links, Dirty::All, stop);
+        } else {
+            self.solve(surfaces, links, dirty, stop);
         }
         for (linear, strict) in [(true, false), (false, false), (false, true)] {
             if self.has_settled() && self.keeps_light(surfaces, links) {
@@ -109,7 +112,7 @@ impl Radiosity {
             self.constant = !linear;
             let rows = RowScaling::none(surfaces, links, linear);
             self.scaling = match strict {
-                false => rows.found(surfaces, links, &RowScaling::default()),
+                false => rows.found(surfaces, links),
                 true => rows.strict(surfaces, links),
             };
             self.start_anew(surfaces);
@@ -137,12 +140,12 @@ impl Radiosity {
                 }
             });
         }
-        let lights = self.from_lights_w(surfaces, links);
+        let lights = self.light_arriving_w(surfaces, links);
         (arriving - lights - sent).abs() <= LOST_MAX * (emitted + lights)
     }
 
     /// Flux that arrives from what is no surface, W.
-    fn from_lights_w(&self, surfaces: &impl Surfaces, links: &Links) -> f64 {
+    fn light_arriving_w(&self, surfaces: &impl Surfaces, links: &Links) -> f64 {
         let mut sum = 0.0;
         for facet in surfaces.facets() {
             for_each_below(surfaces, facet.0, &mut |id| {
@@ -157,8 +160,14 @@ impl Radiosity {
         sum
     }
 
-    /// Solves with factors, from what surfaces send as it was found last.
+    /// Solves with factors, beginning with what surfaces send as it stands.
     fn solve_scaled(&mut self, surfaces: &impl Surfaces, links: &Links, stop: Stop) {
+        let stop = match stop {
+            Stop::Bounded { residual, mean_w_m2 } => {
+                Stop::Bounded { residual: SCALED_RESIDUAL * residual, mean_w_m2 }
+            }
+            other => other,
+        };
         self.scale_leaves(surfaces, |b, factor| b.times(factor));
         self.forget(surfaces);
         self.solve(surfaces, links, Dirty::All, stop);
@@ -660,7 +669,7 @@ mod tests {
             list.map(|(source, coupling)| Link { source, coupling, ..Link::default() }).into_iter(),
         );
         let rows = RowScaling::none(&plates, &links, true);
-        let scaling = rows.found(&plates, &links, &RowScaling::default());
+        let scaling = rows.found(&plates, &links);
         for leaf in [0, 2, 3] {
             assert!((scaling.rows[leaf].mean - 1.0).abs() < 1e-3, "{:?}", scaling.rows);
         }

@@ -126,7 +126,7 @@ a_few! {
     blades_in_a_row: "blades", 0..3;
     crates_on_a_floor: "standing", 0..4;
     crates_that_land: "landing", 0..2;
-    rugs_on_a_floor: "rug", 0..4;
+    rugs_on_a_floor: "rug", 0..3;
     sensors_in_gaps: "sensor-in-gap", 0..8;
     furnaces_with_gaps: "furnace", 0..3;
     bodies_through_each_other_in_motion: "motion", 0..3;

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::Radiosity;
 use super::solve::CHUNK;
-use crate::element::{ElementId, Renumbering};
+use crate::element::Renumbering;
 use crate::solver::field::{Field, Linear};
 use crate::solver::gather::gather_some;
 use crate::solver::links::Links;
@@ -115,8 +115,8 @@ impl RowScaling {
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> u64 {
-        (self.factors.capacity() * size_of::<f32>() + self.rows.capacity() * size_of::<RowSum>())
-            as u64
+        let single = (self.factors.capacity() + self.wanted.capacity()) * size_of::<f32>();
+        (single + self.rows.capacity() * size_of::<RowSum>()) as u64
     }
 
     /// Follows elements to their new ids.
@@ -153,7 +153,11 @@ impl RowScaling {
         let mut sent = Field::default();
         sent.extend(surfaces.len());
         for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
-            self.pull(surfaces, facet.0, &mut sent);
+            let leaf = |id: u32, _: &Linear| Linear {
+                mean: [self.factors[id as usize]; 3],
+                ..Linear::default()
+            };
+            pull(surfaces, facet.0, &leaf, &mut sent);
         }
         let mut gathered = vec![Linear::default(); surfaces.len()];
         let level = transport::Simd::detect().level();
@@ -178,24 +182,6 @@ impl RowScaling {
             });
         }
     }
-
-    /// Sets factors as what surfaces send, with first moments.
-    fn pull(&self, surfaces: &impl Surfaces, id: u32, sent: &mut Field) -> (Linear, Place) {
-        let (place, moment) = (surfaces.place(id), surfaces.source_moment());
-        let children = surfaces.children(id);
-        let own = if children.is_empty() {
-            Linear { mean: [self.factors[id as usize]; 3], ..Linear::default() }
-        } else {
-            let mut fit = Fit::default();
-            for child in children {
-                let (own, at) = self.pull(surfaces, child, sent);
-                fit.add(surfaces.area_m2(child), (&place, &at), moment, &own);
-            }
-            fit.linear(&place, moment)
-        };
-        sent.set(id, &own);
-        (own, place)
-    }
 }
 
 impl Radiosity {
@@ -217,34 +203,37 @@ impl Radiosity {
     pub(super) fn scale_leaves(
         &mut self,
         surfaces: &impl Surfaces,
-        scaled: impl Fn(&Linear, f32) -> Linear + Copy,
+        scaled: impl Fn(&Linear, f32) -> Linear,
     ) {
-        for ElementId(facet) in surfaces.facets() {
-            self.scale_below(surfaces, *facet, scaled);
+        let Radiosity { radiosity, scaling, .. } = self;
+        let leaf = |id: u32, b: &Linear| scaled(b, scaling.factors[id as usize]);
+        for facet in surfaces.facets() {
+            pull(surfaces, facet.0, &leaf, radiosity);
         }
     }
+}
 
-    fn scale_below(
-        &mut self,
-        surfaces: &impl Surfaces,
-        id: u32,
-        scaled: impl Fn(&Linear, f32) -> Linear + Copy,
-    ) -> (Linear, Place) {
-        let (place, moment) = (surfaces.place(id), surfaces.source_moment());
-        let children = surfaces.children(id);
-        let own = if children.is_empty() {
-            scaled(&self.radiosity.get(id), self.scaling.factors[id as usize])
-        } else {
-            let mut fit = Fit::default();
-            for child in children {
-                let (own, at) = self.scale_below(surfaces, child, scaled);
-                fit.add(surfaces.area_m2(child), (&place, &at), moment, &own);
-            }
-            fit.linear(&place, moment)
-        };
-        self.radiosity.set(id, &own);
-        (own, place)
-    }
+/// Sets what leaves send to what `leaf` makes of it, and what elements above them send, with first moments.
+fn pull(
+    surfaces: &impl Surfaces,
+    id: u32,
+    leaf: &dyn Fn(u32, &Linear) -> Linear,
+    sent: &mut Field,
+) -> (Linear, Place) {
+    let (place, moment) = (surfaces.place(id), surfaces.source_moment());
+    let children = surfaces.children(id);
+    let own = if children.is_empty() {
+        leaf(id, &sent.get(id))
+    } else {
+        let mut fit = Fit::default();
+        for child in children {
+            let (own, at) = pull(surfaces, child, leaf, sent);
+            fit.add(surfaces.area_m2(child), (&place, &at), moment, &own);
+        }
+        fit.linear(&place, moment)
+    };
+    sent.set(id, &own);
+    (own, place)
 }
 
 /// Largest reflectance of a facet over all channels, 1.

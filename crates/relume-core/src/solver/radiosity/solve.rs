@@ -94,19 +94,16 @@ impl Radiosity {
         }
         let was_scaled = !std::mem::take(&mut self.scaling).is_none();
         self.constant = false;
-        if is_white(surfaces) && RowScaling::gain(surfaces, links) > GAIN_MAX {
-            self.scaling = RowScaling::none(surfaces, links, true).found(surfaces, links);
-            // Light that hardly loses anything settles slowly: begun as a cold build does, it ends where that ends.
-            self.start_anew(surfaces);
-            self.solve_scaled(surfaces, links, stop);
-        } else if was_scaled {
-            self.forget(surfaces);
-            self.solve(surfaces, links, Dirty::All, stop);
-        } else {
+        let grows = is_white(surfaces) && RowScaling::gain(surfaces, links) > GAIN_MAX;
+        if !grows {
+            let dirty = if was_scaled { Dirty::All } else { dirty };
             self.solve(surfaces, links, dirty, stop);
         }
+        let scaled =
+            Stop::Bounded { residual: SCALED_RESIDUAL * residual, mean_w_m2: most_mean_w_m2 };
+        let mut is_solved = !grows && self.has_settled();
         for (linear, strict) in [(true, false), (false, false), (false, true)] {
-            if self.has_settled() && self.keeps_light(surfaces, links) {
+            if is_solved {
                 return;
             }
             self.constant = !linear;
@@ -115,17 +112,16 @@ impl Radiosity {
                 false => rows.found(surfaces, links),
                 true => rows.strict(surfaces, links),
             };
+            // Light that hardly loses anything settles slowly: begun as a cold build does, it ends where that ends.
             self.start_anew(surfaces);
-            self.solve_scaled(surfaces, links, stop);
+            self.solve_scaled(surfaces, links, scaled);
+            is_solved = self.has_settled() && self.keeps_light(surfaces, links);
         }
     }
 
     /// Whether surfaces receive of each other what they send, but for `LOST_MAX` of what is emitted: with factors, as lines may
     /// reach below zero.
     fn keeps_light(&self, surfaces: &impl Surfaces, links: &Links) -> bool {
-        if self.scaling.is_none() {
-            return true;
-        }
         let (mut sent, mut arriving, mut emitted) = (0.0, 0.0, 0.0);
         for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
             let exitance = surfaces.material(facet.0).exitance;
@@ -162,12 +158,6 @@ impl Radiosity {
 
     /// Solves with factors, beginning with what surfaces send as it stands.
     fn solve_scaled(&mut self, surfaces: &impl Surfaces, links: &Links, stop: Stop) {
-        let stop = match stop {
-            Stop::Bounded { residual, mean_w_m2 } => {
-                Stop::Bounded { residual: SCALED_RESIDUAL * residual, mean_w_m2 }
-            }
-            other => other,
-        };
         self.scale_leaves(surfaces, |b, factor| b.times(factor));
         self.forget(surfaces);
         self.solve(surfaces, links, Dirty::All, stop);

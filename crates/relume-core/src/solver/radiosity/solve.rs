@@ -78,7 +78,7 @@ pub(super) const CHUNK: usize = 256;
 
 impl Radiosity {
     /// [`solve`](Radiosity::solve) to a residual, relative to the mean radiosity, whatever the links: where rows of leaves that sum to
-    /// more than 1 would make light of nothing, with factors of leaves ([`RowScaling`]), with which none do; and if lines grow even so,
+    /// more than 1 would make light of nothing, with factors of leaves (`RowScaling`), with which none do; and if lines grow even so,
     /// with constant elements and factors that lose light. `most_mean_w_m2` is what the mean radiosity cannot reach.
     pub fn solve_bounded(
         &mut self,

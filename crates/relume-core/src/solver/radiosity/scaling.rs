@@ -40,6 +40,9 @@ pub(super) const CLOSE: f32 = 1e-3;
 /// What rows may be above 1 by rounding, and as their exchange is found: 1.
 const ROUNDED: f64 = 1e-3;
 
+/// Halvings of the interval in which [`raised`] looks.
+const RAISED_BITS: u32 = 24;
+
 impl RowScaling {
     /// Factors of 1, with the sums of rows as lines or as means alone unless `linear`.
     pub(super) fn none(surfaces: &impl Surfaces, links: &Links, linear: bool) -> RowScaling {
@@ -128,22 +131,20 @@ impl RowScaling {
         }
     }
 
-    /// Sums that the rows of leaves should have: at most 1, and over each facet together as much as they have, unless that would
-    /// take more than twice as much of some leaf.
+    /// Sums that the rows of leaves should have: at most 1, and over each facet together as much as they have. What is taken from
+    /// rows above 1 goes to the others in proportion to what they have, so that a leaf which sees next to nothing goes on to.
     fn wanted(&self, surfaces: &impl Surfaces) -> Vec<f32> {
         let mut wanted = vec![0.0; surfaces.len()];
         for facet in surfaces.facets() {
-            let (mut above, mut below) = (0.0, 0.0);
+            let mut rows: Vec<(u32, f64, f64)> = Vec::new();
             for_each_leaf(surfaces, facet.0, &mut |leaf| {
-                let off = surfaces.area_m2(leaf) * (f64::from(self.rows[leaf as usize].mean) - 1.0);
-                *(if off > 0.0 { &mut above } else { &mut below }) += off.abs();
+                let row = f64::from(self.rows[leaf as usize].mean.max(0.0));
+                rows.push((leaf, surfaces.area_m2(leaf), row));
             });
-            let left = if below > above { (1.0 - above / below) as f32 } else { 0.0 };
-            for_each_leaf(surfaces, facet.0, &mut |leaf| {
-                let row = self.rows[leaf as usize].mean;
-                let short = (1.0 - row).max(0.0);
-                wanted[leaf as usize] = (1.0 - left * short).min(RAISED_MOST * row);
-            });
+            let raised = raised(&rows);
+            for (leaf, _, row) in rows {
+                wanted[leaf as usize] = (raised * row).min(1.0) as f32;
+            }
         }
         wanted
     }
@@ -211,6 +212,23 @@ impl Radiosity {
             pull(surfaces, facet.0, &leaf, radiosity);
         }
     }
+}
+
+/// By how much rows are to be multiplied for their sum over areas to stay while none is above 1: 1, at most `RAISED_MOST`; of leaves,
+/// their areas (m2) and rows.
+fn raised(rows: &[(u32, f64, f64)]) -> f64 {
+    let off = |raised: f64| -> f64 {
+        rows.iter().map(|&(_, area, row)| area * ((raised * row).min(1.0) - row)).sum()
+    };
+    let (mut low, mut high) = (1.0, f64::from(RAISED_MOST));
+    if off(low) >= 0.0 {
+        return low;
+    }
+    for _ in 0..RAISED_BITS {
+        let middle = 0.5 * (low + high);
+        *(if off(middle) < 0.0 { &mut low } else { &mut high }) = middle;
+    }
+    high
 }
 
 /// Sets what leaves send to what `leaf` makes of it, and what elements above them send, with first moments.

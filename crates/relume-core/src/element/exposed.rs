@@ -33,12 +33,6 @@ fn exposed(shape: &Shape, covered: &Covered) -> Moments {
         let moved: Vec<DVec2> = p.iter().map(|&c| c - centroid).collect();
         Moments::of(&moved)
     };
-    let (lo, hi) = own
-        .iter()
-        .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)));
-    let near = covered
-        .parts
-        .iter()
-        .filter(|(_, [low, high])| low.cmplt(hi).all() && lo.cmplt(*high).all());
+    let near = covered.parts.iter().filter(|(_, bounds)| shape.meets(bounds));
     near.fold(about(own), |rest, (part, _)| rest.without(&about(&common(own, part))))
 }

@@ -11,14 +11,16 @@ use super::groups::{Group, Groups};
 use super::ids::{ElementId, ElementKey, Kind, Renumbering};
 use super::split::{Chart, Extent, Place, Seam, Shape};
 use crate::geometry::Aabb;
-use crate::scene::{BodyId, Covered, Enclosure, PatchId, Solid, Solids};
+use crate::scene::{BodyId, Covered, Covering, Enclosure, PatchId, Solid, Solids};
 
+mod cover;
 mod grouping;
 mod plant;
 mod pool;
 mod replant;
 
 use super::tuning::EXPOSED_LEAST;
+pub use cover::PartInside;
 pub use replant::{Seeds, old_coarse_numbers};
 
 /// What differs between siblings: 20 bytes.
@@ -98,6 +100,8 @@ pub struct Forest {
     siblings: Vec<Siblings>,
     /// Area of what light can reach of the elements that are partly or wholly covered, m2.
     exposed: BTreeMap<u32, f32>,
+    /// What of patches is covered now, where that differs from what always is.
+    covered_now: BTreeMap<PatchId, Covered>,
     fixed_len: u32,
     /// Elements with ids below this are never reaped.
     kept_len: u32,
@@ -132,6 +136,8 @@ struct Fixed {
     solids: Solids,
     /// What of each patch is covered, by patch.
     covered: Vec<Covered>,
+    /// What moving bodies may cover.
+    covering: Covering,
     /// Box around the unit normals of the patches at or below each node, in their bodies' frames.
     normals: Vec<Aabb>,
     /// Whether a patch emits light at any time, by patch.
@@ -246,6 +252,7 @@ impl Forest {
                 .map(|seams| (seams.capacity() * size_of::<Seam>()) as u64)
                 .sum::<u64>()
             + f.groups.memory_bytes()
+            + f.covering.memory_bytes() as u64
     }
 
     /// Room that no element has.
@@ -306,9 +313,8 @@ impl Forest {
     /// it. Exact up to single precision.
     #[inline]
     pub fn exposed_m2(&self, id: ElementId) -> f64 {
-        let is_covered = |patch: PatchId| !self.fixed.covered[patch.0 as usize].parts.is_empty();
         match self.patch(id) {
-            Some(patch) if is_covered(patch) => {
+            Some(patch) if !self.covered_of(patch).parts.is_empty() => {
                 self.exposed.get(&id.0).map_or_else(|| self.area_m2(id), |&m2| f64::from(m2))
             }
             _ => self.area_m2(id),
@@ -333,10 +339,31 @@ impl Forest {
         rests(of_a, of_b) || rests(of_b, of_a)
     }
 
+    /// Whether two elements [rest in contact](Forest::rest_in_contact), or one is on an inner side of what stands on the other now.
+    #[inline]
+    pub fn are_in_contact(&self, a: ElementId, b: ElementId) -> bool {
+        if self.covered_now.is_empty() {
+            return self.rest_in_contact(a, b);
+        }
+        let (Some(of_a), Some(of_b)) = (self.patch(a), self.patch(b)) else { return false };
+        let touches = |on: PatchId, other: PatchId| {
+            self.covered_of(on).contacts.binary_search(&other).is_ok()
+        };
+        touches(of_a, of_b) || touches(of_b, of_a)
+    }
+
     /// Covered parts of the patch of an element.
     fn covered(&self, id: ElementId) -> &Covered {
-        let patch = self.patch(id).expect("an element has a patch");
-        &self.fixed.covered[patch.0 as usize]
+        self.covered_of(self.patch(id).expect("an element has a patch"))
+    }
+
+    /// Covered parts of a patch.
+    #[inline]
+    fn covered_of(&self, patch: PatchId) -> &Covered {
+        match self.covered_now.is_empty() {
+            true => &self.fixed.covered[patch.0 as usize],
+            false => self.covered_now.get(&patch).unwrap_or(&self.fixed.covered[patch.0 as usize]),
+        }
     }
 
     /// Where what is exposed of an element lies in its patch's frame; the radius is that of the whole.

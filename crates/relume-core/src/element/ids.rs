@@ -47,6 +47,12 @@ impl Renumbering {
         self.new_of[old as usize]
     }
 
+    /// New id of an element; `None` where it has left.
+    pub fn kept(&self, old: ElementId) -> Option<ElementId> {
+        let new = self.new_of(old.0);
+        ((new as usize) < self.old_of.len()).then_some(ElementId(new))
+    }
+
     /// Old ids, by new one.
     pub fn old_of(&self) -> &[u32] {
         &self.old_of

@@ -12,7 +12,7 @@ mod split;
 mod tuning;
 mod world;
 
-pub use forest::{Counts, Forest, Seeds, old_coarse_numbers};
+pub use forest::{Counts, Forest, PartInside, Seeds, old_coarse_numbers};
 pub use groups::{Group, GroupLeaf, Groups, distant_parts, grouped_patches};
 pub use ids::{ElementId, ElementKey, Kind, Renumbering};
 pub use split::{Extent, Shape, bilinear, bilinear_area};

@@ -22,6 +22,15 @@ impl Shape {
         Shape { corners: [corner(0), corner(1), corner(2), corner(3)], len: corners.len() }
     }
 
+    /// Whether the box around it and another have an inner point in common.
+    pub fn meets(&self, [low, high]: &[DVec2; 2]) -> bool {
+        let (lo, hi) = self
+            .corners
+            .iter()
+            .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)));
+        low.cmplt(hi).all() && lo.cmplt(*high).all()
+    }
+
     /// Area, m2: half the cross product of the diagonals, which holds for a triangle with its last
     /// corner repeated too.
     pub fn area(&self) -> f64 {

@@ -16,6 +16,10 @@ pub(crate) trait Receivers {
     fn rest_in_contact(&self, _a: ElementId, _b: ElementId) -> bool {
         false
     }
+    /// Part of the exchange area of two elements over which no light goes, m2.
+    fn dark_exchange_m2(&self, _a: ElementId, _b: ElementId) -> f32 {
+        0.0
+    }
     /// Whether a link that ends there is gathered in another way.
     fn is_apart(&self, _id: ElementId) -> bool {
         false
@@ -31,7 +35,10 @@ pub(crate) fn directions(
     let carried = link.carried;
     let exchange = carried.exchange_area_past_occluders_m2();
     let g = carried.gradients;
-    let exchange = if forest.rest_in_contact(link.a, link.b) { 0.0 } else { exchange };
+    let exchange = match forest.rest_in_contact(link.a, link.b) {
+        true => 0.0,
+        false => exchange - forest.dark_exchange_m2(link.a, link.b),
+    };
     let one = |receiver: ElementId, source: ElementId, over_receiver, over_source| {
         let apart = forest.is_apart(link.a) || forest.is_apart(link.b);
         let receives = forest.receives(receiver) && exchange > 0.0 && !apart;
@@ -72,11 +79,9 @@ pub(crate) fn set_pairs(
     let both = |(a, b): (ElementId, ElementId)| [(a.0, without(b)), (b.0, without(a))];
     let mut wanted: Vec<(u32, Link)> = Vec::new();
     for pair in set {
-        if pair.carried.exchange_area_past_occluders_m2() > 0.0
-            && !forest.rest_in_contact(pair.a, pair.b)
-        {
-            wanted.extend(directions(forest, &pair));
-        } else {
+        let start = wanted.len();
+        wanted.extend(directions(forest, &pair));
+        if wanted.len() == start {
             wanted.extend(both((pair.a, pair.b)));
         }
     }

@@ -106,7 +106,7 @@ impl Reconstruction<'_> {
         let forest = &self.solved.space.forest;
         if !forest.receives(receiver)
             || forest.kind(source) != Kind::Element
-            || forest.rest_in_contact(receiver, source)
+            || forest.are_in_contact(receiver, source)
         {
             return false;
         }

@@ -7,11 +7,11 @@ use glam::{DVec2, DVec3};
 
 use super::topology::{Polygon, components, matched, sides_of};
 use super::weld::Weld;
-use super::{BodyId, InPlane, PatchId, Scene, Sheet, Solids};
-use crate::geometry::{Aabb, Moments, Plane, Segment, common, difference, within_outlines};
+use super::{BodyId, Frame, InPlane, Patch, PatchId, Scene, Sheet, Solids};
+use crate::geometry::{Aabb, Moments, Plane, Pose, Segment, common, difference, within_outlines};
 
 /// What lies this close to a plane, as a share of the largest coordinate, lies in it: a few roundings of 32-bit numbers.
-const IN_PLANE: f64 = 1e-6;
+pub(super) const IN_PLANE: f64 = 1e-6;
 
 /// Bodies are cut this far above a patch to see what they cover, in roundings.
 const ABOVE: f64 = 4.0;
@@ -25,17 +25,34 @@ const SLIVER: f64 = 1e-9;
 /// Cuts made in one scene; what would be found after that is not: a count, so that it is the same everywhere.
 const CUTS_MAX: usize = 2_000_000;
 
-/// Parts of the animation in which it is told apart where moving bodies get.
-const SPANS: u32 = 32;
+/// Polygons of a body of which it is asked whether it is convex.
+const CONVEX_MAX: usize = 128;
 
 /// Polygons of a surface, and covered parts of a patch, that are looked at.
 const POLYGONS_MAX: usize = 4_096;
+
+/// Part of a patch that lies within a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inside {
+    /// The body, and a number of what of it hangs together.
+    pub of: (BodyId, u32),
+    /// Whether the patch is one of the same body's, which moves; then places are in that body's frame, else in the world.
+    pub is_own: bool,
+    /// Convex polygon in the patch's frame, counter-clockwise, metres.
+    pub outline: Vec<DVec2>,
+    /// Lowest and highest coordinates of the outline.
+    pub bounds: [DVec2; 2],
+    /// Origin of the patch's frame, and its axes.
+    pub plane: [DVec3; 3],
+}
 
 /// What of a patch is covered.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Covered {
     /// Disjoint convex polygons in the patch's frame, counter-clockwise, with boxes around them (low, high); metres.
     pub parts: Vec<(Vec<DVec2>, [DVec2; 2])>,
+    /// What of it lies within bodies: what that exchanges with what lies within the same body, no light does. Of one body disjoint.
+    pub inside: Vec<Inside>,
     /// Patches that touch it, and inner sides of what stands on it: what they exchange leaves neither. Ascending.
     pub contacts: Vec<PatchId>,
 }
@@ -54,11 +71,11 @@ impl Scene {
             .filter(|&body| !self.is_distant(body))
             .partition(|&b| self.moves(b) || is_displaced(b));
         let mut cuts_left = CUTS_MAX;
-        let mut cover = |bodies: &[BodyId]| {
-            Group::new(self, bodies).cover((self, solids), &mut out, &mut cuts_left);
+        let mut cover = |bodies: &[BodyId], is_own: bool| {
+            Group::new(self, bodies, is_own).cover((self, solids), &mut out, &mut cuts_left);
         };
-        cover(&at_rest);
-        moving.into_iter().for_each(|body| cover(&[body]));
+        cover(&at_rest, false);
+        moving.into_iter().for_each(|body| cover(&[body], true));
         for covered in &mut out {
             covered.contacts.sort_unstable();
             covered.contacts.dedup();
@@ -72,22 +89,42 @@ struct Group {
     placed: Vec<Placed>,
     hulls: Vec<Hull>,
     slack_m: f64,
+    /// Whether they are those of a body that moves, in its frame.
+    is_own: bool,
 }
 
 /// A patch in the frame of its group.
-struct Placed {
-    id: PatchId,
+pub(super) struct Placed {
+    pub(super) id: PatchId,
     corners: Vec<DVec3>,
     normal: DVec3,
-    bounds: Aabb,
+    pub(super) bounds: Aabb,
+    /// Origin and axes of its plane.
+    origin: DVec3,
+    axes: [DVec3; 2],
 }
 
-/// Where what emits, and what moves, can get in the whole animation, in the world.
+impl Placed {
+    /// A patch of a body that is at a pose.
+    pub(super) fn new(id: PatchId, patch: &Patch, pose: &Pose) -> Placed {
+        let corners: Vec<DVec3> = patch.corners_in_body().map(|c| pose.point(c)).collect();
+        let bounds = Aabb::of(corners.iter().copied());
+        let Frame { origin, u, v, normal } = patch.frame;
+        let [u, v, normal] = [u, v, normal].map(|d| pose.direction(d));
+        Placed { id, corners, normal, bounds, origin: pose.point(origin), axes: [u, v] }
+    }
+
+    /// A point of the group's frame in the patch's own.
+    fn in_frame(&self, p: DVec3) -> DVec2 {
+        let d = p - self.origin;
+        DVec2::new(d.dot(self.axes[0]), d.dot(self.axes[1]))
+    }
+}
+
+/// Where what emits can get in the whole animation, in the world.
 struct Lamps {
     patches: Vec<(PatchId, Aabb)>,
     lights: Vec<Aabb>,
-    /// Bodies that move, other than those that cover, each in `SPANS` parts of the animation.
-    movers: Vec<Aabb>,
 }
 
 impl Lamps {
@@ -111,12 +148,10 @@ impl Lamps {
         Lamps {
             patches: (0..scene.patches.len() as u32).filter(emits).map(patch).collect(),
             lights: scene.lights.iter().map(light).collect(),
-            movers: movers(scene, bodies),
         }
     }
 
-    /// Whether a lamp, or a body that moves, is or may get among the polygons of a body; touching is not enough. An inner side that
-    /// emits counts. What moves in there would exchange light with covered parts.
+    /// Whether a lamp is or may get among the polygons of a body; touching is not enough. An inner side that emits counts.
     fn may_be_in(&self, scene: &Scene, (placed, hull): (&[Placed], &Hull), slack_m: f64) -> bool {
         let own = |id: PatchId, of: &[usize]| of.iter().any(|&k| placed[k].id == id);
         let body = scene.patches[placed[hull.polygons[0]].id.0 as usize].body;
@@ -124,29 +159,14 @@ impl Lamps {
         let within = |lamp: &Aabb| {
             let lamp = lamp.grown(2.0 * slack_m);
             let least = bounds.lo.max(lamp.lo).cmplt(bounds.hi.min(lamp.hi) - 3.0 * slack_m);
-            least.all()
+            least.all() && (scene.moves(body) || !hull.is_before(placed, &lamp, 4.0 * slack_m))
         };
-        self.lights.iter().chain(&self.movers).any(within)
+        self.lights.iter().any(within)
             || self.patches.iter().any(|(id, lamp)| {
                 within(lamp) && (!own(*id, &hull.polygons) || own(*id, &hull.twins))
                     || !hull.twins.is_empty() && own(*id, &hull.polygons)
             })
     }
-}
-
-/// Where bodies can get that move and are none of `bodies`, in each of `SPANS` parts of the animation, in the world.
-fn movers(scene: &Scene, bodies: &[BodyId]) -> Vec<Aabb> {
-    let [from, to] = scene.motion.span_s();
-    let at = |k: u32| from + (to - from) * f64::from(k) / f64::from(SPANS);
-    let all = (0..scene.bodies.len() as u32).map(BodyId);
-    let moving = all.filter(|&body| scene.moves(body) && !scene.is_distant(body));
-    let others = moving.filter(|body| !bodies.contains(body) && !scene.is_inserted(*body));
-    let ways = |body: BodyId| {
-        let corners = scene.patches_of(body).flat_map(|(_, patch)| patch.corners_in_body());
-        let bounds = Aabb::of(corners);
-        (0..SPANS).map(move |k| way(scene, body, &bounds, [at(k), at(k + 1)]))
-    };
-    others.flat_map(ways).collect()
 }
 
 /// Where something of a body can get from one time to another, in the world.
@@ -164,34 +184,35 @@ fn way(scene: &Scene, body: BodyId, bounds: &Aabb, [from, to]: [f64; 2]) -> Aabb
 }
 
 /// Polygons of a body that hang together along sides.
-struct Hull {
+#[derive(Clone, Debug)]
+pub(super) struct Hull {
     /// Numbers of its patches in the group; of two sides the first.
-    polygons: Vec<usize>,
+    pub(super) polygons: Vec<usize>,
     /// The other sides.
-    twins: Vec<usize>,
+    pub(super) twins: Vec<usize>,
     /// Ends of sides that no other polygon has.
-    border: Vec<DVec3>,
-    bounds: Aabb,
+    pub(super) border: Vec<DVec3>,
+    pub(super) bounds: Aabb,
+    /// Whether it lies behind the planes of all its polygons.
+    pub(super) is_convex: bool,
+    /// The body that it is of, and its number there.
+    pub(super) of: (BodyId, u32),
 }
 
 impl Group {
-    fn new(scene: &Scene, bodies: &[BodyId]) -> Group {
+    fn new(scene: &Scene, bodies: &[BodyId], is_own: bool) -> Group {
         let mut placed = Vec::new();
         let mut hulls = Vec::new();
         for &body in bodies {
             let first = placed.len();
-            placed.extend(scene.patches_of(body).map(|(id, patch)| {
-                let corners: Vec<DVec3> = patch.corners_in_body().collect();
-                let bounds = Aabb::of(corners.iter().copied());
-                Placed { id, corners, normal: patch.frame.normal, bounds }
-            }));
+            let own = scene.patches_of(body);
+            placed.extend(own.map(|(id, patch)| Placed::new(id, patch, &Pose::IDENTITY)));
             hulls_of(scene, (&placed, first), &mut hulls);
         }
-        let reach = |p: &Placed| p.bounds.lo.abs().max(p.bounds.hi.abs()).max_element();
-        let slack_m = IN_PLANE * placed.iter().map(reach).fold(0.0, f64::max);
+        let slack_m = IN_PLANE * placed.iter().map(|p| reach_m(&p.bounds)).fold(0.0, f64::max);
         let lamps = Lamps::of(scene, bodies);
         hulls.retain(|hull: &Hull| !lamps.may_be_in(scene, (&placed, hull), slack_m));
-        Group { placed, hulls, slack_m }
+        Group { placed, hulls, slack_m, is_own }
     }
 
     fn cover(&self, (scene, solids): (&Scene, &Solids), out: &mut [Covered], left: &mut usize) {
@@ -244,8 +265,7 @@ impl Group {
             if lies == InPlane::Apart {
                 continue;
             }
-            let mut corners: Vec<DVec2> =
-                by.corners.iter().map(|&c| in_frame(scene, of.id, c)).collect();
+            let mut corners: Vec<DVec2> = by.corners.iter().map(|&c| of.in_frame(c)).collect();
             if opposed {
                 corners.reverse();
             }
@@ -258,53 +278,92 @@ impl Group {
     }
 
     /// What a body covers of a patch that it stands on or sticks in.
-    fn stand(
-        &self,
-        scene: &Scene,
-        hull: &Hull,
-        patch: &Placed,
-        (covered, left): (&mut Covered, &mut usize),
-    ) {
-        let height = |c: DVec3| (c - patch.corners[0]).dot(patch.normal);
-        if hull.border.iter().any(|&c| height(c) > self.slack_m) {
-            return;
-        }
-        let mut outline: Vec<Segment> = Vec::new();
-        for polygon in hull.polygons.iter().map(|&k| &self.placed[k]) {
-            let above = |c: DVec3| height(c) - ABOVE * self.slack_m;
-            let n = polygon.corners.len();
-            let through = (0..n).filter_map(|k| {
-                let [p, q] = [polygon.corners[k], polygon.corners[(k + 1) % n]];
-                let (x, y) = (above(p), above(q));
-                ((x > 0.0) != (y > 0.0)).then(|| p + (q - p) * (x / (x - y)))
-            });
-            let ends: Vec<DVec3> = through.collect();
-            let [p, q] = ends[..] else { continue };
-            // The inside is on the left, seen from the front of the patch.
-            let along = patch.normal.cross(polygon.normal);
-            let [p, q] = if along.dot(q - p) < 0.0 { [q, p] } else { [p, q] };
-            outline.push([p, q].map(|c| in_frame(scene, patch.id, c)));
-        }
-        if outline.is_empty() || outline.len() > POLYGONS_MAX {
-            return;
-        }
-        *left = left.saturating_sub(outline.len());
-        let around: f64 = outline.iter().map(|[p, q]| p.perp_dot(*q)).sum();
-        // Two-sided polygons may all be wound either way.
-        let turned = around < 0.0 && hull.twins.len() == hull.polygons.len();
-        if turned {
-            outline.iter_mut().for_each(|line| line.reverse());
-        }
-        let inner = if turned { &hull.polygons } else { &hull.twins };
-        if add(scene, patch.id, within_outlines(&outline, self.slack_m), (&mut *covered, left)) {
-            covered.contacts.extend(inner.iter().map(|&k| self.placed[k].id));
-        }
+    fn stand(&self, scene: &Scene, hull: &Hull, patch: &Placed, out: (&mut Covered, &mut usize)) {
+        stand(scene, (&self.placed, hull), (patch, self.is_own), self.slack_m, out);
     }
 }
 
+/// What a body covers of a patch that it stands on or sticks in; its polygons, by number. `is_own` if the patch is of that body, which
+/// moves, and places are in its frame.
+pub(super) fn stand(
+    scene: &Scene,
+    (placed, hull): (&[Placed], &Hull),
+    (patch, is_own): (&Placed, bool),
+    slack_m: f64,
+    (covered, left): (&mut Covered, &mut usize),
+) {
+    let height = |c: DVec3| (c - patch.corners[0]).dot(patch.normal);
+    if hull.border.iter().any(|&c| height(c) > slack_m) {
+        return;
+    }
+    let mut outline: Vec<Segment> = Vec::new();
+    for polygon in hull.polygons.iter().map(|&k| &placed[k]) {
+        let above = |c: DVec3| height(c) - ABOVE * slack_m;
+        let n = polygon.corners.len();
+        let through = (0..n).filter_map(|k| {
+            let [p, q] = [polygon.corners[k], polygon.corners[(k + 1) % n]];
+            let (x, y) = (above(p), above(q));
+            ((x > 0.0) != (y > 0.0)).then(|| p + (q - p) * (x / (x - y)))
+        });
+        let ends: Vec<DVec3> = through.collect();
+        let [p, q] = ends[..] else { continue };
+        // The inside is on the left, seen from the front of the patch.
+        let along = patch.normal.cross(polygon.normal);
+        let [p, q] = if along.dot(q - p) < 0.0 { [q, p] } else { [p, q] };
+        outline.push([p, q].map(|c| patch.in_frame(c)));
+    }
+    if outline.is_empty() || outline.len() > POLYGONS_MAX {
+        return;
+    }
+    *left = left.saturating_sub(outline.len());
+    let turns: f64 = outline.iter().map(|[p, q]| p.perp_dot(*q)).sum();
+    // Two-sided polygons may all be wound either way.
+    let turned = turns < 0.0 && hull.twins.len() == hull.polygons.len();
+    if turned {
+        outline.iter_mut().for_each(|line| line.reverse());
+    }
+    let inner = if turned { &hull.polygons } else { &hull.twins };
+    let within = within_outlines(&outline, slack_m);
+    let whole = &scene.patches[patch.id.0 as usize].corners;
+    for outline in within.iter().map(|p| common(p, whole)).filter(|p| p.len() > 2) {
+        let (bounds, [u, v]) = (around(&outline), patch.axes);
+        let plane = [patch.origin, u, v];
+        covered.inside.push(Inside { of: hull.of, is_own, outline, bounds, plane });
+    }
+    if add(scene, patch.id, within, (&mut *covered, left)) {
+        covered.contacts.extend(inner.iter().map(|&k| placed[k].id));
+    }
+}
+
+/// Largest coordinate of a box, metres.
+pub(super) fn reach_m(bounds: &Aabb) -> f64 {
+    bounds.lo.abs().max(bounds.hi.abs()).max_element()
+}
+
 impl Hull {
+    /// Whether all corners lie behind the planes of all polygons; that of a body of many polygons is not asked.
+    fn is_convex(&self, placed: &[Placed], slack_m: f64) -> bool {
+        let polygons = || self.polygons.iter().map(|&k| &placed[k]);
+        let behind = |one: &Placed| {
+            let height = |c: DVec3| (c - one.corners[0]).dot(one.normal);
+            polygons().all(|other| other.corners.iter().all(|&c| height(c) <= slack_m))
+        };
+        self.polygons.len() <= CONVEX_MAX && polygons().all(behind)
+    }
+
+    /// Whether a box lies in front of one of the polygons of a convex body; touching counts.
+    pub(super) fn is_before(&self, placed: &[Placed], bounds: &Aabb, slack_m: f64) -> bool {
+        let before = |polygon: &Placed| {
+            let n = polygon.normal;
+            let pick = |k: usize| if n[k] > 0.0 { bounds.lo[k] } else { bounds.hi[k] };
+            let nearest = DVec3::new(pick(0), pick(1), pick(2));
+            (nearest - polygon.corners[0]).dot(n) >= -slack_m
+        };
+        self.is_convex && self.polygons.iter().any(|&k| before(&placed[k]))
+    }
+
     /// Whether a patch of the group is one of its own.
-    fn holds(&self, k: usize) -> bool {
+    pub(super) fn holds(&self, k: usize) -> bool {
         self.polygons.binary_search(&k).is_ok() || self.twins.binary_search(&k).is_ok()
     }
 }
@@ -361,15 +420,10 @@ fn meet(a: &[DVec2; 2], b: &[DVec2; 2]) -> bool {
     a[0].cmplt(b[1]).all() && b[0].cmplt(a[1]).all()
 }
 
-fn in_frame(scene: &Scene, patch: PatchId, p: DVec3) -> DVec2 {
-    let frame = scene.patches[patch.0 as usize].frame;
-    let d = p - frame.origin;
-    DVec2::new(d.dot(frame.u), d.dot(frame.v))
-}
-
 /// Adds the groups of polygons of a body, from the number `first` on, that hang together along sides, each of which
 /// is run as often one way as the other, or is on the border.
-fn hulls_of(scene: &Scene, (placed, first): (&[Placed], usize), out: &mut Vec<Hull>) {
+pub(super) fn hulls_of(scene: &Scene, (placed, first): (&[Placed], usize), out: &mut Vec<Hull>) {
+    let Some(body) = placed.get(first).map(|p| scene.patches[p.id.0 as usize].body) else { return };
     let twin = |p: &Placed| scene.patches[p.id.0 as usize].twin;
     let firsts: Vec<usize> = (first..placed.len())
         .filter(|&k| twin(&placed[k]).is_none_or(|twin| twin > placed[k].id))
@@ -391,6 +445,8 @@ fn hulls_of(scene: &Scene, (placed, first): (&[Placed], usize), out: &mut Vec<Hu
             twins: Vec::new(),
             border: Vec::new(),
             bounds: Aabb::EMPTY,
+            is_convex: false,
+            of: (body, 0),
         })
         .collect();
     let number_of = |patch: PatchId| {
@@ -411,7 +467,11 @@ fn hulls_of(scene: &Scene, (placed, first): (&[Placed], usize), out: &mut Vec<Hu
             hulls[component[group[0].polygon as usize] as usize].border.extend(ends);
         }
     }
-    hulls.iter_mut().for_each(|hull| hull.twins.sort_unstable());
+    for (number, hull) in (0..).zip(&mut hulls) {
+        hull.of.1 = number;
+        hull.twins.sort_unstable();
+        hull.is_convex = hull.is_convex(placed, IN_PLANE * reach_m(&hull.bounds));
+    }
     out.extend(hulls.into_iter().filter(|hull| (3..=POLYGONS_MAX).contains(&hull.polygons.len())));
 }
 

@@ -17,6 +17,7 @@ mod check;
 mod connected;
 pub mod coverage;
 mod covered;
+mod covering;
 mod dark;
 mod discontinuity;
 pub mod draft;
@@ -49,7 +50,8 @@ mod world;
 
 pub use builder::SceneBuilder;
 pub use check::check;
-pub use covered::Covered;
+pub use covered::{Covered, Inside};
+pub use covering::{Covering, Instant};
 pub use draft::Edits;
 pub use drift::Drift;
 pub use edited::Edited;

@@ -192,6 +192,7 @@ fn replanted(
     body: &dyn Fn(BodyId) -> Option<BodyId>,
 ) -> Option<Solved> {
     let seeds = Seeds { old: &old.seed, new: &new.seed };
+    let uncovered = last.space.forest.uncover();
     let to = last.space.forest.renumbering_to(seeds, body)?;
     let (forest, touched) = last.space.forest.replanted(seeds, &to);
     last.space.scene = Arc::clone(&new.scene);
@@ -216,6 +217,9 @@ fn replanted(
     for world in [&mut space.world, &mut space.sound_world] {
         *world = world.of_bodies(&from);
     }
+    let uncovered = std::mem::take(&mut space.covered).into_iter().chain(uncovered);
+    let kept = uncovered.filter_map(|id| to.kept(id));
+    space.covered = kept.chain(space.forest.cover(&new.scene, &space.world)).collect();
     let view = WorldView::new(&new.scene, &space.forest, &space.world);
     let was = std::mem::replace(&mut space.view, view);
     let links = std::mem::take(&mut space.groups);

@@ -6,6 +6,7 @@ mod bed;
 mod coarse;
 mod emission;
 mod groups;
+mod inner;
 mod phases;
 mod promise;
 mod state;

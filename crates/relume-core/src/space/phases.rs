@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::element::{ElementId, Forest, Renumbering, WorldView};
+use crate::element::{ElementId, Forest, Kind, Renumbering, WorldView};
 use crate::follow::{
     Balance, Clocked, Follower, FrameReport, Level, Motion, Prediction, Space, Update, Void, Why,
 };
@@ -62,12 +62,13 @@ impl Space for SpaceState {
             coarse: Coarse::default(),
             sound_world: world.clone(),
             touched: Vec::new(),
+            covered: Vec::new(),
             is_stopped: false,
         }
     }
 
     fn is_at(&self, goal: &Goal<'_>) -> bool {
-        self.world == *goal.world && self.touched.is_empty()
+        self.world == *goal.world && self.touched.is_empty() && self.covered.is_empty()
     }
 
     fn stay(&mut self, goal: &Goal<'_>) -> bool {
@@ -87,6 +88,8 @@ impl Space for SpaceState {
     fn go(&mut self, goal: &Goal<'_>) -> Was {
         self.scene = Arc::clone(&goal.bed.scene);
         let view = WorldView::new(&self.scene, &self.forest, goal.world);
+        let covered = self.forest.cover(&self.scene, goal.world);
+        self.covered.extend(covered);
         Was {
             world: std::mem::replace(&mut self.world, goal.world.clone()),
             held: std::mem::replace(&mut self.held, goal.held.clone()),
@@ -165,10 +168,14 @@ impl Space for SpaceState {
     }
 
     fn remade(&self, _: &Was, tree: &PairTree) -> Vec<PairId> {
-        if self.touched.is_empty() {
+        if self.touched.is_empty() && self.covered.is_empty() {
             return Vec::new();
         }
-        let is_touched = |id| self.touched.binary_search(&self.forest.fixed(id)).is_ok();
+        let mut covered = vec![false; self.forest.len()];
+        self.covered.iter().for_each(|id| covered[id.0 as usize] = true);
+        let is_touched = |id: ElementId| {
+            covered[id.0 as usize] || self.touched.binary_search(&self.forest.fixed(id)).is_ok()
+        };
         let ends_there = |&id: &PairId| {
             let (a, b) = tree.ends(id);
             is_touched(a) || is_touched(b)
@@ -221,6 +228,7 @@ impl Space for SpaceState {
             let facets = self.forest.near_facets();
             parents.extend(self.came_or_went(was, facets));
             parents.extend(self.relit_facets(was, facets));
+            parents.extend(self.covered_facets());
         }
         let sources_differ = self.world.lights_differ(&was.world) || self.outside_differs(was);
         // Whoever gathers from a light, or from outside, gathers anew: neither knows who that is.
@@ -262,7 +270,7 @@ impl Space for SpaceState {
     }
 
     fn finish(&mut self, is_settled: bool) {
-        (self.touched, self.is_stopped) = (Vec::new(), false);
+        (self.touched, self.covered, self.is_stopped) = (Vec::new(), Vec::new(), false);
         if is_settled {
             self.sound_world = self.world.clone();
         }
@@ -274,6 +282,7 @@ impl Space for SpaceState {
         }
         let to = self.forest.compact();
         self.groups.renumber(&to);
+        self.covered = self.covered.iter().filter_map(|&id| to.kept(id)).collect();
         Some(to)
     }
 
@@ -350,6 +359,16 @@ impl SpaceState {
             self.world.is_relit(&was.world, material)
         };
         of.iter().filter(is_relit).map(|f| f.0).collect()
+    }
+
+    /// The facets of elements that bodies in motion cover otherwise than before.
+    fn covered_facets(&self) -> Vec<u32> {
+        // Some may have been reaped since.
+        let alive = self.covered.iter().filter(|&&id| self.forest.kind(id) == Kind::Element);
+        let mut out: Vec<u32> = alive.map(|&id| self.forest.fixed(id).0).collect();
+        out.sort_unstable();
+        out.dedup();
+        out
     }
 
     /// Whether what is distant emits otherwise than before, or came or went.

@@ -38,6 +38,8 @@ pub struct SpaceState {
     pub(crate) sound_world: World,
     /// Facets of which another part is covered than when they were solved, ascending.
     pub(crate) touched: Vec<ElementId>,
+    /// Elements of which bodies that move cover another part than when they were solved, ascending.
+    pub(crate) covered: Vec<ElementId>,
     /// Whether a frame was left half-way.
     pub(super) is_stopped: bool,
 }

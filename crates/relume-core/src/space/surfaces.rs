@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::inner::exchange_inside_m2;
 use super::tuning::COVERED;
 use crate::element::{ElementId, Forest, Kind, WorldView};
 use crate::follow::Receivers;
@@ -243,7 +244,11 @@ impl Receivers for Forest {
     }
 
     fn rest_in_contact(&self, a: ElementId, b: ElementId) -> bool {
-        Forest::rest_in_contact(self, a, b)
+        self.are_in_contact(a, b)
+    }
+
+    fn dark_exchange_m2(&self, a: ElementId, b: ElementId) -> f32 {
+        exchange_inside_m2(self, a, b) as f32
     }
 
     fn is_apart(&self, id: ElementId) -> bool {

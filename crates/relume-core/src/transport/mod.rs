@@ -28,7 +28,7 @@ pub use contact::{in_plane, lies_in, overlap_m2};
 pub use crowd::{Crowd, light_past_crowd};
 pub use exchange::{
     Exchange, Meeting, Variation, contact_exchange, exchange, exchange_by_points,
-    exchange_of_points, light_at, light_exchange, meeting,
+    exchange_of_points, exchange_of_polygons, light_at, light_exchange, meeting,
 };
 pub use group::{GROUP_SEGMENTS, GroupSight, Slope, Spread, common_body};
 pub use kernel::Simd;

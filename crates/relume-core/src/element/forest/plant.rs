@@ -20,7 +20,7 @@ use crate::element::tuning::{
     CUT_LEAST, CUT_SHARE, SMALL_CUT_PART, SMALL_CUT_SHARE, SMALL_CUT_TIMES, WIDE,
 };
 use crate::geometry::{Aabb, Segment, cut_along, polygon_area, split_convex};
-use crate::scene::{BodyId, Scene};
+use crate::scene::{BodyId, Covering, Scene};
 
 /// Input of planting: the scene, the lines that its patches are cut along, and the order of its bodies.
 #[derive(Clone, Copy)]
@@ -75,6 +75,7 @@ impl Forest {
             nodes: Vec::new(),
             siblings: Vec::new(),
             exposed: BTreeMap::new(),
+            covered_now: BTreeMap::new(),
             // All that is planted here.
             fixed_len: u32::MAX,
             kept_len: u32::MAX,
@@ -82,6 +83,7 @@ impl Forest {
                 patch_roots: vec![ElementId(NONE); scene.patches.len()],
                 body_roots: vec![ElementId(NONE); scene.bodies.len()],
                 covered: scene.covered(&solids, is_displaced),
+                covering: Covering::new(scene, is_displaced),
                 solids,
                 ..Fixed::default()
             }),
@@ -346,7 +348,7 @@ impl Forest {
         self.fixed_mut().made_m2 = made.map(|id| sums[id as usize][0]).sum::<f64>() as f32;
         for (id, [area, exposed]) in (0..).zip(sums) {
             self.nodes[id as usize].area_m2 = area as f32;
-            if exposed < area {
+            if (exposed as f32) < area as f32 {
                 self.exposed.insert(id, exposed as f32);
             }
         }

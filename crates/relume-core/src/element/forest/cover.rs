@@ -1,0 +1,129 @@
+//! What is exposed of elements at one instant.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::{DVec2, DVec3};
+
+use super::{ElementId, Forest, Kind, exposed_m2};
+use crate::geometry::{Aabb, common};
+use crate::scene::{BodyId, Covered, Instant, LightId, PatchId, Scene, World};
+
+/// Part of an element that lies within a body.
+pub struct PartInside {
+    /// The body, a number of what of it hangs together, and whether places are in its own frame.
+    pub of: ((BodyId, u32), bool),
+    /// Corners of a convex polygon, counter-clockwise as seen from its front, metres.
+    pub corners: Vec<DVec3>,
+    /// Unit normal.
+    pub normal: DVec3,
+}
+
+/// Elements of a patch that count as changed though no other area of them is exposed.
+enum Which {
+    All,
+    /// Those that meet one of these boxes.
+    Within(Vec<[DVec2; 2]>),
+}
+
+impl Forest {
+    /// Finds what of patches is covered in a world. The elements of which another part is exposed than before, or that touch others;
+    /// ascending.
+    pub fn cover(&mut self, scene: &Scene, world: &World) -> Vec<ElementId> {
+        let lights = (0..scene.lights.len() as u32).map(LightId);
+        let lights = lights.filter_map(|light| world.light_pose(light));
+        let now = Instant {
+            poses: world.poses(),
+            lights: lights.map(|pose| Aabb::of([pose.translation])).collect(),
+            glows: &self.fixed.glows,
+        };
+        let now = self.fixed.covering.at(scene, &self.fixed.covered, &now);
+        self.set_covered_now(now)
+    }
+
+    /// Forgets what is covered only now. The elements of which another part is exposed than before, or that touched others; ascending.
+    pub fn uncover(&mut self) -> Vec<ElementId> {
+        self.set_covered_now(BTreeMap::new())
+    }
+
+    fn set_covered_now(&mut self, now: BTreeMap<PatchId, Covered>) -> Vec<ElementId> {
+        if now.is_empty() && self.covered_now.is_empty() {
+            return Vec::new();
+        }
+        let was = std::mem::replace(&mut self.covered_now, now);
+        let patches: BTreeSet<PatchId> =
+            was.keys().chain(self.covered_now.keys()).copied().collect();
+        let mut changed = Vec::new();
+        for patch in patches {
+            let before = was.get(&patch).unwrap_or(&self.fixed.covered[patch.0 as usize]);
+            let after = self.covered_of(patch);
+            if before == after {
+                continue;
+            }
+            let within = before.inside.iter().chain(&after.inside).map(|part| part.bounds);
+            let which = match before.contacts == after.contacts {
+                true => Which::Within(within.collect()),
+                false => Which::All,
+            };
+            self.expose_anew(self.patch_root(patch), &which, &mut changed);
+        }
+        changed.sort_unstable();
+        changed
+    }
+
+    /// Parts of an element that lie within bodies, as polygons in space with their normals.
+    pub fn parts_inside(&self, id: ElementId) -> Vec<PartInside> {
+        let shape = self.shape(id);
+        let own = &shape.corners[..shape.len];
+        let mut out = Vec::new();
+        for part in self.covered(id).inside.iter().filter(|part| shape.meets(&part.bounds)) {
+            let [origin, u, v] = part.plane;
+            let outline = common(&part.outline, own);
+            if outline.len() > 2 {
+                let corners = outline.iter().map(|p| origin + u * p.x + v * p.y).collect();
+                out.push(PartInside { of: (part.of, part.is_own), corners, normal: u.cross(v) });
+            }
+        }
+        out
+    }
+
+    /// Whether some of the patch of an element lies within a body.
+    #[inline]
+    pub fn may_be_inside(&self, id: ElementId) -> bool {
+        self.patch(id).is_some_and(|patch| !self.covered_of(patch).inside.is_empty())
+    }
+
+    /// Finds anew what is exposed of the elements of a patch, given its root; adds those that are, or were, covered in part, and
+    /// those asked for.
+    fn expose_anew(&mut self, root: ElementId, which: &Which, changed: &mut Vec<ElementId>) {
+        let mut stack = vec![root];
+        while let Some(id) = stack.pop() {
+            if self.kind(id) != Kind::Element {
+                stack.extend(self.children(id).map(ElementId));
+                continue;
+            }
+            let was = self.exposed.remove(&id.0);
+            let area_m2 = self.nodes[id.0 as usize].area_m2;
+            // Below what is not covered nothing is.
+            let may_be = self.parent(id).is_none_or(|parent| {
+                self.kind(parent) != Kind::Element || self.exposed.contains_key(&parent.0)
+            });
+            if may_be {
+                let is_m2 = exposed_m2(&self.shape(id), self.covered(id)) as f32;
+                if is_m2 < area_m2 {
+                    self.exposed.insert(id.0, is_m2);
+                }
+            }
+            let is_asked_for = || match which {
+                Which::All => true,
+                Which::Within(parts) => {
+                    let shape = self.shape(id);
+                    parts.iter().any(|bounds| shape.meets(bounds))
+                }
+            };
+            if was.is_some() || self.exposed.contains_key(&id.0) || is_asked_for() {
+                changed.push(id);
+                stack.extend(self.children(id).map(ElementId));
+            }
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! What is covered of patches at one instant by bodies that move, or of them by others. Pure geometry.
+//!
+//! A crate that slides over a floor covers another part of it in every frame, and a drawer is covered as far as it is in.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
+use super::covered::{Hull, IN_PLANE, Placed, hulls_of, reach_m, stand};
+use super::{BodyId, Covered, Patch, PatchId, Scene};
+use crate::geometry::{Aabb, Pose};
+
+/// Cuts made at one instant; what would be found after that is not: a count, so that it is the same everywhere.
+const CUTS_MAX: usize = 200_000;
+
+/// Bodies that may cover or be covered while one of them moves.
+#[derive(Clone, Debug, Default)]
+pub struct Covering {
+    /// Boxes around the bodies, in their own frames; by body.
+    bounds: Vec<Aabb>,
+    /// What may cover, by body; polygons by their number in the body.
+    hulls: Vec<Vec<Hull>>,
+    /// Whether a body moves, or a hand holds it; by body.
+    moves: Vec<bool>,
+}
+
+/// A scene at one instant.
+pub struct Instant<'a> {
+    /// Poses of the bodies, `None` while absent; by body.
+    pub poses: &'a [Option<Pose>],
+    /// Where punctual lights are.
+    pub lights: Vec<Aabb>,
+    /// Whether a patch emits at any time, by patch.
+    pub glows: &'a [bool],
+}
+
+/// A body that is there.
+struct Present {
+    body: BodyId,
+    pose: Pose,
+    bounds: Aabb,
+}
+
+impl Covering {
+    /// Hulls of the bodies of a scene, where any of them moves or is one that `is_displaced` names.
+    pub fn new(scene: &Scene, is_displaced: &dyn Fn(BodyId) -> bool) -> Covering {
+        let bodies = || (0..scene.bodies.len() as u32).map(BodyId);
+        let moves: Vec<bool> =
+            bodies().map(|b| !scene.is_distant(b) && (scene.moves(b) || is_displaced(b))).collect();
+        if !moves.contains(&true) {
+            return Covering::default();
+        }
+        let bounds = |body: BodyId| {
+            Aabb::of(scene.patches_of(body).flat_map(|(_, patch)| patch.corners_in_body()))
+        };
+        let hulls = |body: BodyId| {
+            let mut out = Vec::new();
+            if !scene.is_distant(body) {
+                hulls_of(scene, (&placed(scene, body, &Pose::IDENTITY), 0), &mut out);
+            }
+            out
+        };
+        Covering {
+            bounds: bodies().map(bounds).collect(),
+            hulls: bodies().map(hulls).collect(),
+            moves,
+        }
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        let hull = |hull: &Hull| {
+            let lists = (hull.polygons.capacity() + hull.twins.capacity()) * size_of::<usize>();
+            size_of::<Hull>() + lists + size_of_val(&hull.border[..])
+        };
+        let hulls = self.hulls.iter().flatten().map(hull).sum::<usize>();
+        hulls + self.bounds.capacity() * size_of::<Aabb>() + self.moves.capacity()
+    }
+
+    /// What of patches is covered at an instant, with what is always covered of them (`rest`, by patch): of a moving body by others, of
+    /// others by it. By the rules of [`Scene::covered`], with lamps where they are now.
+    pub fn at(
+        &self,
+        scene: &Scene,
+        rest: &[Covered],
+        now: &Instant<'_>,
+    ) -> BTreeMap<PatchId, Covered> {
+        let mut out = BTreeMap::new();
+        if self.moves.is_empty() {
+            return out;
+        }
+        let present: Vec<Present> = (0..scene.bodies.len() as u32)
+            .map(BodyId)
+            .filter(|&body| !scene.is_distant(body) && self.bounds[body.0 as usize] != Aabb::EMPTY)
+            .filter_map(|body| {
+                let pose = now.poses[body.0 as usize]?;
+                let bounds = moved(&self.bounds[body.0 as usize], &pose);
+                Some(Present { body, pose, bounds })
+            })
+            .collect();
+        let mut left = CUTS_MAX;
+        for one in present.iter().filter(|one| !self.hulls[one.body.0 as usize].is_empty()) {
+            let meets = |other: &&Present| {
+                let moves = |p: &Present| self.moves[p.body.0 as usize];
+                let reach = one.bounds.union(other.bounds);
+                let slack_m = IN_PLANE * reach_m(&reach);
+                other.body != one.body
+                    && (moves(one) || moves(other))
+                    && one.bounds.grown(slack_m).meets(&other.bounds)
+            };
+            let others: Vec<&Present> = present.iter().filter(meets).collect();
+            if others.is_empty() {
+                continue;
+            }
+            let polygons = placed(scene, one.body, &one.pose);
+            for other in others {
+                let there = Pair { scene, now, polygons: &polygons, bodies: [one, other] };
+                self.cover(&there, &present, rest, (&mut out, &mut left));
+            }
+        }
+        for covered in out.values_mut() {
+            covered.contacts.sort_unstable();
+            covered.contacts.dedup();
+        }
+        out.retain(|patch, covered| *covered != rest[patch.0 as usize]);
+        out
+    }
+
+    /// What the first body of a pair covers of the second.
+    fn cover(
+        &self,
+        pair: &Pair<'_>,
+        present: &[Present],
+        rest: &[Covered],
+        (out, left): (&mut BTreeMap<PatchId, Covered>, &mut usize),
+    ) {
+        let Pair { scene, polygons, bodies: [one, other], .. } = *pair;
+        for hull in &self.hulls[one.body.0 as usize] {
+            let bounds = moved(&hull.bounds, &one.pose);
+            let slack_m = IN_PLANE * reach_m(&bounds);
+            let reach = bounds.grown(slack_m);
+            let near = |(id, patch): (PatchId, &Patch)| {
+                let there = Placed::new(id, patch, &other.pose);
+                there.bounds.meets(&reach).then_some(there)
+            };
+            let near: Vec<Placed> = scene.patches_of(other.body).filter_map(near).collect();
+            if near.is_empty() || Covering::may_hold_light(pair, (hull, &bounds), present, slack_m)
+            {
+                continue;
+            }
+            let border = hull.border.iter().map(|&c| one.pose.point(c)).collect();
+            let hull = Hull { border, bounds, ..hull.clone() };
+            for patch in &near {
+                let covered =
+                    out.entry(patch.id).or_insert_with(|| rest[patch.id.0 as usize].clone());
+                stand(scene, (polygons, &hull), (patch, false), slack_m, (covered, left));
+            }
+        }
+    }
+
+    /// Whether a lamp may be among the polygons of a hull.
+    fn may_hold_light(
+        pair: &Pair<'_>,
+        (hull, bounds): (&Hull, &Aabb),
+        present: &[Present],
+        slack_m: f64,
+    ) -> bool {
+        let Pair { scene, now, polygons, bodies: [one, _] } = *pair;
+        let glows = |id: PatchId| now.glows[id.0 as usize];
+        let within = |what: &Aabb| {
+            let what = what.grown(2.0 * slack_m);
+            let inner = bounds.hi.min(what.hi) - 3.0 * slack_m;
+            bounds.lo.max(what.lo).cmplt(inner).all()
+                && !hull.is_before(polygons, &what, 4.0 * slack_m)
+        };
+        let is_two_sided = !hull.twins.is_empty();
+        let own = |(k, polygon): (usize, &Placed)| match hull.holds(k) {
+            true => is_two_sided && glows(polygon.id),
+            false => glows(polygon.id) && within(&polygon.bounds),
+        };
+        polygons.iter().enumerate().any(own)
+            || now.lights.iter().any(within)
+            || present.iter().filter(|third| third.body != one.body).any(|third| {
+                let shines = |(id, patch): (PatchId, &Patch)| {
+                    glows(id) && within(&Placed::new(id, patch, &third.pose).bounds)
+                };
+                within(&third.bounds) && scene.patches_of(third.body).any(shines)
+            })
+    }
+}
+
+/// Two bodies, of which the first may cover the second.
+#[derive(Clone, Copy)]
+struct Pair<'a> {
+    scene: &'a Scene,
+    now: &'a Instant<'a>,
+    /// The polygons of the first, in the world.
+    polygons: &'a [Placed],
+    bodies: [&'a Present; 2],
+}
+
+/// The patches of a body at a pose.
+fn placed(scene: &Scene, body: BodyId, pose: &Pose) -> Vec<Placed> {
+    scene.patches_of(body).map(|(id, patch)| Placed::new(id, patch, pose)).collect()
+}
+
+/// A box around a box of a body's frame, in the world.
+fn moved(bounds: &Aabb, pose: &Pose) -> Aabb {
+    let pick =
+        |k: usize, axis: usize| if k >> axis & 1 == 0 { bounds.lo[axis] } else { bounds.hi[axis] };
+    let corner = |k: usize| DVec3::new(pick(k, 0), pick(k, 1), pick(k, 2));
+    Aabb::of((0..8).map(|k| pose.point(corner(k))))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+    use crate::geometry::Moments;
+    use crate::scene::{Inside, Interpolation, SceneBuilder, Track};
+
+    /// What of a floor of 4 x 4 m and of a beam through them two crates of 1 x 1 m cover, of which one moves, as it lies at `at`; with a
+    /// lamp in the moving one or not. The parts of the floor, those of the side of the beam that looks along y.
+    fn covered(at: DVec3, lamp: bool) -> (f64, Vec<Inside>) {
+        let mut b = SceneBuilder::new("crates");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let glow = b.material("glow", [0.0; 3], [1.0; 3]);
+        let floor = b.node("floor", None, DVec3::ZERO, DQuat::IDENTITY);
+        let corners = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)];
+        b.polygon(floor, "floor", grey, &corners.map(|(x, y)| DVec3::new(x, y, 0.0)));
+        let (lo, hi) = (DVec3::new(-0.5, -0.5, -0.5), DVec3::new(0.5, 0.5, 0.5));
+        let rests = b.node("rests", None, DVec3::new(3.0, 3.0, 0.5), DQuat::IDENTITY);
+        b.cuboid(rests, "rests", grey, lo, hi);
+        let moves = b.node("moves", None, DVec3::ZERO, DQuat::IDENTITY);
+        b.cuboid(moves, "moves", grey, lo, hi);
+        if lamp {
+            let small = [(0.0, 0.0), (0.1, 0.0), (0.1, 0.1)];
+            b.polygon(moves, "lamp", glow, &small.map(|(x, y)| DVec3::new(x, y, 0.1)));
+        }
+        let (times_s, values) = (vec![0.0, 1.0], vec![DVec3::ZERO, DVec3::X]);
+        let interpolation = Interpolation::Linear;
+        b.animate_translation(moves, Track { times_s, values, interpolation });
+        let scene = b.build().unwrap();
+        let rest = scene.covered(&scene.solids(), &|_| false);
+        let covering = Covering::new(&scene, &|_| false);
+        let body = |name: &str| scene.bodies.iter().position(|body| body.name == name).unwrap();
+        let mut poses = vec![Some(Pose::IDENTITY); scene.bodies.len()];
+        poses[body("moves")] = Some(Pose::translation(at));
+        let glows: Vec<bool> = scene.patches.iter().map(|p| scene.patch_emits(p)).collect();
+        let now = Instant { poses: &poses, lights: Vec::new(), glows: &glows };
+        let found = covering.at(&scene, &rest, &now);
+        let floor = found.get(&PatchId(0)).unwrap_or(&rest[0]);
+        let area_m2 = floor.parts.iter().map(|(part, _)| Moments::of(part).area).sum();
+        let is_moving =
+            |id: &PatchId| scene.patches[id.0 as usize].body == BodyId(body("moves") as u32);
+        let of_moving = found.iter().filter(|(id, _)| is_moving(id));
+        (area_m2, of_moving.flat_map(|(_, covered)| covered.inside.clone()).collect())
+    }
+
+    #[test]
+    fn a_crate_covers_what_it_stands_on_now_and_overlaps_count_once() {
+        let off = |found: f64, truth: f64| (found - truth).abs() < 1e-6;
+        // Far away, on the floor, half over its edge, sunk in, on the crate that rests, half within that.
+        for (at, area_m2) in [
+            (DVec3::new(1.0, 1.0, 5.0), 1.0),
+            (DVec3::new(1.0, 1.0, 0.5), 2.0),
+            (DVec3::new(0.0, 1.0, 0.5), 1.5),
+            (DVec3::new(1.0, 1.0, 0.2), 2.0),
+            (DVec3::new(3.0, 3.0, 1.5), 1.0),
+            (DVec3::new(2.5, 3.0, 0.5), 1.5),
+        ] {
+            let (found, _) = covered(at, false);
+            assert!(off(found, area_m2), "{at}: {found}");
+        }
+        assert!(off(covered(DVec3::new(1.0, 1.0, 0.5), true).0, 1.0), "a lamp in it");
+    }
+
+    #[test]
+    fn of_crates_through_each_other_parts_lie_inside() {
+        let (_, inside) = covered(DVec3::new(2.5, 3.2, 0.7), false);
+        assert!(!inside.is_empty() && inside.iter().all(|part| !part.is_own));
+        assert!(covered(DVec3::new(1.0, 1.0, 0.5), false).1.is_empty());
+    }
+}

@@ -1,0 +1,20 @@
+//! What elements exchange within bodies, where no light is.
+//!
+//! A box that is sunk into a floor and a wall covers a part of both, and these parts see each other within it. Exchange areas have that
+//! in them; light is carried by the rest.
+
+use crate::element::{ElementId, Forest, PartInside};
+use crate::transport::exchange_of_polygons;
+
+/// Exchange area of what of two elements lies within the same bodies, m2.
+pub(super) fn exchange_inside_m2(forest: &Forest, a: ElementId, b: ElementId) -> f64 {
+    if !forest.may_be_inside(a) || !forest.may_be_inside(b) {
+        return 0.0;
+    }
+    let (of_a, of_b) = (forest.parts_inside(a), forest.parts_inside(b));
+    let both = |one: &PartInside, two: &PartInside| match one.of == two.of {
+        true => exchange_of_polygons((&one.corners, one.normal), (&two.corners, two.normal)),
+        false => 0.0,
+    };
+    of_a.iter().map(|one| of_b.iter().map(|two| both(one, two)).sum::<f64>()).sum()
+}

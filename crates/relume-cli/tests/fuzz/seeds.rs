@@ -285,9 +285,11 @@ fn surrounded() -> Seed {
     let (mut json, bin) = room();
     json.as_object_mut().expect("a document is an object").remove("animations");
     json["scenes"][0]["extensions"] = json!({"EXT_lights_image_based": {"light": 0}});
+    let coefficients = vec![[1.0, 0.9, 0.8]; 9];
+    let faces = vec![vec![0; 6]; 2];
     json["extensions"]["EXT_lights_image_based"] = json!({"lights": [{"intensity": 0.5,
-        "rotation": [0.1, 0.2, 0.3, 0.9], "irradianceCoefficients": [[1.0, 0.9, 0.8]; 9],
-        "specularImageSize": 6, "specularImages": [[0; 6], [0; 6]]}]});
+        "rotation": [0.1, 0.2, 0.3, 0.9], "irradianceCoefficients": coefficients,
+        "specularImageSize": 6, "specularImages": faces}]});
     Seed { name: "surrounded", format: Format::Gltf, content: Content::Tree { json, bin } }
 }
 

@@ -155,9 +155,9 @@ impl Clip {
         }
     }
 
-    /// The same clip with nothing that emits, for form factors.
+    /// The same clip with nothing that emits and without light from outside that the file carries, for form factors.
     pub(crate) fn without_light(self) -> Clip {
-        Clip { scene: Arc::new(self.scene.without_light()), ..self }
+        Clip { scene: Arc::new(self.scene.without_outside().without_light()), ..self }
     }
 
     /// The same clip without the inner sides of closed double-sided surfaces in which it is dark: what is

@@ -184,9 +184,13 @@ fn emitters(out: &mut String, scene: &Scene) -> fmt::Result {
         )?;
     }
     if none {
+        let by = match scene.environment {
+            Some(_) => "the environment that it carries",
+            None => "an overcast sky and a sun",
+        };
         writeln!(
             out,
-            "  none: `render` lights it with an overcast sky and a sun, unless it is told --sky, --sun, --environment or --emit"
+            "  none: `render` lights it with {by}, unless it is told --sky, --sun, --environment or --emit"
         )?;
     }
     Ok(())

@@ -109,9 +109,15 @@ impl OutsideFlags {
         (!words.is_empty()).then(|| words.join(" "))
     }
 
-    /// The scene in that light. Pictures of environments are read here.
+    /// The scene in that light, or in that which its file carries where none was asked for. Pictures of environments are read here.
     pub(crate) fn light(&self, scene: Scene, fps: f64, fineness: f64) -> Result<Scene, Failure> {
         if self.is_empty() {
+            let own = scene.environment.clone().filter(|_| self.ground.is_none());
+            if let Some(own) = own {
+                let sky = Some(Sky::Environment(own));
+                let outside = Outside { sky, fineness, ..Outside::default() };
+                return scene.with_outside(outside).map_err(scene_file::failure);
+            }
             if self.ground.is_some() {
                 return Err(Failure::usage(
                     "--ground shines with what the sky and the sun send down",

@@ -33,10 +33,16 @@ fn floor() -> (tempfile::TempDir, std::path::PathBuf) {
 
 /// Irradiance at the floor's middle with some options.
 fn irradiance(options: &[&str]) -> Vec<f64> {
-    let (dir, scene) = floor();
+    irradiance_of(&floor(), options)
+}
+
+fn irradiance_of(
+    (dir, scene): &(tempfile::TempDir, std::path::PathBuf),
+    options: &[&str],
+) -> Vec<f64> {
     let sensors = dir.path().join("sensors.txt");
     fs::write(&sensors, "0 0 0 0 1 0\n").unwrap();
-    let common = ["probe", text(&scene), text(&sensors), "--tolerance", "0.01", "--quiet"];
+    let common = ["probe", text(scene), text(&sensors), "--tolerance", "0.01", "--quiet"];
     let ran = relume(&[&common[..], options].concat()).succeeds();
     let rows = ran.out.lines().skip(1).map(|row| row.split(',').nth(8).unwrap().parse().unwrap());
     rows.collect()
@@ -57,6 +63,39 @@ fn skies_and_the_sun_light_a_floor_as_stated() {
     assert_eq!(day.len(), 3);
     assert_eq!(day[0], 0.0);
     close(day[2], 800.0);
+}
+
+#[test]
+fn light_that_the_file_carries_is_its_sky_unless_another_is_asked_for() {
+    let file = floor();
+    let mut gltf = json(&file.1);
+    gltf["extensionsUsed"] = serde_json::json!(["EXT_lights_image_based"]);
+    // Even light: its irradiance is the first coefficient over twice the root of pi.
+    let mut coefficients = vec![[0.0; 3]; 9];
+    coefficients[0] = [20.0; 3];
+    let light = serde_json::json!({ "irradianceCoefficients": coefficients, "specularImageSize": 1, "specularImages": [] });
+    gltf["extensions"] = serde_json::json!({ "EXT_lights_image_based": { "lights": [light] } });
+    gltf["scenes"][0]["extensions"] =
+        serde_json::json!({ "EXT_lights_image_based": { "light": 0 } });
+    fs::write(&file.1, gltf.to_string()).unwrap();
+    let own = 20.0 / (2.0 * std::f64::consts::PI.sqrt());
+    for (options, right) in [
+        (&[][..], own),
+        (&["--sky", "none"], 0.0),
+        (&["--sky", "uniform=2"], 2.0 * std::f64::consts::PI),
+    ] {
+        let found = irradiance_of(&file, options)[0];
+        assert!((found - right).abs() < 5e-3 * right.max(1.0), "{options:?}: {found} {right}");
+    }
+    // Tables of form factors are of the scene alone.
+    let table = file.0.path().join("f.csv");
+    relume(&["factors", text(&file.1), "-o", text(&table), "--quiet"]).succeeds();
+    let rows = fs::read_to_string(table).unwrap();
+    assert!(rows.lines().skip(1).all(|row| row.split(',').nth(1) == Some("floor")), "{rows}");
+    let out = file.0.path().join("out");
+    let ran =
+        relume(&[&["render", text(&file.1), "-o", text(&out)], &QUICK[..]].concat()).succeeds();
+    assert!(!ran.err.contains("nothing emits"), "{}", ran.err);
 }
 
 #[test]

@@ -280,6 +280,19 @@ const PLY: &str = "ply\nformat ascii 1.0\ncomment roof\nelement vertex 5\nproper
 property uchar red\nelement face 2\nproperty list uchar int vertex_indices\nelement edge 1\nproperty list char float a\nend_header\n\
 0 0 0 1\n2 0 0 2\n2 2 0 3\n1 0.5 0 4\n0 2 1 5\n4 0 1 2 3\n3 0 3 4\n2 1.5 2\n";
 
+/// The room without its animation, in light of pictures all around.
+fn surrounded() -> Seed {
+    let (mut json, bin) = room();
+    json.as_object_mut().expect("a document is an object").remove("animations");
+    json["scenes"][0]["extensions"] = json!({"EXT_lights_image_based": {"light": 0}});
+    let coefficients = vec![[1.0, 0.9, 0.8]; 9];
+    let faces = vec![vec![0; 6]; 2];
+    json["extensions"]["EXT_lights_image_based"] = json!({"lights": [{"intensity": 0.5,
+        "rotation": [0.1, 0.2, 0.3, 0.9], "irradianceCoefficients": coefficients,
+        "specularImageSize": 6, "specularImages": faces}]});
+    Seed { name: "surrounded", format: Format::Gltf, content: Content::Tree { json, bin } }
+}
+
 /// A ring whose mesh is stored compressed, from the tests of the reader.
 fn ring(name: &'static str, file: &[u8]) -> Seed {
     let (json, bin) = unpack(file);
@@ -298,6 +311,7 @@ pub(crate) fn all() -> Vec<Seed> {
         tree("room.glb", Format::Glb),
         tree("room.glb again: it holds the most", Format::Glb),
         tree("room.gltf", Format::Gltf),
+        surrounded(),
         text("box.vs3", Format::View3d, VIEW3D),
         text("room.flat", Format::Flat, FLAT),
         text("room.svg", Format::Svg, SVG),

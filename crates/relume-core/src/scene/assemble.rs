@@ -73,6 +73,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
         motion,
         outside: None,
         outside_m: 0.0,
+        environment: draft.environment,
         notes,
         edited: super::Edited::default(),
     })

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DQuat, DVec3};
 
+use super::outside::Environment;
 use super::{Camera, Light, Material, MaterialId, Note, Print, RotationTrack, Tint, TintId, Track};
 
 /// Everything of a scene, unchecked.
@@ -26,6 +27,8 @@ pub struct Draft {
     pub cameras: Vec<Camera>,
     /// Name of the animation that was chosen, if one was.
     pub animation: Option<String>,
+    /// Radiance from all directions that the file carries.
+    pub environment: Option<Arc<Environment>>,
     /// No animation ends earlier than this, seconds, even if nothing moves any more.
     pub end_s: f64,
     /// What was noticed while reading.

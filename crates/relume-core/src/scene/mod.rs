@@ -121,6 +121,8 @@ pub struct Scene {
     pub outside: Option<Arc<outside::Outside>>,
     /// How far away these bodies are, metres; 0 where there are none.
     pub outside_m: f64,
+    /// Radiance from all directions that the file carries: it lights the scene where [`Scene::with_outside`] takes it as its sky.
+    pub environment: Option<Arc<outside::Environment>>,
     /// What was noticed while reading, for `info` and `check`.
     pub notes: Vec<Note>,
     /// Bodies that came or went since it was made: none by default.

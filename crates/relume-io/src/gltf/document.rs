@@ -12,7 +12,8 @@ use crate::folder::{Folder, read_scene, unless_fits};
 use relume_core::scene::SceneError;
 
 /// Extensions that may be required: handled, or without effect on diffuse light.
-const KNOWN: [&str; 26] = [
+const KNOWN: [&str; 27] = [
+    "EXT_lights_image_based",
     "EXT_meshopt_compression",
     "KHR_draco_mesh_compression",
     "KHR_meshopt_compression",

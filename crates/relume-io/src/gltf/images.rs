@@ -66,25 +66,9 @@ impl<'a> Images<'a> {
     fn read(&self, (index, least_alpha): Key) -> Result<Result<Pyramid, String>, SceneError> {
         let document = self.document;
         let owner = format!("image {index}");
-        let Some(image) = document.root.images.get(index) else {
-            return Err(document.out_of_range("image", index));
-        };
-        let bytes = match (&image.uri, image.buffer_view) {
-            (Some(uri), _) => {
-                if !uri.starts_with("data:") && !uri.contains("://") {
-                    document.inside(uri, &owner)?;
-                }
-                document.uri(uri, &owner, IMAGE_MAX)
-            }
-            (None, Some(view)) => document.view(view).map(|(bytes, _)| bytes.to_vec()),
-            (None, None) => {
-                return Ok(Err(format!("{owner} names neither a file nor a buffer view")));
-            }
-        };
-        match bytes {
+        match encoded(document, index)? {
             Ok(bytes) => self.decoded(&bytes, &owner, least_alpha),
-            Err(error @ SceneError::TooLarge { .. }) => Err(error),
-            Err(error) => Ok(Err(error.to_string())),
+            Err(why) => Ok(Err(why)),
         }
     }
 
@@ -100,5 +84,34 @@ impl<'a> Images<'a> {
             Pyramid::new(size, image.into_raw(), least_alpha)
                 .ok_or_else(|| "the image is empty".to_owned())
         }))
+    }
+}
+
+/// The bytes of the file of an image, or why they cannot be had.
+///
+/// # Errors
+/// Those of [`Images::get`].
+pub(super) fn encoded(
+    document: &Document,
+    index: usize,
+) -> Result<Result<Vec<u8>, String>, SceneError> {
+    let owner = format!("image {index}");
+    let Some(image) = document.root.images.get(index) else {
+        return Err(document.out_of_range("image", index));
+    };
+    let bytes = match (&image.uri, image.buffer_view) {
+        (Some(uri), _) => {
+            if !uri.starts_with("data:") && !uri.contains("://") {
+                document.inside(uri, &owner)?;
+            }
+            document.uri(uri, &owner, IMAGE_MAX)
+        }
+        (None, Some(view)) => document.view(view).map(|(bytes, _)| bytes.to_vec()),
+        (None, None) => return Ok(Err(format!("{owner} names neither a file nor a buffer view"))),
+    };
+    match bytes {
+        Ok(bytes) => Ok(Ok(bytes)),
+        Err(error @ SceneError::TooLarge { .. }) => Err(error),
+        Err(error) => Ok(Err(error.to_string())),
     }
 }

@@ -41,12 +41,44 @@ pub(super) struct Asset {
 pub(super) struct RootExtensions {
     #[serde(rename = "KHR_lights_punctual")]
     pub(super) lights: Option<LightList>,
+    #[serde(rename = "EXT_lights_image_based")]
+    pub(super) environments: Option<serde_json::Value>,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(default)]
 pub(super) struct SceneList {
     pub(super) nodes: Vec<usize>,
+    pub(super) extensions: SceneExtensions,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct SceneExtensions {
+    #[serde(rename = "EXT_lights_image_based")]
+    pub(super) environment: Option<serde_json::Value>,
+}
+
+/// A light of `EXT_lights_image_based`.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Environment {
+    #[serde(default = "no_rotation")]
+    pub(super) rotation: [f64; 4],
+    #[serde(default = "full")]
+    pub(super) intensity: f64,
+    /// Of the irradiance, by band.
+    pub(super) irradiance_coefficients: [[f64; 3]; 9],
+    /// Six images of each level.
+    pub(super) specular_images: Vec<[usize; 6]>,
+}
+
+fn no_rotation() -> [f64; 4] {
+    [0.0, 0.0, 0.0, 1.0]
+}
+
+fn full() -> f64 {
+    1.0
 }
 
 #[derive(Deserialize, Default)]

@@ -12,6 +12,7 @@ mod clock;
 mod component;
 mod document;
 mod draco;
+mod environment;
 mod images;
 mod json;
 mod light;

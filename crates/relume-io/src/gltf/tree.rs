@@ -9,7 +9,7 @@ use super::document::Document;
 use super::look::Looks;
 use super::mesh::{Polygons, polygons};
 use super::skinned::Skinned;
-use super::{json, light, material, node_name, note};
+use super::{environment, json, light, material, node_name, note};
 use crate::ImportOptions;
 use crate::options::Span;
 use relume_core::scene::draft::{Draft, DraftNode, DraftSurface};
@@ -21,7 +21,7 @@ const SAME_SCALE: f64 = 1e-6;
 /// Everything of the file's active scene.
 pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draft, SceneError> {
     let mut notes = Vec::new();
-    note_environment(document, &mut notes);
+    let environment = environment::of_scene(document, &mut notes)?;
     let played = played(document, options.animation.as_deref(), &mut notes)?;
     let (materials, paints) =
         material::materials(document, &played.materials, &mut notes).into_iter().unzip();
@@ -43,6 +43,7 @@ pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draf
             materials,
             animation: played.names,
             end_s: played.end_s,
+            environment,
             ..Draft::default()
         },
     };
@@ -50,17 +51,6 @@ pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draf
     tree.walk(&roots)?;
     tree.skins()?;
     Ok(tree.finish())
-}
-
-/// Says that light of pictures all around is not read.
-fn note_environment(document: &Document, notes: &mut Vec<Note>) {
-    let is_such = |name: &&String| name.as_str() == "EXT_lights_image_based";
-    if let Some(extension) = document.root.extensions_used.iter().find(is_such) {
-        let message = format!(
-            "its environment ({extension}) is not read: give a picture of all directions with --environment FILE"
-        );
-        notes.push(note(Severity::Warning, "environment", &document.file, 1, message));
-    }
 }
 
 /// The root nodes of the active scene: the file's default, or its first; without any scene all

@@ -123,7 +123,7 @@ fn harmless_extensions_are_ignored_quietly() {
 fn environments_of_files_are_named() {
     let mut g = Gltf::cube();
     assert!(with_code(&scene_of(&g).unwrap().notes, "environment").is_empty());
-    g.json["extensionsUsed"] = json!(["EXT_lights_image_based"]);
+    g.json["extensionsUsed"] = json!(["KHR_lights_environment"]);
     let scene = scene_of(&g).unwrap();
     assert!(with_code(&scene.notes, "environment")[0].message.contains("--environment FILE"));
 }

@@ -6,6 +6,7 @@
 
 mod broken;
 mod edits;
+mod environment;
 mod files;
 mod gltf;
 mod meshes;

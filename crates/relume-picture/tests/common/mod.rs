@@ -42,6 +42,7 @@ pub(crate) fn empty() -> Scene {
         motion: Motion::default(),
         outside: None,
         outside_m: 0.0,
+        environment: None,
         notes: Vec::new(),
         edited: Default::default(),
     }

@@ -37,6 +37,8 @@ pub(crate) struct Was {
     world: World,
     held: Held,
     view: WorldView,
+    /// See [`SpaceState`].
+    regrouped: Vec<ElementId>,
 }
 
 impl Space for SpaceState {
@@ -62,12 +64,13 @@ impl Space for SpaceState {
             coarse: Coarse::default(),
             sound_world: world.clone(),
             touched: Vec::new(),
+            regrouped: Vec::new(),
             is_stopped: false,
         }
     }
 
     fn is_at(&self, goal: &Goal<'_>) -> bool {
-        self.world == *goal.world && self.touched.is_empty()
+        self.world == *goal.world && self.touched.is_empty() && self.regrouped.is_empty()
     }
 
     fn stay(&mut self, goal: &Goal<'_>) -> bool {
@@ -91,11 +94,13 @@ impl Space for SpaceState {
             world: std::mem::replace(&mut self.world, goal.world.clone()),
             held: std::mem::replace(&mut self.held, goal.held.clone()),
             view: std::mem::replace(&mut self.view, view),
+            regrouped: self.regrouped.clone(),
         }
     }
 
     fn change<'m>(&self, _: &Goal<'_>, was: &'m Was) -> WorldChange<'m> {
-        let change = WorldChange::new(&self.scene, &self.forest, &was.view, &self.view);
+        let change = WorldChange::new(&self.scene, &self.forest, &was.view, &self.view)
+            .with_regrouped(&self.forest, &was.regrouped);
         if self.is_stopped { change.after_a_stop() } else { change }
     }
 
@@ -153,7 +158,7 @@ impl Space for SpaceState {
         let Bed { scene, seed, coarse_ids } = goal.bed;
         let changed = self.coarse.follow(seed, changes);
         let relit = change.is_none() || self.world.any_relit(&was.world);
-        if !changed && !relit && self.touched.is_empty() {
+        if !changed && !relit && self.touched.is_empty() && self.regrouped.is_empty() {
             return;
         }
         let before = std::mem::take(&mut self.coarse.brightness);
@@ -262,7 +267,7 @@ impl Space for SpaceState {
     }
 
     fn finish(&mut self, is_settled: bool) {
-        (self.touched, self.is_stopped) = (Vec::new(), false);
+        (self.touched, self.regrouped, self.is_stopped) = (Vec::new(), Vec::new(), false);
         if is_settled {
             self.sound_world = self.world.clone();
         }

@@ -38,6 +38,8 @@ pub struct SpaceState {
     pub(crate) sound_world: World,
     /// Facets of which another part is covered than when they were solved, ascending.
     pub(crate) touched: Vec<ElementId>,
+    /// Nodes that became groups or coarse elements since they were solved, or ceased to be, ascending.
+    pub(crate) regrouped: Vec<ElementId>,
     /// Whether a frame was left half-way.
     pub(super) is_stopped: bool,
 }

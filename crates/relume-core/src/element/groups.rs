@@ -1,7 +1,7 @@
 //! Groups: clusters of small patches of one rigid body that may be ends of links.
 //!
-//! Which there are, and all that is known of them, is a pure function of the scene: in the frame of the body, or in the
-//! world for what never moves, which counts as one rigid body. Must not know light or links.
+//! Which there are, and all that is known of them, is a pure function of the scene and of the bodies that hands have displaced: in
+//! the frame of the body, or in the world for a cluster of several bodies, all of them at rest. Must not know light or links.
 
 use std::ops::Range;
 

@@ -759,6 +759,23 @@ fn a_body_that_rests_among_others_is_taken_up_at_the_cost_of_a_move() {
 }
 
 #[test]
+fn taking_a_body_up_among_groups_is_called_off() {
+    let mut session = Session::new(furnished(1), at_tolerance(0.3)).unwrap();
+    let hash = session.solve().unwrap().hash();
+    let body = session.scene().body_named("cup 0 0 0").unwrap();
+    place(&mut session, body, Some(v(0.02, 0.01, 0.05)));
+    session.watch().cancel();
+    assert!(session.solve().is_err());
+    assert_eq!(session.frame().unwrap().hash(), hash, "the links of before, of its groups");
+    check(&mut session, "taken up after all");
+    place(&mut session, body, None);
+    session.watch().cancel();
+    assert!(session.solve().is_err());
+    check(&mut session, "put down");
+    assert_eq!(session.solve().unwrap().hash(), hash);
+}
+
+#[test]
 #[ignore = "a minute: nine thousand triangles"]
 fn taking_up_in_a_room_of_nine_thousand_triangles() {
     costs_of_taking_up(furnished(4), 0.1, false);

@@ -234,7 +234,7 @@ impl GroupLinks {
         let kept = links.into_iter().zip(ids).filter(|(_, ids)| ids.iter().all(|&id| keeps(id)));
         let (mut links, ids): (Vec<GroupLink>, Vec<[u32; 2]>) = kept.unzip();
         for (link, ids) in links.iter_mut().zip(&ids) {
-            for (end, &new) in link.ends.iter_mut().zip(&*ids) {
+            for (end, &new) in link.ends.iter_mut().zip(ids) {
                 match end {
                     GroupEnd::Element { id, .. } => *id = new,
                     GroupEnd::Group { facets, .. } => *facets = leaves(new),

@@ -82,7 +82,7 @@ impl ChildRange {
 
 const NONE: u32 = u32::MAX;
 
-/// In place of a body: all that never moves, planted as one.
+/// In place of a body: several bodies of the stage, all of them at rest.
 const STAGE: u32 = u32::MAX - 1;
 
 /// Levels that a path has room for.
@@ -407,7 +407,7 @@ impl Forest {
         (self.kind(id) == Kind::Cluster && subject < STAGE).then_some(BodyId(subject))
     }
 
-    /// Whether this is a cluster of patches that never move, of whichever bodies.
+    /// Whether this is a cluster of several bodies that no clip moves, all of them where the scene has them at rest.
     #[inline]
     pub fn is_of_stage(&self, id: ElementId) -> bool {
         self.fixed.subjects.get(id.0 as usize) == Some(&STAGE) && self.kind(id) == Kind::Cluster
@@ -558,11 +558,13 @@ impl Forest {
     }
 
     /// Whether this is another forest of the same scene though other bodies are displaced: as much of patches is covered, the
-    /// same patches glow, and there are no groups.
+    /// same patches glow, and the same clusters are of bodies at rest.
     pub fn is_as_displaced(&self, other: &Forest) -> bool {
         let (own, others) = (&self.fixed, &other.fixed);
-        let no_groups = own.groups.is_empty() && others.groups.is_empty();
-        no_groups && own.covered == others.covered && own.glows == others.glows
+        own.covered == others.covered
+            && own.glows == others.glows
+            && own.subjects == others.subjects
+            && own.groups.ids == others.groups.ids
     }
 
     /// Area of the patches that are connected with a patch by common corners, itself among them, m2.

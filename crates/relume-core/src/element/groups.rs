@@ -1,7 +1,7 @@
 //! Groups: clusters of small patches of one rigid body that may be ends of links.
 //!
-//! Which there are, and all that is known of them, is a pure function of the scene: in the frame of the body, or in the
-//! world for what never moves, which counts as one rigid body. Must not know light or links.
+//! Which there are, and all that is known of them, is a pure function of the scene and of the bodies that hands have displaced: in
+//! the frame of the body, or in the world for a cluster of several bodies, all of them at rest. Must not know light or links.
 
 use std::ops::Range;
 
@@ -33,14 +33,17 @@ pub(super) struct Layout {
     sorts: Vec<Sort>,
     /// By body: whether its patches are planted by sorts.
     sorted: Vec<bool>,
-    /// By body: whether it is planted together with all others that never move and have few small patches.
+    /// By body: whether it is planted under one node with all others that no clip moves and that have few small patches.
     staged: Vec<bool>,
+    /// By body: whether it is not where the scene has it at rest.
+    displaced: Vec<bool>,
     /// By body: whether it may hold groups: of an inserted one it depends on that body alone.
     grouped: Vec<bool>,
 }
 
 impl Layout {
-    /// How they are where some bodies that never move in the clip are displaced. Cost: proportional to the patches.
+    /// How they are where some bodies that never move in the clip are displaced. What is planted where does not depend on
+    /// these: only which clusters of several bodies are of one frame, and so may be groups. Cost: proportional to the patches.
     pub(super) fn of(scene: &Scene, is_displaced: &dyn Fn(BodyId) -> bool) -> Layout {
         let small_m2 = SMALL_SHARE * scene.made_area_m2();
         let sort_of = |patch: &crate::scene::Patch| match patch.area_m2() > small_m2 {
@@ -54,9 +57,10 @@ impl Layout {
             let patches = scene.bodies[body.0 as usize].patches.clone();
             patches.filter(|&patch| sorts[patch as usize] != Sort::Large).count()
         };
-        let rests =
-            |body: &BodyId| !scene.is_distant(*body) && !scene.moves(*body) && !is_displaced(*body);
-        // A body of many small patches stands for itself, whether it rests or not: taking it by hand groups nothing anew.
+        let rests = |body: &BodyId| {
+            !scene.is_distant(*body) && !scene.moves(*body) && !scene.is_inserted(*body)
+        };
+        // A body of many small patches stands for itself, whether it rests or not.
         let sorted = |body: BodyId| !scene.is_distant(body) && small(body) >= PATCHES_MIN;
         let shares = |body: &BodyId| rests(body) && !sorted(*body);
         let resting: usize = bodies().filter(shares).map(small).sum();
@@ -67,7 +71,8 @@ impl Layout {
         let any_made = bodies().any(|body| !scene.is_inserted(body) && own(body));
         let may = |body| if scene.is_inserted(body) { own(body) } else { any_made };
         let grouped = bodies().map(may).collect();
-        let layout = Layout { sorts, sorted, staged, grouped };
+        let displaced = bodies().map(is_displaced).collect();
+        let layout = Layout { sorts, sorted, staged, displaced, grouped };
         if layout.has_groups() { layout } else { Layout::default() }
     }
 
@@ -91,6 +96,17 @@ impl Layout {
 
     pub(super) fn is_staged(&self, body: u32) -> bool {
         self.staged.get(body as usize).is_some_and(|&staged| staged)
+    }
+
+    pub(super) fn is_displaced(&self, body: u32) -> bool {
+        self.displaced.get(body as usize).is_some_and(|&displaced| displaced)
+    }
+
+    /// The one sort of all patches of a body; `None` where there are several, or a large one.
+    pub(super) fn pure_sort(&self, patches: Range<u32>) -> Option<Sort> {
+        let first = self.sort(patches.start);
+        let is_pure = first != Sort::Large && patches.into_iter().all(|p| self.sort(p) == first);
+        is_pure.then_some(first)
     }
 
     pub(super) fn sort(&self, patch: u32) -> Sort {
@@ -137,7 +153,7 @@ pub struct Group {
     pub centre: DVec3,
     /// Largest distance of a corner from the middle, metres.
     pub radius: f64,
-    /// Its body; `None` for what never moves.
+    /// Its body; `None` for a cluster of several bodies, all of them at rest.
     pub body: Option<BodyId>,
     /// Whether no corner of it is in front of any of its planes: nothing of it sees anything else of it.
     pub is_convex: bool,

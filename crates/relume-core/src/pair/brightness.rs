@@ -15,6 +15,10 @@ impl Brightness {
     /// Brightness of every element of a scene in which all surfaces weigh the same.
     pub const UNIFORM: Brightness = Brightness { radiosity: 1.0, reflected: 1.0, irradiance: 1.0 };
 
+    /// In place of a brightness that margins were not counted with: it equals none, and any change from it is without bounds.
+    pub const UNKNOWN: Brightness =
+        Brightness { radiosity: -1.0, reflected: -1.0, irradiance: -1.0 };
+
     /// Brightness of a distant element without its emission: nothing arrives there, and no error counts.
     pub const DISTANT: Brightness =
         Brightness { radiosity: 0.0, reflected: 0.0, irradiance: f64::INFINITY };

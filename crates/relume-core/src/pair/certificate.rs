@@ -231,35 +231,22 @@ impl SpaceCertificateTests<'_> {
             (lo + shift.0, hi + shift.1)
         };
         let spans = (span(a, &moves.a), span(b, &moves.b));
-        let tilt = self.tilt_m(&c, half);
-        let at_end = |e: &WorldElement,
-                      end: (Option<BodyId>, Option<PatchId>),
-                      by,
-                      turns: bool,
-                      span| {
-            let corners = c.corners.iter().map(|&p| e.plane.distance(p));
-            let (lo, hi) = corners.fold(NO_SPAN, |(lo, hi), d| (f64::min(lo, d), f64::max(hi, d)));
-            // What rides with the end keeps its distances.
-            let rides = end.0 == Some(body);
-            let shift = match rides {
-                true => (0.0, 0.0),
-                false => moves.c.difference(by).along(e.plane.normal),
+        let tilt_m = self.tilt_m(&c, half);
+        let end =
+            |e: &WorldElement, (of, on): (Option<BodyId>, Option<PatchId>), by, turns, span| {
+                // What rides with the end keeps its distances.
+                let rides = of == Some(body);
+                let shift = match rides {
+                    true => (0.0, 0.0),
+                    false => moves.c.difference(by).along(e.plane.normal),
+                };
+                let is_other_side = twin.is_some() && twin == on;
+                let end = OneEnd { e, rides, shift, turns, span, is_other_side };
+                end.beside(&c, turns_c, (half, tilt_m))
             };
-            // The end's plane does not turn against what bounds the blocker's corners.
-            let known = rides || !turns;
-            let (span_lo, span_hi): (f64, f64) = span;
-            let off = match known {
-                true => hi + shift.0 > OFF * half || lo + shift.1 < -OFF * half,
-                false => !turns_c && (span_lo > tilt || span_hi < -tilt),
-            };
-            let turned = !rides && (turns || turns_c);
-            let faces = turned || c.plane.normal.dot(e.plane.normal).abs() > 0.5 - 1e-9;
-            let other_side = twin.is_some() && twin == end.1;
-            AtEnd { behind: known && hi + shift.1 <= half, may_cover: !other_side && !off && faces }
-        };
         let (patch_a, patch_b) = ends.patches;
-        let at_a = at_end(a, (ends.bodies.0, patch_a), &moves.a, turns_a, spans.0);
-        let at_b = at_end(b, (ends.bodies.1, patch_b), &moves.b, turns_b, spans.1);
+        let at_a = end(a, (ends.bodies.0, patch_a), &moves.a, turns_a, spans.0);
+        let at_b = end(b, (ends.bodies.1, patch_b), &moves.b, turns_b, spans.1);
         if at_a.may_cover || at_b.may_cover {
             return true;
         }
@@ -324,4 +311,38 @@ impl SpaceCertificateTests<'_> {
 struct AtEnd {
     behind: bool,
     may_cover: bool,
+}
+
+/// An end of a pair beside a blocker, up to a horizon.
+struct OneEnd<'a> {
+    e: &'a WorldElement,
+    /// Whether the blocker rides on the end's body.
+    rides: bool,
+    /// Displacement of the blocker against the end along the end's normal: least and most, metres.
+    shift: (f64, f64),
+    /// Whether the end turns.
+    turns: bool,
+    /// Distances of the end's corners from the blocker's plane at all times, metres.
+    span: (f64, f64),
+    /// Whether the blocker is the other side of the end's polygon.
+    is_other_side: bool,
+}
+
+impl OneEnd<'_> {
+    /// Position of the blocker; `half` is half of the slack, `tilt_m` the distance from the blocker's plane up to which it may
+    /// cover an end however it is turned, metres.
+    fn beside(&self, c: &OccluderPolygon<'_>, turns_c: bool, (half, tilt_m): (f64, f64)) -> AtEnd {
+        let OneEnd { e, rides, shift, turns, span, is_other_side } = *self;
+        let corners = c.corners.iter().map(|&p| e.plane.distance(p));
+        let (lo, hi) = corners.fold(NO_SPAN, |(lo, hi), d| (f64::min(lo, d), f64::max(hi, d)));
+        // The end's plane does not turn against what bounds the blocker's corners.
+        let known = rides || !turns;
+        let off = match known {
+            true => hi + shift.0 > OFF * half || lo + shift.1 < -OFF * half,
+            false => !turns_c && (span.0 > tilt_m || span.1 < -tilt_m),
+        };
+        let turned = !rides && (turns || turns_c);
+        let faces = turned || c.plane.normal.dot(e.plane.normal).abs() > 0.5 - 1e-9;
+        AtEnd { behind: known && hi + shift.1 <= half, may_cover: !is_other_side && !off && faces }
+    }
 }

@@ -54,9 +54,10 @@ impl CoarseBrightness {
         )
     }
 
-    /// Renumbers coarse elements; `old_of` holds the old number of each. New elements get [`Brightness::UNIFORM`].
+    /// Renumbers coarse elements; `old_of` holds the old number of each. Of what had none, or several, no margin withstands the
+    /// next change ([`Brightness::UNKNOWN`]).
     pub fn renumber(&mut self, old_of: &[Option<usize>]) {
-        let of = |old: &Option<usize>| old.map_or(Brightness::UNIFORM, |old| self.coarse[old]);
+        let of = |old: &Option<usize>| old.map_or(Brightness::UNKNOWN, |old| self.coarse[old]);
         self.coarse = old_of.iter().map(of).collect();
     }
 

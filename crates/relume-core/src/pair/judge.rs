@@ -371,8 +371,10 @@ impl SpaceJudge<'_> {
         let listed_max = if met == Meeting::Coplanar { usize::MAX } else { LISTED_MAX };
         let start = narrowed.len();
         let found = shaft.narrow_to_blockers(candidates, narrowed, listed_max);
-        let between = Between { shaft: &shaft, candidates: &narrowed[start..], found };
-        self.decide((a, b), known, (&places.own.0, &places.own.1), met, between)
+        let key = pair_key(self.forest.key(a), self.forest.key(b));
+        let places = (&places.own.0, &places.own.1);
+        let (shaft, candidates) = (&shaft, &narrowed[start..]);
+        self.decide(&Elements { ids: (a, b), places, key, met, shaft, candidates, found }, known)
     }
 
     /// Whether what two touching elements exchange counts for nothing, as it leaves neither: where there is light. Links of patches
@@ -402,17 +404,40 @@ impl SpaceJudge<'_> {
         body_of(self.forest, self.view, id)
     }
 
-    fn decide(
-        &self,
-        (a, b): (ElementId, ElementId),
-        known: Option<&Carried>,
-        (place_a, place_b): (&WorldElement, &WorldElement),
-        met: Meeting,
-        Between { shaft, candidates, mut found }: Between<'_>,
-    ) -> Judgement {
-        let key = pair_key(self.forest.key(a), self.forest.key(b));
-        let in_contact = met == Meeting::Coplanar;
-        let end = |brightness: &CoarseBrightness, id, area| End {
+    /// Judges a pair of elements that face each other, at or below the coarse level.
+    fn decide(&self, pair: &Elements<'_>, known: Option<&Carried>) -> Judgement {
+        let exchanged = match self.exchanged(pair) {
+            Ok(exchanged) => exchanged,
+            Err(decided) => return decided,
+        };
+        let x = &exchanged.x;
+        let firm = match self.by_form_factor(pair, x) {
+            Ok(margin) => margin,
+            Err(decided) => return decided,
+        };
+        let seen = self.look(pair, x);
+        let verdict = match (self.stage, self.oracle) {
+            (Stage::Fine(brightness), Oracle::Error { threshold }) => {
+                return self.by_error(pair, &exchanged, seen, known, (brightness, threshold));
+            }
+            (Stage::Coarse, _) => Verdict::CoarseLink,
+            (Stage::Fine(_), _) if self.is_distant(pair) => {
+                self.by_unevenness(pair.ids, pair.places, x, &seen.v)
+            }
+            (Stage::Fine(_), _) => Verdict::Link,
+        };
+        Judgement { margin: firm, ..carrying(verdict, x, &seen.v, pair.places) }
+    }
+
+    /// Whether an end of a pair is distant.
+    fn is_distant(&self, pair: &Elements<'_>) -> bool {
+        self.forest.is_distant(pair.ids.0) || self.forest.is_distant(pair.ids.1)
+    }
+
+    /// Both ends of a pair as the error oracle weighs them.
+    fn ends(&self, pair: &Elements<'_>, brightness: &CoarseBrightness) -> (End, End) {
+        let (place_a, place_b) = pair.places;
+        let end = |id, area| End {
             area: if self.forest.is_distant(id) { 0.0 } else { area },
             reference_area: self.reference_area(brightness, id),
             light: brightness.of(self.forest, id),
@@ -424,76 +449,79 @@ impl SpaceJudge<'_> {
                 false => self.forest.area_m2(self.forest.patch_root(self.patch_of(id))),
             },
         };
-        let distant = self.forest.is_distant(a) || self.forest.is_distant(b);
-        let mut x = match in_contact {
-            true => contact_exchange(place_a, place_b, shaft.contact_m2(&found.blockers)),
-            false => exchange_by_points(self.simd, place_a, place_b, met),
+        (end(pair.ids.0, place_a.area), end(pair.ids.1, place_b.area))
+    }
+
+    /// What a pair exchanges without occlusion; as an error the verdict, where that alone decides.
+    fn exchanged(&self, pair: &Elements<'_>) -> Result<Exchanged, Judgement> {
+        let (place_a, place_b) = pair.places;
+        let blockers = &pair.found.blockers;
+        let x = match pair.in_contact() {
+            true => contact_exchange(place_a, place_b, pair.shaft.contact_m2(blockers)),
+            false => exchange_by_points(self.simd, place_a, place_b, pair.met),
         };
-        if in_contact && x.area_m2 <= 0.0 {
-            let is_covered = !found.blockers.is_empty();
-            return culled(if is_covered { CullReason::Covered } else { CullReason::FacingAway });
+        if pair.in_contact() && x.area_m2 <= 0.0 {
+            let is_covered = !blockers.is_empty();
+            let reason = if is_covered { CullReason::Covered } else { CullReason::FacingAway };
+            return Err(culled(reason));
         }
-        // How many times too large the area is that verdicts are first made with.
-        let mut overstated = 1.0;
-        // The errors of those verdicts, where they were not enough to refine.
-        let mut by_points: Option<Estimate> = None;
-        if x.is_steep {
-            // What the smaller area by points is enough to refine needs no better one.
-            if let (Stage::Fine(brightness), Oracle::Error { threshold }) =
-                (self.stage, self.oracle)
-                && found.is_clear()
-            {
-                let (clear, nothing) = (Visibility::CLEAR, BlockerSizes::NOTHING);
-                let ends = (end(brightness, a, place_a.area), end(brightness, b, place_b.area));
-                let scale = (brightness.reference_area_m2(), threshold);
-                let e = estimate(&x, &clear, (&ends.0, &ends.1), &nothing, scale);
-                let wish = self.wish((a, b), &ends, &e);
-                if let Some(refined) = refined(&e, wish, threshold, Margin::ENDLESS, 0) {
-                    return refined;
-                }
-                by_points = Some(e);
-            }
-            let exact = x.along_outlines(place_a, place_b);
-            overstated = (x.area_m2 / exact.area_m2.max(f64::MIN_POSITIVE)).max(1.0);
-            x = exact;
+        if !x.is_steep {
+            return Ok(Exchanged { x, overstated: 1.0, by_points: None });
         }
-        let mut firm = Margin::Firm;
-        if let (Oracle::FormFactor { epsilon, min_area_m2 }, Stage::Fine(_)) =
-            (self.oracle, self.stage)
-            && !distant
+        let mut by_points = None;
+        // What the smaller area by points is enough to refine needs no better one.
+        if let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
+            && pair.found.is_clear()
         {
-            let areas = (place_a.area, place_b.area);
-            let factor = x.area_m2 / areas.0.min(areas.1);
-            if let Some(side) = self.larger((a, b), areas, min_area_m2) {
-                // Only extrapolation asks how far the verdict is from changing.
-                let (wanted, asked) = (factor > epsilon, self.lookahead.is_some());
-                if asked {
-                    let (large, small) = if wanted { (factor, epsilon) } else { (epsilon, factor) };
-                    firm = Margin::of_error(!wanted, Margin::between(large, small));
-                }
-                if wanted {
-                    return Judgement { margin: firm, ..passing(Verdict::Refine(side), 0) };
-                }
+            let (clear, nothing) = (Visibility::CLEAR, BlockerSizes::NOTHING);
+            let ends = self.ends(pair, brightness);
+            let scale = (brightness.reference_area_m2(), threshold);
+            let e = estimate(&x, &clear, (&ends.0, &ends.1), &nothing, scale);
+            let wish = self.wish(pair.ids, &ends, &e);
+            if let Some(refined) = refined(&e, wish, threshold, Margin::ENDLESS, 0) {
+                return Err(refined);
             }
+            by_points = Some(e);
         }
+        let exact = x.along_outlines(place_a, place_b);
+        let overstated = (x.area_m2 / exact.area_m2.max(f64::MIN_POSITIVE)).max(1.0);
+        Ok(Exchanged { x: exact, overstated, by_points })
+    }
+
+    /// Margin of the form-factor oracle where it does not refine a pair; as an error its verdict where it does.
+    fn by_form_factor(&self, pair: &Elements<'_>, x: &Exchange) -> Result<Margin, Judgement> {
+        let (Oracle::FormFactor { epsilon, min_area_m2 }, Stage::Fine(_)) =
+            (self.oracle, self.stage)
+        else {
+            return Ok(Margin::Firm);
+        };
+        let areas = (pair.places.0.area, pair.places.1.area);
+        let larger = || self.larger(pair.ids, areas, min_area_m2);
+        let Some(side) = larger().filter(|_| !self.is_distant(pair)) else {
+            return Ok(Margin::Firm);
+        };
+        let factor = x.area_m2 / areas.0.min(areas.1);
+        let wanted = factor > epsilon;
+        // Only extrapolation asks how far the verdict is from changing.
+        let mut margin = Margin::Firm;
+        if self.lookahead.is_some() {
+            let (large, small) = if wanted { (factor, epsilon) } else { (epsilon, factor) };
+            margin = Margin::of_error(!wanted, Margin::between(large, small));
+        }
+        match wanted {
+            true => Err(Judgement { margin, ..passing(Verdict::Refine(side), 0) }),
+            false => Ok(margin),
+        }
+    }
+
+    /// A first look at the visibility of a pair: clipped where few polygons are in the way, else sampled.
+    fn look<'p>(&self, pair: &'p Elements<'_>, x: &Exchange) -> Seen<'p> {
+        let &Elements { shaft, candidates, ref found, key, .. } = pair;
         let crowd = found.is_crowd.then_some(Crowd { shaft, candidates, simd: self.simd });
-        let blockers = if in_contact { &[][..] } else { &found.blockers };
+        let blockers = pair.blockers();
         let occluders = if crowd.is_some() { usize::MAX } else { shaft.occluders(blockers) };
-        let mut most = CLIPPED_MAX;
-        let mut way = Margin::ENDLESS;
-        if let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle) {
-            let ends = [(a, place_a.area), (b, place_b.area)];
-            let relative_contribution = self.relative_contribution(brightness, ends, x.area_m2);
-            let limit = CLOSE_SHARE * threshold;
-            most = if relative_contribution > limit { CLIPPED_MAX_CLOSE } else { CLIPPED_MAX_REST };
-            if (CLIPPED_MAX_REST + 1..=CLIPPED_MAX_CLOSE).contains(&occluders) {
-                way = Margin::between(
-                    relative_contribution.max(limit),
-                    relative_contribution.min(limit),
-                );
-            }
-        }
-        let factor = x.area_m2 / place_a.area.min(place_b.area);
+        let (most, way) = self.clipped_max(pair, x, occluders);
+        let factor = pair.factor(x);
         // Of the canonical brightness, which is coarse, less is asked.
         let overlooked_max = match (self.stage, self.oracle) {
             (Stage::Fine(_), Oracle::Error { threshold }) => {
@@ -501,22 +529,21 @@ impl SpaceJudge<'_> {
             }
             _ => f64::INFINITY,
         };
-        let mut clipped =
-            (1..=most).contains(&occluders).then(|| clipping(self.simd, shaft, blockers));
-        let mut sampled = None;
-        let mut sample = None;
+        let clip = || clipping(self.simd, shaft, blockers);
+        let mut clipped = (1..=most).contains(&occluders).then(clip);
+        let (mut sampled, mut crossed) = (None, None);
         if clipped.is_none() {
             let v = match &crowd {
                 Some(crowd) => {
-                    let (v, crossed) = crowd.first_look(key);
-                    sample = Some(crossed);
+                    let (v, in_the_way) = crowd.first_look(key);
+                    crossed = Some(in_the_way);
                     v
                 }
                 None => visibility(self.simd, shaft, blockers, key, 4),
             };
             // Segments that are all blocked prove nothing.
             if v.value <= 0.0 && occluders <= CLIPPED_MAX_CLOSE && SAMPLED_MAX > overlooked_max {
-                clipped = Some(clipping(self.simd, shaft, blockers));
+                clipped = Some(clip());
             }
             sampled = Some(v);
         }
@@ -524,30 +551,51 @@ impl SpaceJudge<'_> {
             (Some(clipped), _) => clipped.first_look(overlooked_max),
             (None, sampled) => (sampled.expect("what is not clipped is sampled"), 0.0),
         };
+        Seen { v, doubt, way, clipped, crowd, crossed }
+    }
+
+    /// How many polygons in the way of a pair are clipped at most, and how far its light is from another number for those that
+    /// are: [`Margin::ENDLESS`] where that changes nothing.
+    fn clipped_max(&self, pair: &Elements<'_>, x: &Exchange, occluders: usize) -> (usize, u16) {
         let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
         else {
-            let verdict = match self.stage {
-                Stage::Coarse => Verdict::CoarseLink,
-                Stage::Fine(_) if distant => self.by_unevenness((a, b), (place_a, place_b), &x, &v),
-                Stage::Fine(_) => Verdict::Link,
-            };
-            let carrying = carrying(verdict, &x, &v, (place_a, place_b));
-            return Judgement { margin: firm, ..carrying };
+            return (CLIPPED_MAX, Margin::ENDLESS);
         };
-        let ends = (end(brightness, a, place_a.area), end(brightness, b, place_b.area));
+        let ends = [(pair.ids.0, pair.places.0.area), (pair.ids.1, pair.places.1.area)];
+        let contribution = self.relative_contribution(brightness, ends, x.area_m2);
+        let limit = CLOSE_SHARE * threshold;
+        let most = if contribution > limit { CLIPPED_MAX_CLOSE } else { CLIPPED_MAX_REST };
+        let way = match (CLIPPED_MAX_REST + 1..=CLIPPED_MAX_CLOSE).contains(&occluders) {
+            true => Margin::between(contribution.max(limit), contribution.min(limit)),
+            false => Margin::ENDLESS,
+        };
+        (most, way)
+    }
+
+    /// The error oracle's verdict on a pair.
+    fn by_error(
+        &self,
+        pair: &Elements<'_>,
+        exchanged: &Exchanged,
+        seen: Seen<'_>,
+        known: Option<&Carried>,
+        (brightness, threshold): (&CoarseBrightness, f64),
+    ) -> Judgement {
+        let Exchanged { x, overstated, by_points } = exchanged;
+        let (v, way) = (&seen.v, seen.way);
+        let ends = self.ends(pair, brightness);
         let scale = (brightness.reference_area_m2(), threshold);
         let around = |end: &End| end.surface_area.min(SPOT_AROUND * brightness.reference_area_m2());
-        let sizes = match sample {
-            Some(blockers) => shaft.sizes_of(
-                &InShaft { blockers, lamps: std::mem::take(&mut found.lamps), ..found },
-                (around(&ends.0), around(&ends.1)),
-            ),
-            None => shaft.sizes_of(&found, (around(&ends.0), around(&ends.1))),
+        let around = (around(&ends.0), around(&ends.1));
+        let sizes = match &seen.crossed {
+            Some(crossed) => {
+                let (blockers, lamps) = (crossed.clone(), pair.found.lamps.clone());
+                pair.shaft.sizes_of(&InShaft { blockers, lamps, ..pair.found }, around)
+            }
+            None => pair.shaft.sizes_of(&pair.found, around),
         };
-        let e = estimate(&x, &v, (&ends.0, &ends.1), &sizes, scale);
-        let stake = factor / threshold.max(FINEST);
-        let both_ways = way != Margin::ENDLESS;
-        let wish = self.wish((a, b), &ends, &e);
+        let e = estimate(x, v, (&ends.0, &ends.1), &sizes, scale);
+        let wish = self.wish(pair.ids, &ends, &e);
         // In another light the errors by points may be enough to refine, and that perhaps the other side.
         let until_points = by_points
             .map_or(Margin::ENDLESS, |e| Margin::between(threshold, e.error().min(threshold)));
@@ -562,23 +610,30 @@ impl SpaceJudge<'_> {
             }
             None => way,
         };
+        let both_ways = way != Margin::ENDLESS;
         let margin = Margin::Link { on: [below(0), below(1)], both_ways };
         // How V is found may depend on the light.
         if let Some(&carried) = known.filter(|_| !both_ways) {
             return Judgement { verdict: Verdict::Link, carried, margin, segments: v.segments };
         }
-        let v = match &mut clipped {
-            Some(clipped) => look_closer(v, clipped, stake * doubt),
-            None if v.segments == 0 => v,
-            None => {
+        let v = self.look_closer(pair, seen, pair.factor(x) / threshold.max(FINEST));
+        Judgement { margin, ..carrying(Verdict::Link, x, &v, pair.places) }
+    }
+
+    /// The visibility that a link carries; `stake` is its form factor over what it may err by.
+    fn look_closer(&self, pair: &Elements<'_>, seen: Seen<'_>, stake: f64) -> Visibility {
+        let Seen { v, doubt, clipped, crowd, .. } = seen;
+        match (clipped, crowd) {
+            (Some(mut clipped), _) => look_closer(v, &mut clipped, stake * doubt),
+            (None, _) if v.segments == 0 => v,
+            (None, crowd) => {
                 let again = match &crowd {
-                    Some(crowd) => crowd.visibility(key, 6),
-                    None => visibility(self.simd, shaft, blockers, key, 6),
+                    Some(crowd) => crowd.visibility(pair.key, 6),
+                    None => visibility(self.simd, pair.shaft, pair.blockers(), pair.key, 6),
                 };
                 Visibility { segments: v.segments + again.segments, ..again }
             }
-        };
-        Judgement { margin, ..carrying(Verdict::Link, &x, &v, (place_a, place_b)) }
+        }
     }
 
     /// The form-factor oracle's verdict on an end and what is distant: no splitting makes the factor smaller, but what
@@ -723,50 +778,51 @@ impl SpaceJudge<'_> {
             true => light_past_crowd(&crowd, &segments),
             false => light_visibility(self.simd, &shaft, &found.blockers, (&segments, from)),
         };
-        let mut margin = Margin::Firm;
-        let verdict = match (self.stage, self.oracle) {
-            (Stage::Coarse, _) => Verdict::CoarseLink,
+        let (verdict, margin) = self.decide_light((light, element), side, (&e, &x, &v));
+        Judgement { margin, ..carrying(verdict, &x, &v, (&e, &place.stand_in)) }
+    }
+
+    /// The verdict on a punctual light and an element, which is at that side of the pair.
+    fn decide_light(
+        &self,
+        (light, element): (ElementId, ElementId),
+        side: Side,
+        (e, x, v): (&WorldElement, &Exchange, &Visibility),
+    ) -> (Verdict, Margin) {
+        let may_split = self.forest.can_split(element);
+        match (self.stage, self.oracle) {
+            (Stage::Coarse, _) => (Verdict::CoarseLink, Margin::Firm),
             (Stage::Fine(brightness), Oracle::Error { threshold }) => {
-                let ends = (
-                    End {
-                        area: e.area,
-                        reference_area: self.reference_area(brightness, element),
-                        light: brightness.of(self.forest, element),
-                        own_area: 0.0,
-                        surface_area: 0.0,
-                    },
-                    End {
-                        area: 0.0,
-                        reference_area: f64::INFINITY,
-                        light: brightness.of(self.forest, light),
-                        own_area: 0.0,
-                        surface_area: 0.0,
-                    },
-                );
-                let ends = (&ends.0, &ends.1);
+                let end = |id, area, reference_area| {
+                    let light = brightness.of(self.forest, id);
+                    End { area, reference_area, light, own_area: 0.0, surface_area: 0.0 }
+                };
+                let receiver = end(element, e.area, self.reference_area(brightness, element));
+                let source = end(light, 0.0, f64::INFINITY);
                 let scale = (brightness.reference_area_m2(), threshold);
-                let est = estimate(&x, &v, ends, &BlockerSizes::NOTHING, scale);
-                let (error, may_split) = (est.on[0], self.forest.can_split(element));
-                let wanted = error > threshold;
-                if may_split && wanted {
-                    let error = Margin::between(error, threshold);
-                    let no_choice = SideMargin::ENDLESS;
-                    margin = Margin::Refined { error, on: side, both_ways: false, side: no_choice };
-                } else if may_split {
-                    let error = Margin::between(threshold, error);
-                    let endless = Margin::ENDLESS;
-                    let on = if side == Side::A { [error, endless] } else { [endless, error] };
-                    margin = Margin::Link { on, both_ways: false };
+                let error =
+                    estimate(x, v, (&receiver, &source), &BlockerSizes::NOTHING, scale).on[0];
+                if !may_split {
+                    return (Verdict::Link, Margin::Firm);
                 }
-                self.refine_if(wanted && may_split, side)
+                let endless = Margin::ENDLESS;
+                if error > threshold {
+                    let (error, side_margin) =
+                        (Margin::between(error, threshold), SideMargin::ENDLESS);
+                    let margin =
+                        Margin::Refined { error, on: side, both_ways: false, side: side_margin };
+                    return (Verdict::Refine(side), margin);
+                }
+                let error = Margin::between(threshold, error);
+                let on = if side == Side::A { [error, endless] } else { [endless, error] };
+                (Verdict::Link, Margin::Link { on, both_ways: false })
             }
             (Stage::Fine(_), Oracle::FormFactor { epsilon, min_area_m2 }) => {
                 let uneven = x.over_a.slope.max(v.spread_a) > epsilon;
-                let room = e.area > min_area_m2 && self.forest.can_split(element);
-                self.refine_if(uneven && room, side)
+                let room = e.area > min_area_m2 && may_split;
+                (self.refine_if(uneven && room, side), Margin::Firm)
             }
-        };
-        Judgement { margin, ..carrying(verdict, &x, &v, (&e, &place.stand_in)) }
+        }
     }
 
     fn refine_if(&self, wanted: bool, side: Side) -> Verdict {
@@ -774,12 +830,54 @@ impl SpaceJudge<'_> {
     }
 }
 
-/// What is between the two elements of a pair.
-struct Between<'a> {
+/// A pair of elements that is decided on.
+struct Elements<'a> {
+    ids: (ElementId, ElementId),
+    places: (&'a WorldElement, &'a WorldElement),
+    key: u64,
+    met: Meeting,
     shaft: &'a Shaft<'a>,
     /// Candidates in the shaft.
     candidates: &'a [u32],
     found: InShaft,
+}
+
+impl Elements<'_> {
+    fn in_contact(&self) -> bool {
+        self.met == Meeting::Coplanar
+    }
+
+    /// What may be in the way: of two ends in contact nothing, as what covers them is left out of what they exchange.
+    fn blockers(&self) -> &[PatchId] {
+        if self.in_contact() { &[] } else { &self.found.blockers }
+    }
+
+    /// Form factor from the smaller end to the other.
+    fn factor(&self, x: &Exchange) -> f64 {
+        x.area_m2 / self.places.0.area.min(self.places.1.area)
+    }
+}
+
+/// What a pair exchanges without occlusion.
+struct Exchanged {
+    x: Exchange,
+    /// How many times too large the area is that verdicts were first made with.
+    overstated: f64,
+    /// The errors of those verdicts, where they were not enough to refine.
+    by_points: Option<Estimate>,
+}
+
+/// A first look at the visibility of a pair.
+struct Seen<'p> {
+    v: Visibility,
+    /// How far off it may be.
+    doubt: f64,
+    /// How far the light is from V being found in another way.
+    way: u16,
+    clipped: Option<Clipping<'p>>,
+    crowd: Option<Crowd<'p>>,
+    /// What segments past a crowd crossed.
+    crossed: Option<Vec<PatchId>>,
 }
 
 /// Places of the two elements of a pair.

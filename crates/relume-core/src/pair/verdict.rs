@@ -49,6 +49,8 @@ pub enum Stale {
     Due,
     /// The places of its ends.
     Moved,
+    /// How it is decided on: an end became a group or a coarse element, or ceased to be.
+    Regrouped,
     /// Everything: the pair has not been judged yet.
     New,
 }

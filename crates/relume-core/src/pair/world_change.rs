@@ -31,6 +31,8 @@ pub struct WorldChange<'a> {
     brightness_changed_below: Vec<bool>,
     /// Whether all margins count from the first instant.
     knows_margins: bool,
+    /// Nodes that became groups or coarse elements, or ceased to be, ascending.
+    regrouped: &'a [ElementId],
 }
 
 impl<'a> WorldChange<'a> {
@@ -85,7 +87,24 @@ impl<'a> WorldChange<'a> {
             lights: Vec::new(),
             brightness_changed_below: Vec::new(),
             knows_margins: true,
+            regrouped: &[],
         }
+    }
+
+    /// The same where some nodes (ascending) became groups or coarse elements, or ceased to be: pairs that end there are judged
+    /// again, and those above them are looked through.
+    pub fn with_regrouped(mut self, forest: &Forest, nodes: &'a [ElementId]) -> WorldChange<'a> {
+        for &id in nodes {
+            let mut above = forest.parent(id);
+            while let Some(id) = above {
+                let motion = &mut self.motion[id.0 as usize];
+                if *motion == Motion::Still {
+                    *motion = Motion::Some;
+                }
+                above = forest.parent(id);
+            }
+        }
+        WorldChange { regrouped: nodes, ..self }
     }
 
     /// Difference after an update that was left half-way: some margins count from its beginning, others from its end.
@@ -172,6 +191,9 @@ impl<'a> WorldChange<'a> {
     ) -> Stale {
         if self.moved(forest, new, a, b) {
             return Stale::Moved;
+        }
+        if [a, b].iter().any(|end| self.regrouped.binary_search(end).is_ok()) {
+            return Stale::Regrouped;
         }
         let motion = |id| self.motion[forest.fixed(id).0 as usize];
         let body = body_of(forest, new, a).filter(|&body| body_of(forest, new, b) == Some(body));

@@ -3,6 +3,7 @@
 //! A crate that slides over a floor covers another part of it in every frame, and a drawer is covered as far as it is in.
 
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 use glam::DVec3;
 
@@ -13,15 +14,20 @@ use crate::geometry::{Aabb, Pose};
 /// Cuts made at one instant; what would be found after that is not: a count, so that it is the same everywhere.
 const CUTS_MAX: usize = 200_000;
 
-/// Bodies that may cover or be covered while one of them moves.
+/// Bodies that may cover or be covered where one of them is moved.
 #[derive(Clone, Debug, Default)]
 pub struct Covering {
-    /// Boxes around the bodies, in their own frames; by body.
+    /// Found where anything moves first.
+    bodies: OnceLock<Bodies>,
+}
+
+/// What is known of bodies in their own frames.
+#[derive(Clone, Debug)]
+struct Bodies {
+    /// Boxes around them; by body.
     bounds: Vec<Aabb>,
     /// What may cover, by body; polygons by their number in the body.
     hulls: Vec<Vec<Hull>>,
-    /// Whether a body moves, or a hand holds it; by body.
-    moves: Vec<bool>,
 }
 
 /// A scene at one instant.
@@ -39,17 +45,12 @@ struct Present {
     body: BodyId,
     pose: Pose,
     bounds: Aabb,
+    is_moved: bool,
 }
 
-impl Covering {
-    /// Hulls of the bodies of a scene, where any of them moves or is one that `is_displaced` names.
-    pub fn new(scene: &Scene, is_displaced: &dyn Fn(BodyId) -> bool) -> Covering {
+impl Bodies {
+    fn of(scene: &Scene) -> Bodies {
         let bodies = || (0..scene.bodies.len() as u32).map(BodyId);
-        let moves: Vec<bool> =
-            bodies().map(|b| !scene.is_distant(b) && (scene.moves(b) || is_displaced(b))).collect();
-        if !moves.contains(&true) {
-            return Covering::default();
-        }
         let bounds = |body: BodyId| {
             Aabb::of(scene.patches_of(body).flat_map(|(_, patch)| patch.corners_in_body()))
         };
@@ -60,21 +61,21 @@ impl Covering {
             }
             out
         };
-        Covering {
-            bounds: bodies().map(bounds).collect(),
-            hulls: bodies().map(hulls).collect(),
-            moves,
-        }
+        Bodies { bounds: bodies().map(bounds).collect(), hulls: bodies().map(hulls).collect() }
     }
+}
 
+impl Covering {
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         let hull = |hull: &Hull| {
             let lists = (hull.polygons.capacity() + hull.twins.capacity()) * size_of::<usize>();
             size_of::<Hull>() + lists + size_of_val(&hull.border[..])
         };
-        let hulls = self.hulls.iter().flatten().map(hull).sum::<usize>();
-        hulls + self.bounds.capacity() * size_of::<Aabb>() + self.moves.capacity()
+        self.bodies.get().map_or(0, |bodies| {
+            let hulls = bodies.hulls.iter().flatten().map(hull).sum::<usize>();
+            hulls + bodies.bounds.capacity() * size_of::<Aabb>()
+        })
     }
 
     /// What of patches is covered at an instant, with what is always covered of them (`rest`, by patch): of a moving body by others, of
@@ -86,26 +87,31 @@ impl Covering {
         now: &Instant<'_>,
     ) -> BTreeMap<PatchId, Covered> {
         let mut out = BTreeMap::new();
-        if self.moves.is_empty() {
+        let is_moved = |body: BodyId| {
+            let pose = now.poses[body.0 as usize];
+            let elsewhere = pose.is_some_and(|pose| pose != Pose::IDENTITY);
+            !scene.is_distant(body) && pose.is_some() && (scene.moves(body) || elsewhere)
+        };
+        if !(0..scene.bodies.len() as u32).map(BodyId).any(is_moved) {
             return out;
         }
+        let Bodies { bounds, hulls } = self.bodies.get_or_init(|| Bodies::of(scene));
         let present: Vec<Present> = (0..scene.bodies.len() as u32)
             .map(BodyId)
-            .filter(|&body| !scene.is_distant(body) && self.bounds[body.0 as usize] != Aabb::EMPTY)
+            .filter(|&body| !scene.is_distant(body) && bounds[body.0 as usize] != Aabb::EMPTY)
             .filter_map(|body| {
                 let pose = now.poses[body.0 as usize]?;
-                let bounds = moved(&self.bounds[body.0 as usize], &pose);
-                Some(Present { body, pose, bounds })
+                let bounds = moved(&bounds[body.0 as usize], &pose);
+                Some(Present { body, pose, bounds, is_moved: is_moved(body) })
             })
             .collect();
         let mut left = CUTS_MAX;
-        for one in present.iter().filter(|one| !self.hulls[one.body.0 as usize].is_empty()) {
+        for one in present.iter().filter(|one| !hulls[one.body.0 as usize].is_empty()) {
             let meets = |other: &&Present| {
-                let moves = |p: &Present| self.moves[p.body.0 as usize];
                 let reach = one.bounds.union(other.bounds);
                 let slack_m = IN_PLANE * reach_m(&reach);
                 other.body != one.body
-                    && (moves(one) || moves(other))
+                    && (one.is_moved || other.is_moved)
                     && one.bounds.grown(slack_m).meets(&other.bounds)
             };
             let others: Vec<&Present> = present.iter().filter(meets).collect();
@@ -115,7 +121,8 @@ impl Covering {
             let polygons = placed(scene, one.body, &one.pose);
             for other in others {
                 let there = Pair { scene, now, polygons: &polygons, bodies: [one, other] };
-                self.cover(&there, &present, rest, (&mut out, &mut left));
+                let hulls = &hulls[one.body.0 as usize];
+                Covering::cover(&there, (hulls, &present), rest, (&mut out, &mut left));
             }
         }
         for covered in out.values_mut() {
@@ -128,14 +135,13 @@ impl Covering {
 
     /// What the first body of a pair covers of the second.
     fn cover(
-        &self,
         pair: &Pair<'_>,
-        present: &[Present],
+        (hulls, present): (&[Hull], &[Present]),
         rest: &[Covered],
         (out, left): (&mut BTreeMap<PatchId, Covered>, &mut usize),
     ) {
         let Pair { scene, polygons, bodies: [one, other], .. } = *pair;
-        for hull in &self.hulls[one.body.0 as usize] {
+        for hull in hulls {
             let bounds = moved(&hull.bounds, &one.pose);
             let slack_m = IN_PLANE * reach_m(&bounds);
             let reach = bounds.grown(slack_m);
@@ -243,7 +249,7 @@ mod tests {
         b.animate_translation(moves, Track { times_s, values, interpolation });
         let scene = b.build().unwrap();
         let rest = scene.covered(&scene.solids(), &|_| false);
-        let covering = Covering::new(&scene, &|_| false);
+        let covering = Covering::default();
         let body = |name: &str| scene.bodies.iter().position(|body| body.name == name).unwrap();
         let mut poses = vec![Some(Pose::IDENTITY); scene.bodies.len()];
         poses[body("moves")] = Some(Pose::translation(at));

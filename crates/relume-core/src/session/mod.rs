@@ -189,6 +189,8 @@ impl Session {
         let count_motion_from =
             self.count_motion_from.take().map(|from_s| self.bed.scene.at_but(from_s, &self.held));
         let last_world = last.as_ref().map(|last| last.space.world.clone());
+        // Where groups differ, the way back does not lead to the links of before.
+        let is_alike = last.as_ref().is_none_or(|last| last.space.regrouped.is_empty());
         let from = count_motion_from.as_ref().or(last_world.as_ref());
         let goal = self.goal(&world, &self.held, from);
         let moved = from.map_or(Vec::new(), |from| self.moved(from, &world));
@@ -206,6 +208,7 @@ impl Session {
             }
             Err(failed) => {
                 let error = self.error_of(&failed, frame);
+                let last_world = last_world.filter(|_| is_alike);
                 self.solved =
                     back.and_then(|back| self.go_back(*failed, back, last_world, remains));
                 Err(error)

@@ -7,10 +7,10 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::element::{Forest, Seeds, WorldView, old_coarse_numbers};
+use crate::element::{ElementId, Forest, Seeds, WorldView, old_coarse_numbers};
 use crate::geometry::Pose;
 use crate::scene::{BodyId, Held, Patch, Scene};
-use crate::space::{Bed, Before, Solved, group_links, replanted_links};
+use crate::space::{Bed, Before, Solved, SpaceState, group_links, replanted_links};
 
 use super::{Session, Update};
 
@@ -165,6 +165,17 @@ impl Session {
     }
 }
 
+/// Nodes of the fixed part on which links of groups are found anew: what is covered otherwise, groups that hold some of it,
+/// and what is grouped otherwise.
+fn ends_anew(space: &SpaceState) -> BTreeSet<ElementId> {
+    let mut out: BTreeSet<ElementId> = space.regrouped.iter().copied().collect();
+    for &facet in &space.touched {
+        let above = |&id: &ElementId| space.forest.parent(id);
+        out.extend(std::iter::successors(Some(facet), above));
+    }
+    out
+}
+
 /// Whether each patch of a scene emits at any time, with this in hand.
 fn glows(scene: &Scene, held: &Held) -> Vec<bool> {
     let emits_by_hand = |patch: &Patch| {
@@ -198,6 +209,7 @@ fn replanted(
     last.space.scene = Arc::clone(&new.scene);
     last.space.forest = forest;
     last.space.touched = touched;
+    last.space.regrouped = seeds.regrouped(&to);
     last.links.renumber(&to);
     last.radiosity.renumber(&to);
     last.tree.renumber(&to);
@@ -206,7 +218,8 @@ fn replanted(
     last.tree.forget_certificates();
     let numbers = old_coarse_numbers(seeds, &to, new.coarse_ids.len());
     let lens = [old, new].map(|bed| bed.seed.kept_len());
-    last.space.coarse.renumber(&to.below(lens), &numbers);
+    let Solved { space, .. } = &mut last;
+    space.coarse.renumber(&new.seed, &to.below(lens), &numbers, &space.regrouped);
     let mut from = vec![None; new.scene.bodies.len()];
     for was in (0..old.scene.bodies.len() as u32).map(BodyId) {
         if let Some(is) = body(was) {
@@ -223,14 +236,17 @@ fn replanted(
     let view = WorldView::new(&new.scene, &space.forest, &space.world);
     let was = std::mem::replace(&mut space.view, view);
     let links = std::mem::take(&mut space.groups);
-    // Links that carry otherwise over what is covered otherwise, or is rounded otherwise, are found anew.
-    let keeps_links = space.touched.is_empty() && was.far_m() == space.view.far_m();
-    space.groups = match keeps_links {
-        true => replanted_links(links, &to, &space.forest),
-        false => {
+    let is_rounded_as_before = was.far_m() == space.view.far_m();
+    let anew = ends_anew(space);
+    space.groups = match space.touched.is_empty() && space.regrouped.is_empty() {
+        true if !is_rounded_as_before => {
             let places = (&space.forest, &space.view);
             group_links(places, &last.tree, &Before::default())
         }
+        // The step that follows finds those anew that end on what is covered otherwise, or grouped otherwise.
+        _ => replanted_links(links, &to, &space.forest, &|id| {
+            is_rounded_as_before && !anew.contains(&space.forest.fixed(id))
+        }),
     };
     let mut report = std::mem::take(&mut last.report);
     last.count(&mut report);

@@ -219,19 +219,22 @@ impl GroupLinks {
         self.rows = OnceLock::new();
     }
 
-    /// The same links where the forest grows from another seed: elements have other ids, facets of groups other places. `facets`
-    /// and `roots` are as in [`GroupLinks::new`]; `leaves` gives the places of the facets of a group by its new id.
+    /// The links where the forest grows from another seed: elements have other ids, facets of groups other places. `facets`
+    /// and `roots` are as in [`GroupLinks::new`]; `leaves` gives the places of the facets of a group by its new id; `keeps` says
+    /// by their new ids which ends links are kept of.
     pub fn replanted(
         self,
         to: &Renumbering,
-        facets: Vec<(u32, f32)>,
-        roots: Vec<Range<u32>>,
+        (facets, roots): (Vec<(u32, f32)>, Vec<Range<u32>>),
         leaves: &dyn Fn(u32) -> Range<u32>,
+        keeps: &dyn Fn(u32) -> bool,
     ) -> GroupLinks {
-        let GroupLinks { mut links, mut ids, factors, moment, .. } = self;
-        for (link, ids) in links.iter_mut().zip(&mut ids) {
-            *ids = ids.map(|id| to.new_of(id));
-            for (end, &new) in link.ends.iter_mut().zip(&*ids) {
+        let GroupLinks { links, ids, factors, moment, .. } = self;
+        let ids = ids.into_iter().map(|ids| ids.map(|id| to.new_of(id)));
+        let kept = links.into_iter().zip(ids).filter(|(_, ids)| ids.iter().all(|&id| keeps(id)));
+        let (mut links, ids): (Vec<GroupLink>, Vec<[u32; 2]>) = kept.unzip();
+        for (link, ids) in links.iter_mut().zip(&ids) {
+            for (end, &new) in link.ends.iter_mut().zip(ids) {
                 match end {
                     GroupEnd::Element { id, .. } => *id = new,
                     GroupEnd::Group { facets, .. } => *facets = leaves(new),

@@ -140,11 +140,24 @@ impl Coarse {
         CoarseBrightness::new(known, lights, total_area * REFERENCE_SHARE)
     }
 
-    /// Follows elements to their new ids, and coarse elements to other numbers.
-    pub(crate) fn renumber(&mut self, to: &Renumbering, numbers: &[Option<usize>]) {
+    /// Follows elements of a seed to their new ids, and coarse elements to other numbers; what is no longer one loses its links.
+    pub(crate) fn renumber(
+        &mut self,
+        seed: &Forest,
+        to: &Renumbering,
+        numbers: &[Option<usize>],
+        regrouped: &[ElementId],
+    ) {
+        let lost = || regrouped.iter().copied().filter(|&id| !seed.is_coarse_root(id));
         for links in [&mut self.links, &mut self.open] {
             links.extend(to.old_len());
             links.renumber(to);
+            links.extend(seed.len());
+            let of = |id: ElementId| links.of(id.0).iter().map(move |l| (id, ElementId(l.source)));
+            let dropped: Vec<(ElementId, ElementId)> = lost().flat_map(of).collect();
+            let none = std::iter::empty();
+            set_pairs(links, &CoarseReceivers(seed), dropped.into_iter(), none);
+            links.tidy();
         }
         self.radiosity = Radiosity::default();
         self.brightness.renumber(numbers);

@@ -117,13 +117,20 @@ pub(crate) fn group_links(
     GroupLinks::new(facets, roots, links, SQUARE_MOMENT)
 }
 
-/// The group links of a forest that grew from one seed, as it grows from another: each as it was.
-pub(crate) fn replanted_links(links: GroupLinks, to: &Renumbering, forest: &Forest) -> GroupLinks {
+/// The group links of a forest that grew from one seed, as it grows from another: each as it was, those with an end that `keeps`
+/// denies left out.
+pub(crate) fn replanted_links(
+    links: GroupLinks,
+    to: &Renumbering,
+    forest: &Forest,
+    keeps: &dyn Fn(ElementId) -> bool,
+) -> GroupLinks {
     if links.is_empty() {
         return GroupLinks::default();
     }
     let Facets { facets, roots } = facets_of(forest);
-    links.replanted(to, facets, roots, &|id| leaves_of(forest, ElementId(id)))
+    let leaves = |id| leaves_of(forest, ElementId(id));
+    links.replanted(to, (facets, roots), &leaves, &|id| keeps(ElementId(id)))
 }
 
 /// Facets of the groups of a forest.

@@ -37,6 +37,8 @@ pub(crate) struct Was {
     world: World,
     held: Held,
     view: WorldView,
+    /// See [`SpaceState`].
+    regrouped: Vec<ElementId>,
 }
 
 impl Space for SpaceState {
@@ -63,12 +65,14 @@ impl Space for SpaceState {
             sound_world: world.clone(),
             touched: Vec::new(),
             covered: Vec::new(),
+            regrouped: Vec::new(),
             is_stopped: false,
         }
     }
 
     fn is_at(&self, goal: &Goal<'_>) -> bool {
-        self.world == *goal.world && self.touched.is_empty() && self.covered.is_empty()
+        let pending = [&self.touched, &self.covered, &self.regrouped];
+        self.world == *goal.world && pending.iter().all(|list| list.is_empty())
     }
 
     fn stay(&mut self, goal: &Goal<'_>) -> bool {
@@ -94,11 +98,13 @@ impl Space for SpaceState {
             world: std::mem::replace(&mut self.world, goal.world.clone()),
             held: std::mem::replace(&mut self.held, goal.held.clone()),
             view: std::mem::replace(&mut self.view, view),
+            regrouped: self.regrouped.clone(),
         }
     }
 
     fn change<'m>(&self, _: &Goal<'_>, was: &'m Was) -> WorldChange<'m> {
-        let change = WorldChange::new(&self.scene, &self.forest, &was.view, &self.view);
+        let change = WorldChange::new(&self.scene, &self.forest, &was.view, &self.view)
+            .with_regrouped(&self.forest, &was.regrouped);
         if self.is_stopped { change.after_a_stop() } else { change }
     }
 
@@ -156,7 +162,7 @@ impl Space for SpaceState {
         let Bed { scene, seed, coarse_ids } = goal.bed;
         let changed = self.coarse.follow(seed, changes);
         let relit = change.is_none() || self.world.any_relit(&was.world);
-        if !changed && !relit && self.touched.is_empty() {
+        if !changed && !relit && self.touched.is_empty() && self.regrouped.is_empty() {
             return;
         }
         let before = std::mem::take(&mut self.coarse.brightness);
@@ -270,7 +276,10 @@ impl Space for SpaceState {
     }
 
     fn finish(&mut self, is_settled: bool) {
-        (self.touched, self.covered, self.is_stopped) = (Vec::new(), Vec::new(), false);
+        for list in [&mut self.touched, &mut self.covered, &mut self.regrouped] {
+            list.clear();
+        }
+        self.is_stopped = false;
         if is_settled {
             self.sound_world = self.world.clone();
         }

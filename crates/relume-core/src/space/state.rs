@@ -40,6 +40,8 @@ pub struct SpaceState {
     pub(crate) touched: Vec<ElementId>,
     /// Elements of which bodies that move cover another part than when they were solved, ascending.
     pub(crate) covered: Vec<ElementId>,
+    /// Nodes that became groups or coarse elements since they were solved, or ceased to be, ascending.
+    pub(crate) regrouped: Vec<ElementId>,
     /// Whether a frame was left half-way.
     pub(super) is_stopped: bool,
 }

@@ -322,7 +322,7 @@ fn point_of(
 ) -> (u32, DVec3) {
     let patch = forest.patch(leaf.facet).expect("a facet has a patch");
     let place = view.patch(patch);
-    // Groups of what never moves are in the world.
+    // Groups of several bodies are in the world.
     let frame = match forest.moves_with_group(leaf.facet) {
         true => &place.local,
         false => &place.world,

@@ -529,7 +529,7 @@ impl<'a> Shaft<'a> {
         if !shaft.meets(bounds, self.slack()) {
             return true;
         }
-        // Groups of bodies are never kept: their boxes mix frames. What never moves is in the world.
+        // Groups of bodies are never kept: their boxes mix frames. Several at rest are in the world.
         let in_one_frame = body.is_some() || (self.own.is_none() && self.forest.is_of_stage(id));
         if in_one_frame && bounds.diagonal() <= keep_m {
             return visit(id, Standing::Beside);

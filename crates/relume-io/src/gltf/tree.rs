@@ -178,24 +178,48 @@ impl Tree<'_> {
         self.growing.push(growing);
         self.draft.nodes.push(placed);
         if let Some(mesh) = node.mesh {
-            let is_still = morphs.is_empty();
-            let weights = self.weights(mesh, index, moves.weights.as_deref(), !is_still)?;
-            let is_rebuilt = self.is_rebuilt() && node.extensions.instancing.is_none();
-            if !is_still && !is_rebuilt {
-                let message = "its morph target animation is ignored: it keeps its shape at rest; --deform rebuild plays it";
-                self.note(Severity::Warning, "morph", index, message.to_owned());
-            }
-            match (node.skin, &node.extensions.instancing) {
-                (Some(skin), _) => {
-                    self.skinned.push(Skinned { index, me, mesh, skin, weights, morphs });
-                }
-                (None, Some(instancing)) => {
-                    self.instances((me, index), mesh, &weights, instancing)?;
-                }
-                (None, None) if is_still || !is_rebuilt => self.show(me, mesh, &weights)?,
-                (None, None) => self.morphing((me, index), mesh, &weights, &morphs)?,
-            }
+            let weights =
+                self.weights(mesh, index, moves.weights.as_deref(), !morphs.is_empty())?;
+            self.add_mesh((me, index), node, mesh, weights, morphs)?;
         }
+        self.add_light_and_camera((me, index), node, name)?;
+        Ok(me)
+    }
+
+    /// Adds the mesh of a node, by its indices in the draft and in the file, with the weights of its morph targets at rest and in
+    /// motion.
+    fn add_mesh(
+        &mut self,
+        (me, index): (usize, usize),
+        node: &json::Node,
+        mesh: usize,
+        weights: Vec<f64>,
+        morphs: Vec<Track>,
+    ) -> Result<(), SceneError> {
+        let is_still = morphs.is_empty();
+        let is_rebuilt = self.is_rebuilt() && node.extensions.instancing.is_none();
+        if !is_still && !is_rebuilt {
+            let message = "its morph target animation is ignored: it keeps its shape at rest; --deform rebuild plays it";
+            self.note(Severity::Warning, "morph", index, message.to_owned());
+        }
+        match (node.skin, &node.extensions.instancing) {
+            (Some(skin), _) => {
+                self.skinned.push(Skinned { index, me, mesh, skin, weights, morphs });
+                Ok(())
+            }
+            (None, Some(instancing)) => self.instances((me, index), mesh, &weights, instancing),
+            (None, None) if is_still || !is_rebuilt => self.show(me, mesh, &weights),
+            (None, None) => self.morphing((me, index), mesh, &weights, &morphs),
+        }
+    }
+
+    /// Adds the light and the camera of a node, by its indices in the draft and in the file.
+    fn add_light_and_camera(
+        &mut self,
+        (me, index): (usize, usize),
+        node: &json::Node,
+        name: String,
+    ) -> Result<(), SceneError> {
         let id = NodeId(me as u32);
         if let Some(l) = &node.extensions.light {
             let keys = self.lights.get(l.light).cloned().unwrap_or_default();
@@ -214,7 +238,7 @@ impl Tree<'_> {
                 projection,
             }));
         }
-        Ok(me)
+        Ok(())
     }
 
     /// Says once of each node whose scale changes that what hangs on it or below is held at one size.

@@ -20,7 +20,7 @@ use crate::element::tuning::{
     CUT_LEAST, CUT_SHARE, SMALL_CUT_PART, SMALL_CUT_SHARE, SMALL_CUT_TIMES, WIDE,
 };
 use crate::geometry::{Aabb, Segment, cut_along, polygon_area, split_convex};
-use crate::scene::{BodyId, Covering, Scene};
+use crate::scene::{BodyId, Scene};
 
 /// Input of planting: the scene, the lines that its patches are cut along, and the order of its bodies.
 #[derive(Clone, Copy)]
@@ -60,7 +60,11 @@ impl Forest {
         let mut forest = Forest::planted(scene, &layout, is_displaced);
         if layout.has_groups() {
             let groups = groups_of(scene, &forest, &layout);
-            for id in groups.ids() {
+            // Also what is no group now: it may become one when a body is put down.
+            let clusters = (0..forest.fixed_len).map(ElementId);
+            let clusters: Vec<ElementId> =
+                clusters.filter(|&id| forest.kind(id) == Kind::Cluster).collect();
+            for id in clusters {
                 let siblings = &mut forest.siblings[id.0 as usize];
                 (siblings.facet, siblings.path) = (id.0, 1);
             }
@@ -83,7 +87,6 @@ impl Forest {
                 patch_roots: vec![ElementId(NONE); scene.patches.len()],
                 body_roots: vec![ElementId(NONE); scene.bodies.len()],
                 covered: scene.covered(&solids, is_displaced),
-                covering: Covering::new(scene, is_displaced),
                 solids,
                 ..Fixed::default()
             }),
@@ -219,7 +222,7 @@ impl Forest {
         self.plant(&tree, 0, at, NONE, &mut |forest, leaf, id| {
             let whole = &wholes[leaf as usize];
             match layout.is_staged(whole[0]) {
-                true => forest.plant_sorted(plot, whole, STAGE, id),
+                true => forest.plant_stage(plot, whole, id),
                 false => forest.plant_body(plot, whole[0], id),
             }
         });
@@ -227,33 +230,71 @@ impl Forest {
 
     fn plant_body(&mut self, plot: Plot<'_>, body: u32, at: u32) {
         self.fixed_mut().body_roots[body as usize] = ElementId(at);
-        if plot.layout.is_sorted(body) {
-            return self.plant_sorted(plot, &[body], body, at);
+        let Plot { scene, layout, .. } = plot;
+        let range = scene.bodies[body as usize].patches.clone();
+        let is_pure = layout.pure_sort(range.clone()).is_some();
+        let patches: Vec<u32> = range.collect();
+        match layout.is_staged(body) {
+            true if is_pure => return self.plant_patches(plot, &patches, body, at),
+            is_staged if is_staged || layout.is_sorted(body) => {
+                return self.plant_sorted(plot, body, at);
+            }
+            _ => {}
         }
-        let patches: Vec<u32> = plot.scene.bodies[body as usize].patches.clone().collect();
         self.set(at, Kind::Cluster, body);
         let child = self.add_children(at, 1);
         self.plant_patches(plot, &patches, body, child);
     }
 
-    /// Some bodies as one, with a tree for each sort of their patches.
-    fn plant_sorted(&mut self, plot: Plot<'_>, bodies: &[u32], subject: u32, at: u32) {
+    /// The bodies that never move in the clip and have few small patches, each of them as a unit, whether a hand holds it or
+    /// not. Those of small patches of one sort alone come apart from the others: clusters of them may be groups.
+    fn plant_stage(&mut self, plot: Plot<'_>, bodies: &[u32], at: u32) {
         let Plot { scene, layout, .. } = plot;
-        let all = || bodies.iter().flat_map(|&body| scene.bodies[body as usize].patches.clone());
+        let sort = |body: u32| layout.pure_sort(scene.bodies[body as usize].patches.clone());
+        let of_sort = |sought: Option<Sort>| {
+            bodies.iter().copied().filter(|&body| sort(body) == sought).collect::<Vec<u32>>()
+        };
+        let parts = [None, Some(Sort::Shines), Some(Sort::Small)].map(of_sort);
+        let parts: Vec<&Vec<u32>> = parts.iter().filter(|part| !part.is_empty()).collect();
+        self.set(at, Kind::Cluster, STAGE);
+        let first = self.add_children(at, parts.len() as u16);
+        for (child, part) in (first..).zip(parts) {
+            let boxes: Vec<Aabb> =
+                part.iter().map(|&body| box_at_start(scene, BodyId(body))).collect();
+            self.plant(&binary_tree(&boxes), 0, child, STAGE, &mut |forest, leaf, id| {
+                forest.plant_body(plot, part[leaf as usize], id);
+            });
+        }
+        // What is above a body that is not where it rests is in no one frame.
+        for &body in bodies.iter().filter(|&&body| layout.is_displaced(body)) {
+            let mut id = self.fixed.body_roots[body as usize].0;
+            loop {
+                id = self.siblings[id as usize].parent;
+                if self.fixed.subjects[id as usize] != STAGE {
+                    break;
+                }
+                self.fixed_mut().subjects[id as usize] = NONE;
+            }
+        }
+    }
+
+    /// One body, with a tree for each sort of its patches.
+    fn plant_sorted(&mut self, plot: Plot<'_>, body: u32, at: u32) {
+        let Plot { scene, layout, .. } = plot;
+        let all = || scene.bodies[body as usize].patches.clone();
         let of_sort =
             |sort: Sort| all().filter(|&patch| layout.sort(patch) == sort).collect::<Vec<u32>>();
         let sorts = Sort::ALL.map(of_sort);
         let sorts: Vec<&Vec<u32>> = sorts.iter().filter(|patches| !patches.is_empty()).collect();
-        self.set(at, Kind::Cluster, subject);
+        self.set(at, Kind::Cluster, body);
         let first = self.add_children(at, sorts.len() as u16);
         for (child, patches) in (first..).zip(sorts) {
-            self.plant_patches(plot, patches, subject, child);
+            self.plant_patches(plot, patches, body, child);
         }
     }
 
     fn plant_patches(&mut self, plot: Plot<'_>, patches: &[u32], subject: u32, at: u32) {
         let Plot { scene, cuts, .. } = plot;
-        // What is planted together with others rests, so that its body's frame is the world's.
         let of_patch = |&patch: &u32| Aabb::of(scene.patches[patch as usize].corners_in_body());
         let boxes: Vec<Aabb> = patches.iter().map(of_patch).collect();
         let tree = binary_tree(&boxes);

@@ -3,7 +3,9 @@
 //! What the old and the new scene have in common has the same nodes below its root in both fixed parts. Their ids are those
 //! of a forest that is made anew; what is above the kept part keeps its order.
 
-use super::{BodyId, ChildRange, ElementId, Forest, NONE, Node, Renumbering, Siblings, exposed_m2};
+use super::{
+    BodyId, ChildRange, ElementId, Forest, NONE, Node, Renumbering, STAGE, Siblings, exposed_m2,
+};
 use crate::scene::FIRST_NAME;
 
 /// Initial forests of two scenes.
@@ -13,6 +15,23 @@ pub struct Seeds<'a> {
     pub old: &'a Forest,
     /// That of the scene now.
     pub new: &'a Forest,
+}
+
+impl Seeds<'_> {
+    /// Nodes that both have of which only one is a group, or only one a coarse element, by their new ids, ascending. Pairs that
+    /// end there are decided in another way though nothing moved.
+    pub fn regrouped(&self, to: &Renumbering) -> Vec<ElementId> {
+        let Seeds { old, new } = self;
+        let both = (1..old.kept_len).filter(|&was| to.new_of(was) != NONE);
+        let both = both.map(|was| (ElementId(was), ElementId(to.new_of(was))));
+        let differs = |&(was, is): &(ElementId, ElementId)| {
+            old.group(was).is_some() != new.group(is).is_some()
+                || old.is_coarse_root(was) != new.is_coarse_root(is)
+        };
+        let mut out: Vec<ElementId> = both.filter(differs).map(|(_, is)| is).collect();
+        out.sort_unstable();
+        out
+    }
 }
 
 impl Forest {
@@ -57,18 +76,20 @@ impl Forest {
         Some(Renumbering::new(new_of, old_of))
     }
 
-    /// Whether a node of the kept part is what one of another forest is.
+    /// Whether a node of the kept part is what one of another forest is. A cluster of several bodies is a group in one of them
+    /// and none in the other where one of the bodies is taken up ([`Seeds::regrouped`]).
     fn is_like(&self, own: ElementId, other: &Forest, id: ElementId) -> bool {
         let alike = match (self.group(own), other.group(id)) {
             (None, None) => true,
             (Some(a), Some(b)) => a.centre == b.centre && a.radius == b.radius,
-            _ => false,
+            _ => self.is_of_stage(own) != other.is_of_stage(id),
         };
         let glows = |forest: &Forest, id| forest.patch(id).map(|patch| forest.glows(patch));
         // What was inserted has other numbers of patches and bodies.
         let subject = |forest: &Forest, id: ElementId| {
-            let subjects = &forest.fixed.subjects;
-            subjects.get(id.0 as usize).copied().filter(|_| self.is_made(own))
+            let subject = forest.fixed.subjects.get(id.0 as usize).copied();
+            let subject = subject.map(|subject| if subject == STAGE { NONE } else { subject });
+            subject.filter(|_| self.is_made(own))
         };
         alike
             && subject(self, own) == subject(other, id)
@@ -111,7 +132,10 @@ impl Forest {
         out.siblings.extend(beyond.iter().map(|siblings| Siblings {
             parent: id(siblings.parent),
             facet: id(siblings.facet),
-            coarse: number(siblings.coarse),
+            coarse: match new.fixed.coarse.get(id(siblings.facet) as usize) {
+                Some(&of_facet) if of_facet != NONE => of_facet,
+                _ => number(siblings.coarse),
+            },
             ..*siblings
         }));
         for (vacant, own) in out.vacant.iter_mut().zip(&self.vacant) {
@@ -152,7 +176,7 @@ impl Forest {
     }
 }
 
-/// New numbers of the coarse elements of an old seed, by number.
+/// New numbers of the coarse elements of an old seed, by number, where these are parts of facets.
 fn coarse_numbers(Seeds { old, new }: Seeds<'_>, to: &Renumbering) -> Vec<u32> {
     let mut out = Vec::new();
     for (id, &number) in (0..).zip(&old.fixed.coarse).filter(|(_, number)| **number != NONE) {
@@ -165,13 +189,17 @@ fn coarse_numbers(Seeds { old, new }: Seeds<'_>, to: &Renumbering) -> Vec<u32> {
     out
 }
 
-/// Old numbers of the coarse elements of a new seed, by number; `None` for those that are new.
-pub fn old_coarse_numbers(seeds: Seeds<'_>, to: &Renumbering, count: usize) -> Vec<Option<usize>> {
+/// Old numbers of the coarse elements of a new seed, by number: of each the one that it was, or was a part of; `None` for those
+/// that are new or were several.
+pub fn old_coarse_numbers(
+    Seeds { old, new }: Seeds<'_>,
+    to: &Renumbering,
+    count: usize,
+) -> Vec<Option<usize>> {
     let mut out = vec![None; count];
-    for (was, is) in coarse_numbers(seeds, to).into_iter().enumerate() {
-        if is != NONE {
-            out[is as usize] = Some(was);
-        }
+    for id in (0..new.kept_len).map(ElementId).filter(|&id| new.is_coarse_root(id)) {
+        let number = new.coarse(id).expect("a coarse element has a number");
+        out[number] = old.coarse(ElementId(to.old_of()[id.0 as usize]));
     }
     out
 }

@@ -14,7 +14,7 @@ use crate::solver::jump::Jump;
 use crate::solver::links::Links;
 use crate::solver::settle::{Below, IrradianceChange, Settled};
 use crate::solver::surfaces::{FacetMaterial, Surfaces, for_each_below};
-use crate::solver::trend::Trend;
+use crate::solver::trend::{Start, Trend};
 use crate::solver::tuning::{
     FURTHER_MAX, GAIN_MAX, LOST_MAX, PENDING_SHARE, SCALED_RESIDUAL, SKIPPED_MAX, SWEEPS_MAX,
     UNBALANCED_MAX, UNKNOWN_MAX, WHITE,
@@ -261,8 +261,20 @@ impl Radiosity {
                 jump.after(&mut self.radiosity);
             }
         }
+        self.learn(surfaces, start.as_ref(), is_wide, limit);
+    }
+
+    /// Remembers for the next solve how far this one led from its start, where it had one, or whether it changed most of the
+    /// scene.
+    fn learn(
+        &mut self,
+        surfaces: &impl Surfaces,
+        start: Option<&Start>,
+        is_wide: bool,
+        limit: f32,
+    ) {
         match start {
-            Some(start) => self.trend.learn(surfaces, &start, &self.radiosity, limit),
+            Some(start) => self.trend.learn(surfaces, start, &self.radiosity, limit),
             None => self.trend.is_wide = is_wide,
         }
         if self.trend.is_wide {

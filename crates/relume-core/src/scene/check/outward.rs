@@ -108,9 +108,8 @@ fn walls<'a>(world: &'a World<'a>) -> Vec<Wall<'a>> {
                     .iter()
                     .all(|c| (*c - corner).dot(first.normal).abs() < 0.5 * reach_m)
         };
-        let is_wall =
-            world.objects[name].diagonal() >= smallest && faces.iter().all(|face| is_flat(face));
-        is_wall.then(|| Wall { name, normal: first.normal, faces, reach_m })
+        let is_wall = world.objects[name].diagonal() >= smallest && faces.iter().all(is_flat);
+        is_wall.then_some(Wall { name, normal: first.normal, faces, reach_m })
     };
     let mut walls: Vec<Wall> = objects.into_iter().filter_map(wall).collect();
     walls.sort_by(|a, b| b.reach_m.total_cmp(&a.reach_m));

@@ -444,7 +444,8 @@ pub(crate) struct ClipFlags {
     pub(crate) threads: Option<usize>,
     #[command(flatten)]
     pub(crate) outside: OutsideFlags,
-    /// No progress bar, no warnings, no summary; errors only.
+    /// No progress bar, no warnings, no summary; errors only, and frames of which more than a hundredth of the light is unaccounted
+    /// for.
     #[arg(short, long)]
     pub(crate) quiet: bool,
     /// Print every warning, also where many are of one kind.

@@ -6,9 +6,8 @@
 //! does not say, the counts are all there is.
 
 use std::fmt::Display;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::Read;
-use std::path::Path;
 use std::sync::{Mutex, OnceLock};
 use std::time::Duration;
 
@@ -95,16 +94,6 @@ pub(crate) fn exceeded(what: &str) -> Failure {
         "raise --max-memory, or ask for less: a coarser tolerance or epsilon, smaller pictures, fewer threads, a \
          simpler scene; what is finished stays",
     )
-}
-
-/// The bytes of a file, if there is room for them.
-pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    let reading = format_args!("reading {}", path.display());
-    at(reading);
-    if let Ok(file) = fs::metadata(path) {
-        ask(file.len(), reading)?;
-    }
-    fs::read(path).map_err(|error| Failure::read(path, &error))
 }
 
 /// What this process holds now, bytes; `None` where the system does not say.

@@ -7,12 +7,12 @@ use relume::{Frame, Log, LogError};
 use crate::args::{ReplayArgs, UpdateChoice, UpdateFlag};
 use crate::clip::{Clip, step_failure};
 use crate::failure::Failure;
-use crate::memory;
 use crate::output::{self, Sink, count, counted};
+use crate::scene_file;
 
 /// Runs the command. A hash that differs from the log's is a failure.
 pub(crate) fn replay(args: &ReplayArgs) -> Result<(), Failure> {
-    let text = memory::read(&args.log)?;
+    let text = scene_file::read(&args.log)?;
     let clip = Clip::open(&args.source, &args.clip)?;
     clip.warn();
     let mut session = clip.session(UpdateChoice::of(UpdateFlag::Certificate), true)?;

@@ -16,7 +16,7 @@ use serde_json::value::RawValue;
 use crate::args::Shading;
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::memory;
+use crate::scene_file;
 
 /// Name of the format.
 pub(crate) const SCHEMA: &str = "relume-report/1";
@@ -117,6 +117,33 @@ pub(crate) struct PictureOptions {
     pub(crate) reconstruct: bool,
 }
 
+/// A frame as it is written down.
+#[derive(Serialize)]
+struct Entry<'a> {
+    #[serde(flatten)]
+    frame: &'a FrameReport,
+    /// Share of what is emitted that is unaccounted for: 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unbalanced: Option<f64>,
+    /// Digest of the bytes of its picture, 16 hexadecimal digits.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    picture: Option<&'a str>,
+}
+
+/// What of an entry is asked for after it is written.
+#[derive(Debug, Default, Deserialize)]
+pub(crate) struct Finished {
+    /// Share of what is emitted that is unaccounted for: 1.
+    #[serde(default)]
+    pub(crate) unbalanced: f64,
+    /// Surfaces that receive more than they can.
+    #[serde(default)]
+    pub(crate) suspects: Vec<String>,
+    /// Digest of the bytes of its picture.
+    #[serde(default)]
+    pub(crate) picture: Option<String>,
+}
+
 /// The number of a frame, from its entry; an entry without a hash is none.
 #[derive(Deserialize)]
 struct Numbered {
@@ -171,35 +198,45 @@ impl Report {
         }
     }
 
-    /// Adds a finished frame.
+    /// Adds a finished frame, with the digest of its picture if it has one.
     ///
     /// JSON has no infinities; a field that is not finite would be written as null, so it is an
     /// error that names the frame.
-    pub(crate) fn add(&mut self, frame: &FrameReport) -> Result<(), Failure> {
+    pub(crate) fn add(
+        &mut self,
+        frame: &FrameReport,
+        picture: Option<&str>,
+    ) -> Result<(), Failure> {
         let broken = |what: &str| {
             Failure::new(format_args!("the report of frame {} {what}", frame.frame))
                 .help("this is a defect of relume: please report it with the scene")
         };
-        let value = serde_json::to_value(frame).map_err(|_| broken("cannot be written"))?;
+        let unbalanced = frame.energy.map(|energy| energy.unbalanced());
+        let entry = Entry { frame, unbalanced, picture };
+        let value = serde_json::to_value(&entry).map_err(|_| broken("cannot be written"))?;
         if holds_null(&value) {
             return Err(broken("holds a number that is not finite"));
         }
         // Not `value`'s text: that would put the fields into another order.
-        let text = serde_json::to_string(frame).map_err(|_| broken("cannot be written"))?;
+        let text = serde_json::to_string(&entry).map_err(|_| broken("cannot be written"))?;
         let raw = RawValue::from_string(text).map_err(|_| broken("cannot be written"))?;
         self.frames.insert(frame.frame, raw);
         Ok(())
     }
 
+    /// What is asked for of a finished frame; of one that is not, as if there were nothing to say.
+    pub(crate) fn finished(&self, frame: u32) -> Finished {
+        let entry = self.frames.get(&frame);
+        entry.and_then(|raw| serde_json::from_str(raw.get()).ok()).unwrap_or_default()
+    }
+
     /// Reads a report; `None` if there is no such file.
     pub(crate) fn read(path: &Path) -> Result<Option<Report>, Failure> {
-        let length = fs::metadata(path).map_or(0, |file| file.len());
-        memory::ask(length, format_args!("reading {}", path.display()))?;
-        let text = match fs::read_to_string(path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(Failure::read(path, &error)),
-        };
+        if fs::symlink_metadata(path).is_err_and(|e| e.kind() == std::io::ErrorKind::NotFound) {
+            return Ok(None);
+        }
+        let bytes = scene_file::read(path)?;
+        let text = String::from_utf8_lossy(&bytes);
         match serde_json::from_str::<Report>(&text) {
             Ok(report) if report.schema == SCHEMA => Ok(Some(report)),
             Ok(report) => Err(Failure::new(format_args!(
@@ -238,6 +275,8 @@ fn holds_null(value: &serde_json::Value) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use relume::session::Energy;
+
     use super::*;
 
     pub(crate) fn report() -> Report {
@@ -273,7 +312,7 @@ mod tests {
         let third = 1.0 / 3.0;
         for frame in [7, 2] {
             let entry = FrameReport { frame, time_s: third, ..FrameReport::default() };
-            report.add(&entry).unwrap();
+            report.add(&entry, None).unwrap();
         }
         report.write(&path).unwrap();
         let back = Report::read(&path).unwrap().unwrap();
@@ -284,9 +323,22 @@ mod tests {
     }
 
     #[test]
+    fn an_entry_says_what_is_unaccounted_for_and_has_the_digest_of_its_picture() {
+        let mut report = report();
+        let energy = Energy { emitted_w: 50.0, absorbed_w: 48.0, escaped_w: 0.0 };
+        let suspects = vec!["shelf".to_owned()];
+        let frame = FrameReport { frame: 3, energy: Some(energy), suspects, ..Default::default() };
+        report.add(&frame, Some("00ff")).unwrap();
+        let found = report.finished(3);
+        assert_eq!((found.unbalanced, found.picture.as_deref()), (0.04, Some("00ff")));
+        assert_eq!(found.suspects, ["shelf"]);
+        assert_eq!(report.finished(4).picture, None);
+    }
+
+    #[test]
     fn a_number_that_is_not_finite_is_refused() {
         let frame = FrameReport { residual: f64::INFINITY, ..FrameReport::default() };
-        assert!(report().add(&frame).is_err());
+        assert!(report().add(&frame, None).is_err());
     }
 
     #[test]

@@ -3,15 +3,16 @@
 //! What may differ: the frames asked for, the number of threads and the memory limit, since none
 //! of them changes a bit of a frame that was finished.
 
-use std::fs::File;
+use std::collections::BTreeSet;
+use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
 use crate::failure::Failure;
-use crate::memory;
 use crate::report::Report;
+use crate::scene_file;
 
 /// Fields that may differ between the runs.
 const FREE: [&str; 4] = [
@@ -25,12 +26,12 @@ const FREE: [&str; 4] = [
 /// Takes over what `earlier`, read from `path`, has finished, after checking that it belongs to
 /// the same scene and options as `now`.
 ///
-/// `is_whole` tells whether the files of a frame are there.
+/// `is_whole` tells whether the files of a frame are there, as the earlier run left them.
 pub(crate) fn take_over(
     now: &mut Report,
     earlier: Report,
     path: &Path,
-    is_whole: impl Fn(u32) -> bool,
+    is_whole: impl Fn(u32, Option<&str>) -> bool,
 ) -> Result<(), Failure> {
     let differences = differences(&earlier, now);
     if !differences.is_empty() {
@@ -46,7 +47,13 @@ pub(crate) fn take_over(
     if let (Some(now), Some(then)) = (&mut now.options.picture, &earlier.options.picture) {
         now.exposure_ev = then.exposure_ev;
     }
-    now.frames = earlier.frames.into_iter().filter(|(frame, _)| is_whole(*frame)).collect();
+    let whole: BTreeSet<u32> = earlier
+        .frames
+        .keys()
+        .copied()
+        .filter(|&frame| is_whole(frame, earlier.finished(frame).picture.as_deref()))
+        .collect();
+    now.frames = earlier.frames.into_iter().filter(|(frame, _)| whole.contains(frame)).collect();
     now.peak_memory_bytes = earlier.peak_memory_bytes;
     Ok(())
 }
@@ -100,14 +107,24 @@ fn flatten(name: String, value: &Value, into: &mut Vec<(String, String)>) {
 /// FNV-1a over 64 bits: it tells an edited file from the same one, and is no protection against
 /// somebody who wants to deceive.
 pub(crate) fn content_hash(scene: &Path, environment: Option<&Path>) -> Result<String, Failure> {
-    let bytes = memory::read(scene)?;
+    let bytes = scene_file::read(scene)?;
     let mut hash = Fnv::new();
     hash.add(&bytes);
     for file in referred_files(scene, &bytes).into_iter().chain(environment.map(Path::to_owned)) {
-        // A file that is missing is the importer's to complain about.
-        let _ = File::open(&file).and_then(|file| hash.add_file(file));
+        // A file that is missing is the importer's to complain about. A device or a pipe has no content of its own, and
+        // opening one may wait for ever.
+        if fs::metadata(&file).is_ok_and(|known| known.is_file()) {
+            let _ = File::open(&file).and_then(|file| hash.add_file(file));
+        }
     }
     Ok(format!("{:016x}", hash.0))
+}
+
+/// Digest of the bytes of a finished file, 16 hexadecimal digits: [`content_hash`]'s, of one file.
+pub(crate) fn digest(bytes: &[u8]) -> String {
+    let mut hash = Fnv::new();
+    hash.add(bytes);
+    format!("{:016x}", hash.0)
 }
 
 /// The JSON of a `.glb`, its first chunk; the bytes themselves of other files.
@@ -134,7 +151,8 @@ fn referred_files(scene: &Path, bytes: &[u8]) -> Vec<PathBuf> {
         .flatten()
         .filter_map(|entry| entry.get("uri")?.as_str())
         .filter(|uri| !uri.starts_with("data:"))
-        .map(|uri| directory.join(percent_decoded(uri)))
+        // An absolute path takes the place of the directory.
+        .map(|uri| directory.join(percent_decoded(uri.strip_prefix("file://").unwrap_or(uri))))
         .collect()
 }
 
@@ -167,13 +185,9 @@ impl Fnv {
         self.add_bytes(bytes);
     }
 
-    /// The same, read piece by piece. A device or a pipe has no content of its own.
+    /// The same, read piece by piece.
     fn add_file(&mut self, mut file: File) -> io::Result<()> {
-        let known = file.metadata()?;
-        if !known.is_file() {
-            return Ok(());
-        }
-        self.add_bytes(&known.len().to_le_bytes());
+        self.add_bytes(&file.metadata()?.len().to_le_bytes());
         let mut piece = vec![0; 1 << 16];
         loop {
             match file.read(&mut piece)? {
@@ -192,8 +206,6 @@ impl Fnv {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
     use relume::session::FrameReport;
 
     use super::*;
@@ -242,14 +254,16 @@ mod tests {
 
     fn refusal(change: impl FnOnce(&mut Report)) -> String {
         let mut now = with(change);
-        take_over(&mut now, report(), Path::new("report.json"), |_| true).unwrap_err().to_string()
+        take_over(&mut now, report(), Path::new("report.json"), |_, _| true)
+            .unwrap_err()
+            .to_string()
     }
 
     #[test]
     fn whole_frames_and_the_exposure_are_taken_over() {
         let mut earlier = report();
         for frame in [0, 1, 2] {
-            earlier.add(&FrameReport { frame, ..FrameReport::default() }).unwrap();
+            earlier.add(&FrameReport { frame, ..FrameReport::default() }, None).unwrap();
         }
         earlier.peak_memory_bytes = 77;
         let mut now = with(|r| {
@@ -258,7 +272,7 @@ mod tests {
             r.options.max_memory_bytes = Some(1);
             r.options.picture.as_mut().unwrap().exposure_ev = None;
         });
-        take_over(&mut now, earlier, Path::new("report.json"), |frame| frame != 1).unwrap();
+        take_over(&mut now, earlier, Path::new("report.json"), |frame, _| frame != 1).unwrap();
         assert_eq!(now.frames.keys().copied().collect::<Vec<_>>(), [0, 2]);
         assert_eq!(now.options.picture.unwrap().exposure_ev, Some(1.25));
         assert_eq!(now.peak_memory_bytes, 77);

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use relume::export::{probe, write_atomically, write_glb};
 use relume::scene::{BodyId, Light, MaterialId, Scene};
@@ -32,17 +32,12 @@ use crate::memory;
 use crate::output::{self, count, counted};
 use crate::preview::{self, Meanwhile, PATIENCE};
 use crate::progress::Progress;
-use crate::report::{PictureOptions, Report, RunOptions, SceneSummary};
+use crate::report::{self, PictureOptions, Report, RunOptions, SceneSummary};
 use crate::resume;
 use crate::scene_file;
 use crate::size::Size;
+use crate::tuning::UNBALANCED_SAID;
 use crate::viewing::Viewing;
-
-/// The report is written again after a frame if the last time was this long ago. A run that is
-/// killed outright computes the frames of this time again when it is resumed.
-const REPORT_INTERVAL: Duration = Duration::from_secs(1);
-/// At most one part in so many of a run is spent on writing reports, however long they grow.
-const REPORT_SHARE: u32 = 20;
 
 /// `relume demo`
 pub(crate) fn demo(args: DemoArgs) -> Result<(), Failure> {
@@ -154,7 +149,12 @@ impl Job {
         if !there.is_empty() {
             run.finished().write()?;
         }
-        match outcome? {
+        let outcome = outcome?;
+        // Also where it is quiet: the numbers of these frames are in doubt.
+        if let Some(line) = said_of_unbalanced(&run.finished().report, wanted) {
+            output::complain(&line);
+        }
+        match outcome {
             Outcome::Interrupted => {
                 let finished = wanted.iter().filter(|f| there.contains(f)).count();
                 Err(self.interrupted(finished, wanted.len()))
@@ -268,7 +268,9 @@ impl Job {
         if self.solve.resume
             && let Some(earlier) = Report::read(&paths[0])?
         {
-            resume::take_over(&mut report, earlier, &paths[0], |f| self.picture_is_whole(f))?;
+            resume::take_over(&mut report, earlier, &paths[0], |frame, digest| {
+                self.picture_is_whole(frame, digest)
+            })?;
         }
         for path in paths.iter().chain(&self.solve.events) {
             probe(path).map_err(|error| Failure::write(path, &error))?;
@@ -312,9 +314,14 @@ impl Job {
         Some(self.dir.as_ref()?.join(format!("frame-{frame:04}.png")))
     }
 
-    /// Whether a frame's picture is there and undamaged.
-    fn picture_is_whole(&self, frame: u32) -> bool {
-        let whole = |path| fs::read(path).is_ok_and(|bytes| picture::is_whole_png(&bytes));
+    /// Whether a frame's picture is there, undamaged and the one that was finished.
+    fn picture_is_whole(&self, frame: u32, digest: Option<&str>) -> bool {
+        let whole = |path: PathBuf| {
+            scene_file::read(&path).is_ok_and(|bytes| {
+                picture::is_whole_png(&bytes)
+                    && digest.is_none_or(|digest| digest == resume::digest(&bytes))
+            })
+        };
         self.picture_path(frame).is_none_or(whole)
     }
 
@@ -413,6 +420,34 @@ fn gets_no_light(scene: &Scene, energy: &Energy) -> bool {
     !scene.without_outside().emits() && energy.emitted_w < GETS_IN * arrives * scene.area_m2()
 }
 
+/// A line about finished frames in which more of the light than [`UNBALANCED_SAID`] is unaccounted for.
+fn said_of_unbalanced(report: &Report, wanted: &[u32]) -> Option<String> {
+    let finished = wanted.iter().map(|&frame| (frame, report.finished(frame)));
+    let off: Vec<(u32, report::Finished)> =
+        finished.filter(|(_, of)| of.unbalanced > UNBALANCED_SAID).collect();
+    let (worst, of) = off.iter().max_by(|a, b| a.1.unbalanced.total_cmp(&b.1.unbalanced))?;
+    let numbers: Vec<u32> = off.iter().map(|(frame, _)| *frame).collect();
+    let suspects = match &of.suspects[..] {
+        [] => String::new(),
+        some => format!(
+            "; more light arrives at {} than can: they pierce each other or lie very close",
+            named(some)
+        ),
+    };
+    let frames = if numbers.len() == 1 { "frame" } else { "frames" };
+    Some(format!(
+        "warning: {frames} {}: up to {:.1} % of the light is unaccounted for (frame {worst}){suspects}; a finer --tolerance \
+         makes it less",
+        frames::describe(&numbers),
+        100.0 * of.unbalanced
+    ))
+}
+
+fn named(surfaces: &[String]) -> String {
+    let names: Vec<String> = surfaces.iter().map(|s| format!("`{}`", output::name(s))).collect();
+    names.join(" and ")
+}
+
 /// A line about the energy balance of the last frame.
 fn balance(energy: &Energy, suspects: &[String]) -> String {
     let Energy { emitted_w, absorbed_w, escaped_w } = *energy;
@@ -421,12 +456,11 @@ fn balance(energy: &Energy, suspects: &[String]) -> String {
         "\nlast frame: {emitted_w:.4} W emitted, {absorbed_w:.4} W absorbed, {escaped_w:.4} W escaped, \
          {share:.2} % unbalanced"
     );
-    if !suspects.is_empty() {
-        let names: Vec<String> =
-            suspects.iter().map(|s| format!("`{}`", output::name(s))).collect();
+    // What is more is said of all frames.
+    if !suspects.is_empty() && energy.unbalanced() <= UNBALANCED_SAID {
         line += &format!(
             "\nwarning: more light arrives at {} than can: they pierce each other or lie very close",
-            names.join(" and ")
+            named(suspects)
         );
     }
     line
@@ -495,8 +529,6 @@ impl Run<'_> {
         (wanted, pending): (&[u32], &[u32]),
         meanwhile: &mut Option<(Meanwhile, PathBuf)>,
     ) -> Result<Outcome, Failure> {
-        // The first finished frame is written down at once: an older report ends there.
-        let (mut written, mut interval) = (None::<Instant>, REPORT_INTERVAL);
         for &frame in pending {
             if interrupt::requested() {
                 return Ok(Outcome::Interrupted);
@@ -513,12 +545,8 @@ impl Run<'_> {
                 meanwhile.end(&path);
             }
             self.progress.finish_frame();
-            if written.is_none_or(|at| at.elapsed() >= interval) {
-                let before = now();
-                self.finished().write_report()?;
-                written = Some(now());
-                interval = REPORT_INTERVAL.max(before.elapsed() * REPORT_SHARE);
-            }
+            // Whatever ends the run from here on, the report has this frame.
+            self.finished().write_report()?;
         }
         Ok(Outcome::Done)
     }
@@ -533,24 +561,26 @@ impl Run<'_> {
         self.energy = entry.energy;
         self.suspects = entry.suspects.clone();
         entry.accuracy = self.estimates.of(clip::solved(&self.session), frame, None);
-        if let Some(path) = self.job.picture_path(frame) {
-            self.draw(frame, &path)?;
-        }
+        let picture = match self.job.picture_path(frame) {
+            Some(path) => self.draw(frame, &path)?,
+            None => None,
+        };
         let mut finished = self.finished();
-        finished.report.add(&entry)?;
+        finished.report.add(&entry, picture.as_deref())?;
         if let Some(table) = &mut finished.events {
             table.add(frame, &clip::solved(&self.session).events());
         }
         Ok(())
     }
 
-    fn draw(&mut self, frame: u32, path: &Path) -> Result<(), Failure> {
-        let Some((_, flags)) = &self.job.picture else { return Ok(()) };
+    /// Draws the picture of a frame; the digest of its bytes.
+    fn draw(&mut self, frame: u32, path: &Path) -> Result<Option<String>, Failure> {
+        let Some((_, flags)) = &self.job.picture else { return Ok(None) };
         let snapshot = clip::snapshot(clip::solved(&self.session), flags);
         if self.exposure_is_open() {
             self.choose_exposure(frame, &snapshot)?;
         }
-        let Some((view, options, flags)) = self.view(frame)? else { return Ok(()) };
+        let Some((view, options, flags)) = self.view(frame)? else { return Ok(None) };
         let exposure = options.exposure_ev.map_or(Exposure::Automatic, fixed);
         let settings = clip::picture_settings(flags, options.shading, exposure);
         ask_for_picture(flags)?;
@@ -562,7 +592,8 @@ impl Run<'_> {
         write_atomically(path, &bytes).map_err(|error| {
             Failure::write(path, &error)
                 .help("free some space or check the permissions, then run again with --resume")
-        })
+        })?;
+        Ok(Some(resume::digest(&bytes)))
     }
 
     /// What pictures of a frame are made with, if any are made.
@@ -716,6 +747,49 @@ mod tests {
             (material.exitance, material.glow) = ([0.0; 3], None);
         }
         assert_eq!(brightest_frame(&scene, 24.0), None);
+    }
+
+    #[test]
+    fn frames_whose_light_is_off_are_said_and_the_worst_is_named() {
+        let summary = SceneSummary {
+            name: "room".into(),
+            bodies: 1,
+            patches: 6,
+            area_m2: 6.0,
+            bounds: None,
+            content: "00".into(),
+        };
+        let options = RunOptions {
+            frames: "all".into(),
+            fps: 24.0,
+            animation: None,
+            edits: Vec::new(),
+            tolerance: 0.1,
+            oracle: "error".into(),
+            update: "certificate".into(),
+            threads: 1,
+            max_memory_bytes: None,
+            outside: None,
+            picture: None,
+        };
+        let mut report = Report::new(summary, options);
+        let mut add = |frame, absorbed_w, suspects: &[&str]| {
+            let energy = Some(Energy { emitted_w: 100.0, absorbed_w, escaped_w: 0.0 });
+            let suspects = suspects.iter().map(|s| (*s).to_owned()).collect();
+            let entry =
+                relume::session::FrameReport { frame, energy, suspects, ..Default::default() };
+            report.add(&entry, None).unwrap();
+        };
+        add(0, 99.5, &[]);
+        add(1, 102.0, &["floor"]);
+        add(2, 96.0, &["shelf", "wall"]);
+        add(4, 98.0, &[]);
+        let said = said_of_unbalanced(&report, &[0, 1, 2, 4]).unwrap();
+        assert!(said.starts_with("warning: frames 1-2, 4: up to 4.0 % of the light"), "{said}");
+        assert!(said.contains("`shelf` and `wall`"), "{said}");
+        assert_eq!(said_of_unbalanced(&report, &[0]), None);
+        // Frames that are not asked for are another run's.
+        assert!(said_of_unbalanced(&report, &[0, 4]).unwrap().contains("warning: frame 4:"));
     }
 
     #[test]

@@ -1,10 +1,13 @@
 //! A scene from a file, or the message that says why not.
 
+use std::fs;
 use std::path::Path;
 
 use clap::{Args, ValueEnum};
 use indicatif::HumanBytes;
-use relume::scene::{ImportOptions, Instants, Note, Scene, SceneError, Severity, check, import};
+use relume::scene::{
+    ImportOptions, Instants, Note, Scene, SceneError, Severity, check, import, read_file,
+};
 
 use crate::edits::EditFlags;
 use crate::failure::Failure;
@@ -73,6 +76,19 @@ pub(crate) fn load(
     let scene = import(path, &options).map_err(failure)?;
     memory::at(format_args!("preparing {}", path.display()));
     Ok(scene)
+}
+
+/// The bytes of a file, if there is room for them.
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    let reading = format_args!("reading {}", path.display());
+    memory::at(reading);
+    if let Ok(file) = fs::metadata(path) {
+        memory::ask(file.len(), reading)?;
+    }
+    read_file(path, memory::limit_bytes()).map_err(|error| match error {
+        SceneError::Read { source, remedy, .. } => Failure::read(path, &source).help(remedy),
+        error => failure(error),
+    })
 }
 
 /// The message of a scene error, its remedy on a line of its own.

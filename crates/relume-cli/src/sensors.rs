@@ -9,7 +9,7 @@ use glam::DVec3;
 use relume::scene::limits::{COORDINATE_MAX_M, is_place};
 
 use crate::failure::Failure;
-use crate::memory;
+use crate::scene_file;
 
 /// A sensor as it is written down.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +45,7 @@ const SIX: &str = "write six numbers a line, x y z nx ny nz, in metres; # begins
 
 /// Reads a file of sensors.
 pub(crate) fn read(path: &Path) -> Result<Sensors, Failure> {
-    let bytes = memory::read(path)?;
+    let bytes = scene_file::read(path)?;
     let text = String::from_utf8(bytes).map_err(|_| {
         Failure::new(format_args!("{} is not text", path.display()))
             .help("sensors are lines of text: x y z nx ny nz")

@@ -42,3 +42,12 @@ pub(crate) const LIT_MIN: f64 = 0.5;
 /// - Larger: wrong numbers are not noticed
 /// - Smaller: coarse solutions are refused
 pub(crate) const UNBALANCED_MAX: f64 = 0.1;
+
+/// Share of what is emitted that is unaccounted for in a frame, from which on that is said, also with `--quiet`. Above a tenth a
+/// frame is refused by the engine.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: wrong numbers are not noticed
+/// - Smaller: white rooms at coarse tolerances warn, whose numbers are within them
+pub(crate) const UNBALANCED_SAID: f64 = 0.01;

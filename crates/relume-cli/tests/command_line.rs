@@ -176,6 +176,7 @@ fn solve_prints_a_summary_and_writes_a_report() {
         "residual",
         "row_sum_error",
         "energy",
+        "unbalanced",
         "hash",
         "seconds",
     ];

@@ -4,6 +4,7 @@ mod bench;
 mod command_line;
 mod common;
 mod factors;
+mod files;
 mod first_minutes;
 mod flat;
 mod fuzz;

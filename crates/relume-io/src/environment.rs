@@ -5,6 +5,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
+use crate::regular::read_file;
 use relume_core::scene::SceneError;
 use relume_core::scene::outside::Environment;
 
@@ -23,11 +24,6 @@ pub fn read_environment(
     max_memory_bytes: Option<u64>,
 ) -> Result<Environment, SceneError> {
     let file = path.display().to_string();
-    let unreadable = |source| SceneError::Read {
-        file: file.clone(),
-        source,
-        remedy: "check its path and that it may be read".into(),
-    };
     let too_large = |what: &str, needs_bytes| SceneError::TooLarge {
         file: file.clone(),
         what: what.into(),
@@ -41,11 +37,8 @@ pub fn read_environment(
         remedy: "give an equirectangular picture of radiance, .hdr or .exr".into(),
     };
     let limit = max_memory_bytes.unwrap_or(u64::MAX);
-    let len = std::fs::metadata(path).map_err(unreadable)?.len();
-    if len > limit {
-        return Err(too_large("the file", len));
-    }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
+    let bytes = read_file(path, max_memory_bytes)?;
+    let len = bytes.len() as u64;
     let format = match bytes.get(..4) {
         Some(b"#?RA" | b"#?RG") => image::ImageFormat::Hdr,
         Some([0x76, 0x2f, 0x31, 0x01]) => image::ImageFormat::OpenExr,

@@ -5,6 +5,7 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use crate::regular::{IRREGULAR_MAX_BYTES, irregular, not_regular, read_file, unless_fits};
 use relume_core::scene::SceneError;
 
 /// Where a scene file's other files are, and what of them may be read.
@@ -24,14 +25,7 @@ pub(super) fn read_scene(
     max_memory_bytes: Option<u64>,
 ) -> Result<(Vec<u8>, String), SceneError> {
     let file = path.display().to_string();
-    // What cannot be measured cannot be read either.
-    let length = std::fs::metadata(path).map_or(0, |m| m.len());
-    unless_fits(&file, "the file", length, max_memory_bytes)?;
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
-        file: file.clone(),
-        source,
-        remedy: "check the path and its permissions".into(),
-    })?;
+    let bytes = read_file(path, max_memory_bytes)?;
     unless_placeholder(&file, &bytes)?;
     Ok((bytes, path.file_stem().map_or(file, |s| s.to_string_lossy().into_owned())))
 }
@@ -53,16 +47,26 @@ impl Folder {
         };
         // Before it is opened: opening a pipe waits for whoever writes to it.
         let known = std::fs::metadata(&path).map_err(failed)?;
-        let kind = known.file_type();
-        if !(kind.is_file() || kind.is_dir() || self.allow_outside) {
-            return Err(self.outside(format!("{owner} is a device or a pipe ({name})")));
+        let what = irregular(known.file_type());
+        if known.is_dir() {
+            return Err(failed(not_regular("a directory")));
         }
-        let bytes = known.len().min(at_most as u64);
-        let what = format_args!("{owner} ({name})");
-        unless_fits(&self.file, what, bytes, self.max_memory_bytes)?;
-        let mut bytes = Vec::new();
+        if let Some(what) = what.filter(|_| !self.allow_outside) {
+            return Err(self.outside(format!("{owner} ({name}) is {what}, not a regular file")));
+        }
+        let at_most = at_most as u64;
+        let bytes = known.len().min(at_most);
+        unless_fits(&self.file, format_args!("{owner} ({name})"), bytes, self.max_memory_bytes)?;
         let file = std::fs::File::open(&path).map_err(failed)?;
-        file.take(at_most as u64).read_to_end(&mut bytes).map_err(failed)?;
+        let mut bytes = Vec::new();
+        match what {
+            None => file.take(at_most).read_to_end(&mut bytes).map_err(failed)?,
+            // Some never end.
+            Some(_) => {
+                let most = at_most.min(IRREGULAR_MAX_BYTES);
+                file.take(most).read_to_end(&mut bytes).map_err(failed)?
+            }
+        };
         unless_placeholder(name, &bytes)?;
         Ok(bytes)
     }
@@ -76,7 +80,8 @@ impl Folder {
         Ok(())
     }
 
-    fn outside(&self, what: String) -> SceneError {
+    /// The error of what may be read only where more is allowed.
+    pub(super) fn outside(&self, what: String) -> SceneError {
         SceneError::Outside {
             file: self.file.clone(),
             what,
@@ -99,25 +104,6 @@ fn unless_placeholder(file: &str, bytes: &[u8]) -> Result<(), SceneError> {
         source: std::io::Error::other("it is a placeholder of Git LFS, not the file itself"),
         remedy: "fetch it with `git lfs pull`".into(),
     })
-}
-
-/// An error if something of a file needs more bytes, by itself, than are allowed.
-pub(super) fn unless_fits(
-    file: &str,
-    what: impl std::fmt::Display,
-    needs_bytes: u64,
-    limit_bytes: Option<u64>,
-) -> Result<(), SceneError> {
-    match limit_bytes {
-        Some(limit_bytes) if needs_bytes > limit_bytes => Err(SceneError::TooLarge {
-            file: file.to_owned(),
-            what: what.to_string(),
-            needs_bytes,
-            limit_bytes,
-            remedy: "raise --max-memory, or make the file smaller".into(),
-        }),
-        _ => Ok(()),
-    }
 }
 
 /// Whether a path leads out of the folder that it starts from: on any system, whichever this one is.

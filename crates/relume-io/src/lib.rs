@@ -16,6 +16,8 @@ mod import;
 mod log;
 mod mesh_file;
 mod options;
+mod range;
+mod regular;
 mod surface;
 mod view3d;
 
@@ -23,3 +25,4 @@ pub use environment::read_environment;
 pub use import::import;
 pub use log::{Log, LogError};
 pub use options::{FrameRange, ImportOptions, Instants};
+pub use regular::read_file;

@@ -81,7 +81,7 @@ pub mod flat {
 #[doc(hidden)]
 pub mod scene {
     pub use relume_core::scene::*;
-    pub use relume_io::{FrameRange, ImportOptions, Instants, import};
+    pub use relume_io::{FrameRange, ImportOptions, Instants, import, read_file};
 }
 
 pub use relume_core::geometry::Pose;

@@ -26,6 +26,7 @@ use crate::memory;
 use crate::output;
 use crate::paper::make;
 use crate::plan::Plan;
+use crate::scene_file;
 use crate::sequence::{Sequence, Stepping};
 use crate::verify;
 
@@ -63,7 +64,7 @@ pub(crate) fn flat(args: &FlatArgs) -> Result<(), Failure> {
     let path = args.scene.as_deref().ok_or_else(|| {
         Failure::usage("which scene?").help("name a file: relume flat scene.flat")
     })?;
-    let text = String::from_utf8(memory::read(path)?).map_err(|_| {
+    let text = String::from_utf8(scene_file::read(path)?).map_err(|_| {
         let invalid =
             io::Error::new(io::ErrorKind::InvalidData, "stream did not contain valid UTF-8");
         Failure::read(path, &invalid)

@@ -2,6 +2,7 @@
 //!
 //! Must not know how they are solved.
 
+mod size;
 mod svg;
 mod text;
 

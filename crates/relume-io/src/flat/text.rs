@@ -16,7 +16,9 @@
 
 use glam::DVec2;
 
+use super::size::{self, SEGMENTS_MAX};
 use relume_core::flat::{FlatScene, Key, Material, Motion, SceneError, Segment};
+use relume_core::scene::limits::{COORDINATE_MAX_M, is_place};
 
 /// What is wrong with a text, and where.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -64,6 +66,9 @@ pub fn parse(text: &str) -> Result<FlatScene, TextError> {
             "segment" | "polygon" => {
                 settle(&mut scene, begun.take())?;
                 shape(&mut scene, first, rest).map_err(|what| TextError { line: number, what })?;
+                if scene.walls().len() > SEGMENTS_MAX {
+                    return Err(TextError { line: number, what: size::said() });
+                }
             }
             other => {
                 let what = format!("`{other}` is not known: write body, at, segment or polygon");
@@ -94,8 +99,20 @@ fn number(word: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("`{word}` is not a number"))
 }
 
+/// A number that is a coordinate.
+fn coordinate(word: &str) -> Result<f64, String> {
+    let value = number(word)?;
+    if !is_place(&[value]) {
+        return Err(format!(
+            "`{word}` is larger than {COORDINATE_MAX_M:e} m: give places nearer to the origin"
+        ));
+    }
+    Ok(value)
+}
+
 fn key(words: &[&str]) -> Result<Key, String> {
-    let numbers = words.iter().map(|word| number(word)).collect::<Result<Vec<f64>, String>>()?;
+    let numbers =
+        words.iter().map(|word| coordinate(word)).collect::<Result<Vec<f64>, String>>()?;
     let (time_s, x, y, degrees) = match numbers[..] {
         [time_s, x, y] => (time_s, x, y, 0.0),
         [time_s, x, y, degrees] => (time_s, x, y, degrees),
@@ -111,7 +128,8 @@ fn shape(scene: &mut FlatScene, kind: &str, words: &[&str]) -> Result<(), String
     let is_number = |word: &&&str| word.parse::<f64>().is_ok();
     let count = words.iter().take_while(is_number).count();
     let (corners, options) = words.split_at(count);
-    let numbers = corners.iter().map(|word| number(word)).collect::<Result<Vec<f64>, String>>()?;
+    let numbers =
+        corners.iter().map(|word| coordinate(word)).collect::<Result<Vec<f64>, String>>()?;
     let material = material(options)?;
     let points: Vec<DVec2> = numbers.chunks(2).map(|p| DVec2::new(p[0], p[p.len() - 1])).collect();
     let enough = count % 2 == 0
@@ -184,6 +202,17 @@ mod tests {
     }
 
     #[test]
+    fn what_is_too_large_is_refused_at_the_line_that_is_one_too_many() {
+        let lines = |count: usize| -> String {
+            (0..count).map(|k| format!("segment s{k} {k} 0 {k}.9 0\n")).collect()
+        };
+        assert!(parse(&lines(SEGMENTS_MAX)).is_ok());
+        let error = parse(&lines(SEGMENTS_MAX + 9)).unwrap_err();
+        assert_eq!(error.line, SEGMENTS_MAX + 1);
+        assert!(error.what.contains("more than 8192 segments"), "{error}");
+    }
+
+    #[test]
     fn errors_name_the_line() {
         for (text, line, what) in [
             ("segment floor 0 0 2 0\nsegment wall 0 0 2", 2, "needs x0 y0 x1 y1"),
@@ -198,11 +227,11 @@ mod tests {
             ("body b\nbody c\nsegment p 0 0 1 0", 3, "has no segments"),
             ("polygon p 0 0 1 0", 1, "three corners"),
             ("# nothing", 1, "no segments"),
-            ("segment p 0 0 1e300 0", 1, "larger than 1e12"),
+            ("segment p 0 0 1e300 0", 1, "`1e300` is larger than 1e12 m"),
             ("segment p 0 0 nan 0", 1, "`nan` is not a number"),
             ("segment p 1e6 0 1e6 1e-10", 1, "no length"),
             ("segment p 0 0 1 0 emit 1e38", 1, "between 0 and 1e30"),
-            ("body b\nat 0 1e300 0\nsegment p 0 0 1 0", 1, "larger than 1e12"),
+            ("body b\nat 0 1e300 0\nsegment p 0 0 1 0", 2, "`1e300` is larger than 1e12 m"),
         ] {
             let error = parse(text).unwrap_err();
             assert_eq!(error.line, line, "{text}: {error}");

@@ -8,7 +8,8 @@ use std::path::Path;
 use super::streams::Streams;
 use super::{base64, json};
 use crate::ImportOptions;
-use crate::folder::{Folder, read_scene, unless_fits};
+use crate::folder::{Folder, read_scene};
+use crate::regular::unless_fits;
 use relume_core::scene::SceneError;
 
 /// Extensions that may be required: handled, or without effect on diffuse light.
@@ -211,6 +212,15 @@ impl Document {
 
     /// The path that a URI names, if it may be opened.
     pub(super) fn inside(&self, uri: &str, owner: &str) -> Result<String, SceneError> {
+        if let Some(rest) = after_scheme(uri, "file") {
+            let name = percent_decoded(local_path(rest));
+            if !self.folder.allow_outside {
+                let what =
+                    format!("{owner} is an absolute path, outside the folder of the file ({uri})");
+                return Err(self.folder.outside(what));
+            }
+            return Ok(name);
+        }
         if uri.contains("://") {
             return Err(format_error(
                 &self.file,
@@ -295,8 +305,21 @@ fn parse(file: &str, text: &[u8]) -> Result<json::Root, SceneError> {
             "export the scene as glTF 2.0",
         ));
     }
+    if let Some((list, count)) = too_long(&value) {
+        return fail(format!("its list of {list} has {count} entries, more than {LIST_MAX}"));
+    }
     serde_path_to_error::deserialize(value)
         .or_else(|e| fail(format!("at {}: {}", e.path(), in_json_words(&e.inner().to_string()))))
+}
+
+/// Entries of a list of a file at most: each takes up to a few hundred bytes, and as little as three in the file.
+const LIST_MAX: usize = 1 << 19;
+
+/// The first list of a document, among those that it is made of, that is too long.
+fn too_long(document: &serde_json::Value) -> Option<(&str, usize)> {
+    let lists = document.as_object()?.iter();
+    let lengths = lists.filter_map(|(name, list)| Some((name.as_str(), list.as_array()?.len())));
+    lengths.into_iter().find(|(_, length)| *length > LIST_MAX)
 }
 
 /// The version of a glTF 1 file: as it says, or 1.0 where its nodes are listed by name.
@@ -319,6 +342,20 @@ fn in_json_words(message: &str) -> String {
         ("struct ", "an object like "),
     ]);
     words.fold(message.to_owned(), |m, (from, to)| m.replace(from, to))
+}
+
+/// What follows the scheme of a URI, if it has this one.
+fn after_scheme<'a>(uri: &'a str, scheme: &str) -> Option<&'a str> {
+    let (of_uri, rest) = uri.split_once(':')?;
+    of_uri.eq_ignore_ascii_case(scheme).then_some(rest)
+}
+
+/// The path of a URI of this machine: what follows the host, of which `file:///a`, `file://localhost/a` and `file:/a` have none.
+fn local_path(rest: &str) -> &str {
+    match rest.strip_prefix("//") {
+        Some(with_host) => with_host.find('/').map_or(with_host, |at| &with_host[at..]),
+        None => rest,
+    }
 }
 
 /// `%20` and its like, undone.
@@ -345,6 +382,17 @@ fn percent_decoded(uri: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn files_of_this_machine_are_told_from_the_network() {
+        for uri in ["file:///a/b%20c", "FILE://localhost/a/b%20c", "file:/a/b%20c"] {
+            let rest = after_scheme(uri, "file").unwrap();
+            assert_eq!(percent_decoded(local_path(rest)), "/a/b c", "{uri}");
+        }
+        for uri in ["http://a/b", "files/a.bin", "file", "a/file:b"] {
+            assert_eq!(after_scheme(uri, "file"), None, "{uri}");
+        }
+    }
 
     #[test]
     fn percent_signs_are_undone_where_they_mean_something() {

@@ -100,18 +100,13 @@ pub(super) fn encoded(
         return Err(document.out_of_range("image", index));
     };
     let bytes = match (&image.uri, image.buffer_view) {
-        (Some(uri), _) => {
-            if !uri.starts_with("data:") && !uri.contains("://") {
-                document.inside(uri, &owner)?;
-            }
-            document.uri(uri, &owner, IMAGE_MAX)
-        }
+        (Some(uri), _) => document.uri(uri, &owner, IMAGE_MAX),
         (None, Some(view)) => document.view(view).map(|(bytes, _)| bytes.to_vec()),
         (None, None) => return Ok(Err(format!("{owner} names neither a file nor a buffer view"))),
     };
     match bytes {
         Ok(bytes) => Ok(Ok(bytes)),
-        Err(error @ SceneError::TooLarge { .. }) => Err(error),
+        Err(error @ (SceneError::TooLarge { .. } | SceneError::Outside { .. })) => Err(error),
         Err(error) => Ok(Err(error.to_string())),
     }
 }

@@ -10,6 +10,8 @@ use glam::DVec3;
 use super::document::Document;
 use super::look::{Looks, Triangles};
 use super::{json, note};
+use crate::range::out_of_range;
+use relume_core::scene::limits::is_place;
 use relume_core::scene::{Note, Print, SceneError, Severity, TintId};
 
 /// A primitive: its polygons, counter-clockwise from the front, with their tints, and the material's index.
@@ -232,13 +234,13 @@ fn positions(
     Ok(points)
 }
 
-/// An error if a vertex is nowhere.
+/// An error if a vertex is nowhere, or further out than anything can be computed with.
 pub(super) fn check_places(points: &[DVec3], mesh: &str) -> Result<(), SceneError> {
-    match points.iter().enumerate().find(|(_, p)| !p.is_finite()) {
+    match points.iter().enumerate().find(|(_, p)| !is_place(&p.to_array())) {
         None => Ok(()),
         Some((i, p)) => Err(SceneError::Geometry {
             subject: format!("mesh `{mesh}`"),
-            what: format!("vertex {i} is at ({}, {}, {}), which is no place", p.x, p.y, p.z),
+            what: format!("vertex {i} is at {}", out_of_range(*p)),
             remedy: "repair the mesh and export it again".into(),
         }),
     }

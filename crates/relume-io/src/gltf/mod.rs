@@ -10,6 +10,7 @@ mod animation;
 mod base64;
 mod clock;
 mod component;
+mod counts;
 mod document;
 mod draco;
 mod environment;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DQuat, DVec3};
 
 use super::animation::{GlowKeys, Moves, played};
+use super::counts::{self, Uses};
 use super::document::Document;
 use super::look::Looks;
 use super::mesh::{Polygons, polygons};
@@ -21,11 +22,12 @@ const SAME_SCALE: f64 = 1e-6;
 /// Everything of the file's active scene.
 pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draft, SceneError> {
     let mut notes = Vec::new();
+    let roots = roots(document, &mut notes)?;
+    let uses = counts::check(document, &roots)?;
     let environment = environment::of_scene(document, &mut notes)?;
     let played = played(document, options.animation.as_deref(), &mut notes)?;
     let (materials, paints) =
         material::materials(document, &played.materials, &mut notes).into_iter().unzip();
-    let roots = roots(document, &mut notes)?;
     let mut tree = Tree {
         document,
         moves: played.moves,
@@ -35,6 +37,8 @@ pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draf
         places: document.root.nodes.iter().map(|_| None).collect(),
         spans: options.rebuild.as_ref().map_or(Vec::new(), |rebuild| rebuild.spans(played.end_s)),
         skinned: Vec::new(),
+        uses,
+        promised: 0,
         polygons: 0,
         without_material: 0,
         growths: BTreeMap::new(),
@@ -103,6 +107,9 @@ pub(super) struct Tree<'a> {
     pub(super) spans: Vec<Span>,
     /// Nodes with a skin, which wait for their joints.
     pub(super) skinned: Vec<Skinned>,
+    uses: Uses,
+    /// Polygons of the meshes read so far, as often as those are shown.
+    promised: u64,
     /// Polygons in the draft so far.
     polygons: usize,
     without_material: usize,
@@ -315,10 +322,34 @@ impl Tree<'_> {
             None => {
                 let with = (self.document, &mut self.looks);
                 let read = polygons(with, mesh, weights, &mut self.draft.notes)?;
+                self.promise(me, mesh, &read)?;
                 self.meshes.entry(key).or_insert(read).clone()
             }
         };
         self.put(me, primitives)
+    }
+
+    /// An error if a mesh that was read makes too many polygons, as often as it is shown; before it is.
+    fn promise(&mut self, me: usize, mesh: usize, read: &[Polygons]) -> Result<(), SceneError> {
+        // In another shape it was counted.
+        if self.meshes.keys().any(|known| known.0 == mesh) {
+            return Ok(());
+        }
+        let polygons: usize = read.iter().map(|primitive| primitive.loops.len()).sum();
+        let more = self.uses.of(mesh).saturating_mul(polygons as u64);
+        self.promised = self.promised.saturating_add(more);
+        match self.promised > POLYGONS_MAX as u64 {
+            true => Err(self.too_many_polygons(me)),
+            false => Ok(()),
+        }
+    }
+
+    fn too_many_polygons(&self, me: usize) -> SceneError {
+        SceneError::Geometry {
+            subject: format!("node `{}`", self.draft.nodes[me].name),
+            what: format!("with it the scene has more than {POLYGONS_MAX} polygons"),
+            remedy: "leave out objects or instances, or simplify their meshes".into(),
+        }
     }
 
     /// Hangs polygons on a node of the draft.
@@ -333,11 +364,7 @@ impl Tree<'_> {
             self.without_material += usize::from(primitive.material.is_none());
             self.polygons += primitive.loops.len();
             if self.polygons > POLYGONS_MAX {
-                return Err(SceneError::Geometry {
-                    subject: format!("node `{}`", self.draft.nodes[me].name),
-                    what: format!("with it the scene has more than {POLYGONS_MAX} polygons"),
-                    remedy: "leave out objects or instances, or simplify their meshes".into(),
-                });
+                return Err(self.too_many_polygons(me));
             }
             let Polygons { loops: polygons, tints, prints, .. } = primitive;
             let material = MaterialId(material as u32);

@@ -9,9 +9,11 @@ use glam::{DQuat, DVec2, DVec3};
 
 use crate::ImportOptions;
 use crate::folder::{Folder, read_scene};
+use crate::range::{first_out_of_range, out_of_range, said};
 use crate::surface::Tints;
 use paint::Paint;
 use relume_core::scene::draft::{Draft, DraftNode};
+use relume_core::scene::limits::is_place;
 use relume_core::scene::{Material, MaterialId, Note, Scene, SceneError, Severity};
 
 mod mtl;
@@ -101,6 +103,19 @@ pub(super) fn import(
         max_memory_bytes: options.max_memory_bytes,
     };
     let (bytes, stem) = read_scene(path, options.max_memory_bytes)?;
+    let out_of_range = match format {
+        Format::Obj => first_out_of_range(&bytes, "v"),
+        Format::Stl => first_out_of_range(&bytes, "vertex"),
+        Format::Ply => ply::vertex_out_of_range(&bytes),
+    };
+    if let Some(found) = out_of_range {
+        return Err(SceneError::Mesh {
+            file: folder.file,
+            format: format.name(),
+            what: said(found),
+            remedy: "repair the mesh, or scale it to metres, and export it again".into(),
+        });
+    }
     let contents = match format {
         Format::Obj => obj::read(&bytes, &stem, &folder),
         Format::Stl => stl::read(bytes, &stem, &folder),
@@ -186,11 +201,11 @@ fn grey() -> Material {
 }
 
 fn check_places(points: &[DVec3], object: &str) -> Result<(), SceneError> {
-    match points.iter().find(|p| !p.is_finite()) {
+    match points.iter().find(|p| !is_place(&p.to_array())) {
         None => Ok(()),
         Some(p) => Err(SceneError::Geometry {
             subject: format!("object `{object}`"),
-            what: format!("a vertex is at ({}, {}, {}), which is no place", p.x, p.y, p.z),
+            what: format!("a vertex is at {}", out_of_range(*p)),
             remedy: "repair the mesh and export it again".into(),
         }),
     }

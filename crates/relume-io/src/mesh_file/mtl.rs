@@ -10,7 +10,8 @@ use image::{Rgba, RgbaImage};
 
 use super::paint::{Paint, Sheet};
 use super::{REFLECTANCE, warning};
-use crate::folder::{Folder, unless_fits};
+use crate::folder::Folder;
+use crate::regular::unless_fits;
 use crate::surface::image_file::{IMAGE_MAX, texels};
 use relume_core::scene::coverage::Wrap;
 use relume_core::scene::pyramid::Pyramid;
@@ -268,7 +269,8 @@ impl<'a> Textures<'a> {
             }
             Err(error @ SceneError::TooLarge { .. }) => return Err(error),
             Err(SceneError::Read { source, .. }) => Err(source.to_string()),
-            Err(_) => Err("it is outside the folder: --allow-outside reads it".to_owned()),
+            Err(SceneError::Outside { what, remedy, .. }) => Err(format!("{what}; {remedy}")),
+            Err(error) => Err(error.to_string()),
         };
         self.images.insert(name.to_owned(), image.clone());
         Ok(image)

@@ -9,6 +9,7 @@ use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 use super::paint::linear;
 use super::{CORNERS_MAX, Contents, Format, Object, Part, damaged, info, polygon};
 use crate::folder::Folder;
+use crate::range::first_row_out_of_range;
 use relume_core::scene::SceneError;
 
 /// A vertex: its place and its colour.
@@ -90,6 +91,46 @@ impl PropertyAccess for Other {
     fn new() -> Self {
         Other
     }
+}
+
+/// The first coordinate of a vertex of a text that is out of range: its line and how it is written. `None` too where the header is
+/// none that can be followed line by line.
+pub(super) fn vertex_out_of_range(bytes: &[u8]) -> Option<(usize, &str)> {
+    // Far longer than any header.
+    const HEADER_LINES: usize = 1_000;
+    let mut is_text = false;
+    let mut rows = 0;
+    // Of the element of vertices: where its rows begin, how many there are, and its properties.
+    let mut vertices: Option<(usize, usize, Vec<&str>)> = None;
+    let mut in_vertices = false;
+    for (number, line) in bytes.split(|&b| b == b'\n').enumerate().take(HEADER_LINES) {
+        let words: Vec<&str> = std::str::from_utf8(line).ok()?.split_ascii_whitespace().collect();
+        match words[..] {
+            ["format", format, ..] => is_text = format == "ascii",
+            ["element", name, count] => {
+                let count: usize = count.parse().ok()?;
+                in_vertices = name == "vertex";
+                if in_vertices {
+                    vertices = Some((rows, count, Vec::new()));
+                }
+                rows = usize::checked_add(rows, count)?;
+            }
+            ["property", "list", ..] if in_vertices => return None,
+            ["property", _, name] if in_vertices => {
+                if let Some((_, _, names)) = &mut vertices {
+                    names.push(name);
+                }
+            }
+            ["end_header"] => {
+                let (before, count, names) = vertices.filter(|_| is_text)?;
+                let columns: Vec<usize> =
+                    (0..names.len()).filter(|&k| matches!(names[k], "x" | "y" | "z")).collect();
+                return first_row_out_of_range(bytes, (number + 1 + before, count), &columns);
+            }
+            _ => {}
+        }
+    }
+    None
 }
 
 pub(super) fn read(bytes: &[u8], stem: &str, folder: &Folder) -> Result<Contents, SceneError> {

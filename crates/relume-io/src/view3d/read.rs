@@ -2,6 +2,7 @@
 //! own planes need.
 
 use glam::{DVec2, DVec3};
+use relume_core::scene::limits::{COORDINATE_MAX_M, is_place};
 
 /// What is wrong with a line (0: with the whole), and what to do about it.
 #[derive(Debug, PartialEq)]
@@ -85,7 +86,7 @@ impl<'a> Words<'a> {
                 return wrong(after, format!("{} numbers are missing", count - out.len()), SHAPES);
             };
             for word in words {
-                out.push(number(line, word)?);
+                out.push(coordinate(line, word)?);
             }
         }
         if out.len() > count {
@@ -114,6 +115,16 @@ fn number(line: usize, word: &str) -> Result<f64, Wrong> {
         Ok(value) if value.is_finite() => Ok(value),
         _ => wrong(line, format!("`{word}` is not a number"), "give finite decimal numbers"),
     }
+}
+
+/// A number that is, or leads to, a coordinate.
+fn coordinate(line: usize, word: &str) -> Result<f64, Wrong> {
+    let value = number(line, word)?;
+    if !is_place(&[value]) {
+        let what = format!("`{word}` is larger than {COORDINATE_MAX_M:e} m");
+        return wrong(line, what, "give places in metres, nearer to the origin");
+    }
+    Ok(value)
 }
 
 fn whole(line: usize, word: Option<&&str>, what: &str, remedy: &str) -> Result<usize, Wrong> {
@@ -253,7 +264,7 @@ fn vertex(line: usize, words: &[&str], before: usize) -> Result<DVec3, Wrong> {
         .get(1..4)
         .and_then(|w| <[&str; 3]>::try_from(w).ok())
         .map_or_else(|| wrong(line, "a vertex has three coordinates".into(), VERTEX), Ok)?;
-    Ok(DVec3::new(number(line, x)?, number(line, y)?, number(line, z)?))
+    Ok(DVec3::new(coordinate(line, x)?, coordinate(line, y)?, coordinate(line, z)?))
 }
 
 /// A surface by vertices, and the numbers of these.

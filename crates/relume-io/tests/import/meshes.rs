@@ -369,7 +369,11 @@ fn what_is_wrong_with_them_is_said() {
     for (name, content, words) in [
         ("a.obj", b"v 1 2 x\n".to_vec(), "is not a valid OBJ file"),
         ("a.obj", b"v 0 0 0\nf 1 2 3\n".to_vec(), "is not a valid OBJ file"),
-        ("a.obj", b"v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n".to_vec(), "no place"),
+        (
+            "a.obj",
+            b"v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n".to_vec(),
+            "line 3: the coordinate `nan`",
+        ),
         ("a.obj", b"v 0 0 0\n".to_vec(), "no polygon"),
         ("a.obj", Vec::new(), "no polygon"),
         ("a.stl", Vec::new(), "is not a valid STL file"),

@@ -5,13 +5,13 @@
 //! one polygon after another, and nothing is measured.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
+use super::world::{World, spread};
 use super::{listed, note};
 use crate::geometry::{Aabb, Pose};
-use crate::scene::{BodyId, LightKind, NodeId, Note, PatchId, Scene, Severity, SurfaceId};
+use crate::scene::{LightKind, NodeId, Note, PatchId, Scene, Severity, SurfaceId};
 
 /// Rays from a point, a spot or a directional light.
 const RAYS: u32 = 256;
@@ -28,8 +28,6 @@ const INSTANTS: u32 = 8;
 const RIGHT_BEFORE: f64 = 0.05;
 /// What is closed around a light is its shade, and not a room, below this share of the scene's diagonal.
 const SHADE: f64 = 0.25;
-/// Share of the scene's diagonal that rays skip: what lies in the light's own plane.
-const SKIPPED: f64 = 1e-7;
 
 /// Adds the lights that light nothing at any time of the animation.
 pub(super) fn blind(scene: &Scene, notes: &mut Vec<Note>) {
@@ -163,68 +161,7 @@ impl Stopped {
     }
 }
 
-/// A polygon in the world; of two twins the first.
-struct Face {
-    patch: PatchId,
-    surface: SurfaceId,
-    two_sided: bool,
-    origin: DVec3,
-    normal: DVec3,
-    axes: [DVec3; 2],
-}
-
-/// What is present at one instant.
-struct World<'a> {
-    scene: &'a Scene,
-    time_s: f64,
-    faces: Vec<Face>,
-    bounds: Aabb,
-    /// Bounds of each object.
-    objects: BTreeMap<&'a str, Aabb>,
-}
-
-struct Hit<'w> {
-    face: &'w Face,
-    distance_m: f64,
-    /// Whether the side that is met reflects.
-    front: bool,
-    /// Normal of that side.
-    normal: DVec3,
-}
-
-impl<'a> World<'a> {
-    fn of(scene: &'a Scene, time_s: f64) -> World<'a> {
-        let mut world = World {
-            scene,
-            time_s,
-            faces: Vec::new(),
-            bounds: Aabb::EMPTY,
-            objects: BTreeMap::new(),
-        };
-        for body in (0..scene.bodies.len() as u32).map(BodyId) {
-            let Some(pose) = scene.pose(body, time_s) else { continue };
-            for (patch, p) in scene.patches_of(body) {
-                if p.twin.is_some_and(|twin| twin < patch) {
-                    continue;
-                }
-                let corners = Aabb::of(p.corners_in_body().map(|c| pose.point(c)));
-                let object = scene.surfaces[p.surface.0 as usize].object.as_str();
-                let of_object = world.objects.entry(object).or_insert(Aabb::EMPTY);
-                *of_object = of_object.union(corners);
-                world.bounds = world.bounds.union(corners);
-                world.faces.push(Face {
-                    patch,
-                    surface: p.surface,
-                    two_sided: p.twin.is_some(),
-                    origin: pose.point(p.frame.origin),
-                    normal: pose.direction(p.frame.normal),
-                    axes: [pose.direction(p.frame.u), pose.direction(p.frame.v)],
-                });
-            }
-        }
-        world
-    }
-
+impl World<'_> {
     fn try_light(&self, source: &Source, left: &mut usize) -> Tried {
         let mut stopped = Stopped { gap_m: f64::INFINITY, ..Stopped::default() };
         let mut cast = 0_usize;
@@ -315,7 +252,8 @@ impl<'a> World<'a> {
 
     /// Whether a ray meets a front that the light is meant for; if not, notes what it met.
     fn reaches(&self, ray: &Ray, source: &Source, stopped: &mut Stopped) -> bool {
-        let Some(hit) = self.first(ray) else { return false };
+        let own = ray.lamp.as_ref().map_or([None; 2], |lamp| lamp.patches);
+        let Some(hit) = self.first(ray.origin, ray.direction, own) else { return false };
         let surface = hit.face.surface;
         if !hit.front {
             stopped.backs.insert(surface);
@@ -373,30 +311,6 @@ impl<'a> World<'a> {
                 .iter()
                 .any(|(&name, b)| name != object && name != own && inside(b.centre()))
     }
-
-    /// The first polygon on a ray's way.
-    fn first(&self, ray: &Ray) -> Option<Hit<'_>> {
-        let skipped = SKIPPED * self.bounds.diagonal();
-        let mut first: Option<Hit> = None;
-        for face in &self.faces {
-            let against = ray.direction.dot(face.normal);
-            let distance_m = (face.origin - ray.origin).dot(face.normal) / against;
-            let nearest = first.as_ref().map_or(f64::INFINITY, |hit| hit.distance_m);
-            if !(distance_m > skipped && distance_m < nearest)
-                || ray.lamp.as_ref().is_some_and(|l| l.patches.contains(&Some(face.patch)))
-            {
-                continue;
-            }
-            let at = ray.origin + ray.direction * distance_m - face.origin;
-            let corners = &self.scene.patches[face.patch.0 as usize].corners;
-            if within(corners, DVec2::new(at.dot(face.axes[0]), at.dot(face.axes[1]))) {
-                let front = against < 0.0 || face.two_sided;
-                let normal = if against < 0.0 { face.normal } else { -face.normal };
-                first = Some(Hit { face, distance_m, front, normal });
-            }
-        }
-        first
-    }
 }
 
 struct Ray {
@@ -412,21 +326,4 @@ struct OfLamp {
     normal: DVec3,
     /// The shorter of its sides, roughly, metres.
     width_m: f64,
-}
-
-/// Whether a point lies in a convex polygon or on its outline.
-fn within(corners: &[DVec2], p: DVec2) -> bool {
-    (0..corners.len()).all(|k| {
-        let (from, to) = (corners[k], corners[(k + 1) % corners.len()]);
-        (to - from).perp_dot(p - from) >= 0.0
-    })
-}
-
-/// The k-th of points that fill the unit disc evenly, whatever their number: share of its area within,
-/// and turn in radians. By the golden section and van der Corput's sequence.
-fn spread(k: u32) -> [f64; 2] {
-    const GOLDEN: f64 = 0.618_033_988_749_894_8;
-    let share = (f64::from(k.reverse_bits()) + 0.5) / 4_294_967_296.0;
-    let turns = (f64::from(k) * GOLDEN).fract();
-    [share, turns * TAU + PI / 7.0]
 }

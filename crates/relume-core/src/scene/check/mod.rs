@@ -9,7 +9,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::{Material, MaterialId, Note, Patch, Scene, Severity};
 
 mod blind;
+mod outward;
 mod shape;
+mod world;
 
 /// Reflectances from here on are reported: real paints stay below.
 const REFLECTANCE_HIGH: f64 = 0.95;
@@ -27,7 +29,7 @@ const SUN_HIGH: f64 = 1.4e4;
 /// | `nothing-emits` | error | no emitting surface and no light |
 /// | `open-enclosure` | warning, info | gaps in what encloses the scene; nothing encloses it |
 /// | `open-object` | info | an object within it that is not closed |
-/// | `flipped-normals` | warning | neighbours that face opposite ways; an object that faces against all around it; closed objects inside out |
+/// | `flipped-normals` | warning | neighbours that face opposite ways; an object that faces against all around it, a wall that faces out of its room; closed objects inside out |
 /// | `duplicate` | warning | polygons that coincide |
 /// | `overlap` | warning | polygons that face the same way and overlap in one plane |
 /// | `touching` | info | double-sided polygons back to back |
@@ -47,6 +49,7 @@ pub fn check(scene: &Scene) -> Vec<Note> {
     reflectance(scene, &mut notes);
     units(scene, &mut notes);
     shape::shape(scene, &mut notes);
+    outward::outward(scene, &mut notes);
     blind::blind(scene, &mut notes);
     notes.sort_by_key(|n| std::cmp::Reverse(n.severity));
     notes

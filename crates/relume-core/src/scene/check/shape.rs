@@ -433,7 +433,8 @@ fn duplicates(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
     }
     for (object, (count, with)) in doubled {
         let message = format!(
-            "{count} polygons coincide with polygons of {}, so light is exchanged twice; delete one of each",
+            "{count} polygons coincide with polygons of {} and face the same way: the first of each shows, the others count as \
+             covered, so that no light is exchanged twice; delete one of each",
             listed(&with)
         );
         notes.push(note(Severity::Warning, "duplicate", object, count, message));

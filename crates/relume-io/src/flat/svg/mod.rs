@@ -14,8 +14,10 @@ mod transform;
 use glam::{DAffine2, DMat2, DVec2};
 use roxmltree::{Document, Node, ParsingOptions};
 
+use super::size::{self, SEGMENTS_MAX};
 use super::text::channels;
 use relume_core::flat::{FlatScene, Material, Motion, SceneError, Segment};
+use relume_core::scene::limits::{COORDINATE_MAX_M, is_place};
 
 /// What is wrong with an SVG, where, and what to do about it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -55,7 +57,7 @@ pub fn parse_svg(text: &str) -> Result<FlatScene, SvgError> {
         ));
     }
     let metres = metres(root).map_err(|fault| at(root, fault))?;
-    let mut reader = Reader { bodies: Vec::new(), loose: None, shapes: 0, depth: 0 };
+    let mut reader = Reader { bodies: Vec::new(), loose: None, shapes: 0, segments: 0, depth: 0 };
     let place = Place { world: metres, body: None, moves: false, ink: Ink::default() };
     reader.children(root, &place)?;
     reader.scene().map_err(|error| {
@@ -141,6 +143,8 @@ struct Reader {
     loose: Option<usize>,
     /// Shapes so far.
     shapes: usize,
+    /// Segments so far.
+    segments: usize,
     /// Groups that are open.
     depth: usize,
 }
@@ -243,6 +247,13 @@ impl Reader {
         for chain in chains {
             let mut points: Vec<DVec2> =
                 chain.points.iter().map(|&p| place.world.transform_point2(p)).collect();
+            if let Some(far) = points.iter().find(|p| !is_place(&p.to_array())) {
+                let what = format!(
+                    "it has a point at ({:e}, {:e}) m, further out than {COORDINATE_MAX_M:e} m",
+                    far.x, far.y
+                );
+                return fault(what, "draw it nearer to the origin, or say data-units-per-metre");
+            }
             if chain.closed && points.len() > 2 && points.first() == points.last() {
                 points.pop();
             }
@@ -250,6 +261,10 @@ impl Reader {
                 turn(&mut points, chain.closed, front)?;
             }
             let count = if chain.closed { points.len() } else { points.len().saturating_sub(1) };
+            self.segments += count;
+            if self.segments > SEGMENTS_MAX {
+                return fault(size::said(), "draw less, or with fewer corners");
+            }
             for k in 0..count {
                 let local = Segment { start: points[k], end: points[(k + 1) % points.len()] };
                 walls.push((local, place.ink.material));

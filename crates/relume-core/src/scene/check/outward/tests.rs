@@ -1,0 +1,243 @@
+//! Rooms and what is no room, drawn at random from a seed.
+
+use glam::{DQuat, DVec3};
+
+use crate::scene::builder::cuboid_sides;
+use crate::scene::{MaterialId, Note, SceneBuilder, check};
+
+/// Numbers from a seed (SplitMix64).
+struct Draw(u64);
+
+impl Draw {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.next() % n as u64) as usize
+    }
+
+    fn coin(&mut self) -> bool {
+        self.next().is_multiple_of(2)
+    }
+}
+
+/// A scene under construction, turned about the vertical and moved.
+struct Stage {
+    b: SceneBuilder,
+    turn: DQuat,
+    at: DVec3,
+    one_sided: MaterialId,
+    two_sided: MaterialId,
+    glow: MaterialId,
+}
+
+impl Stage {
+    fn new(draw: &mut Draw) -> Stage {
+        let mut b = SceneBuilder::new("s");
+        let one_sided = b.material("one", [0.5; 3], [0.0; 3]);
+        let two_sided = b.double_sided_material("two", [0.5; 3], [0.0; 3]);
+        let glow = b.material("glow", [0.0; 3], [10.0; 3]);
+        let turn = DQuat::from_rotation_y(draw.within(0.0, 6.3));
+        let at = DVec3::new(draw.within(-9.0, 9.0), draw.within(-1.0, 4.0), draw.within(-9.0, 9.0));
+        Stage { b, turn, at, one_sided, two_sided, glow }
+    }
+
+    /// A polygon that is an object; counter-clockwise from the front.
+    fn panel(&mut self, name: &str, material: MaterialId, corners: &[DVec3]) {
+        let node = self.b.node(name, None, self.at, self.turn);
+        self.b.polygon(node, name, material, corners);
+    }
+
+    /// A box that is an object, its outside seen.
+    fn block(&mut self, name: &str, low: DVec3, high: DVec3) {
+        let node = self.b.node(name, None, self.at, self.turn);
+        let material = self.one_sided;
+        self.b.cuboid(node, name, material, low, high);
+    }
+
+    /// A lamp that faces down.
+    fn lamp(&mut self, at: DVec3, size: f64) {
+        let c = |x: f64, z: f64| at + DVec3::new(x, 0.0, z) * size;
+        let glow = self.glow;
+        self.panel("lamp", glow, &[c(0., 0.), c(1., 0.), c(1., 1.), c(0., 1.)]);
+    }
+
+    fn flipped(self) -> Vec<String> {
+        let scene = self.b.build().unwrap();
+        let notes: Vec<Note> = check(&scene);
+        let flipped = notes.into_iter().filter(|note| note.code == "flipped-normals");
+        flipped.map(|note| note.subject).collect()
+    }
+}
+
+/// Sides of a box, facing inwards, with their names; without its top if that is open. Each ends so far before the others.
+fn sides(low: DVec3, high: DVec3, gap: f64, open: bool) -> Vec<(&'static str, Vec<DVec3>)> {
+    let all = cuboid_sides(low, high);
+    let mut found = Vec::new();
+    for side in all {
+        let normal = (side[1] - side[0]).cross(side[2] - side[0]).normalize();
+        let middle = side.iter().sum::<DVec3>() / 4.0;
+        let name = match normal.to_array() {
+            [x, ..] if x > 0.5 => "east",
+            [x, ..] if x < -0.5 => "west",
+            [_, y, _] if y > 0.5 => "ceiling",
+            [_, y, _] if y < -0.5 => "floor",
+            [.., z] if z > 0.5 => "south",
+            _ => "north",
+        };
+        if open && name == "ceiling" {
+            continue;
+        }
+        let shrunk =
+            |c: &DVec3| *c - (*c - middle).signum() * (*c - middle).abs().min(DVec3::splat(gap));
+        let mut corners: Vec<DVec3> = side.iter().map(shrunk).collect();
+        corners.reverse();
+        found.push((name, corners));
+    }
+    found
+}
+
+/// A room of separate objects and what stands in it; a wall of it may face outwards.
+fn room(seed: u64, flip: bool) -> (Vec<String>, String) {
+    let mut draw = Draw(seed);
+    let mut stage = Stage::new(&mut draw);
+    let size = DVec3::new(draw.within(1.5, 12.0), draw.within(2.0, 4.0), draw.within(1.5, 12.0));
+    let gap = [0.0, 0.005, 0.001][draw.below(3)];
+    let (open, double) = (draw.coin(), draw.coin());
+    let sides = sides(DVec3::ZERO, size, gap, open);
+    let which = draw.below(sides.len());
+    for (k, (name, corners)) in sides.iter().enumerate() {
+        let mut corners = corners.clone();
+        if flip && k == which {
+            corners.reverse();
+        }
+        let material = if double && k != which { stage.two_sided } else { stage.one_sided };
+        stage.panel(name, material, &corners);
+    }
+    let lamp = DVec3::new(draw.within(0.2, 0.7), draw.within(0.5, 0.9), draw.within(0.2, 0.7));
+    stage.lamp(size * lamp, draw.within(0.1, 0.2));
+    for k in 0..draw.below(5) {
+        let low = size * DVec3::new(draw.within(0.02, 0.7), 0.0, draw.within(0.02, 0.7));
+        let extent =
+            DVec3::new(draw.within(0.2, 0.28), draw.within(0.1, 0.4), draw.within(0.2, 0.28));
+        let high = (low + size * extent).min(size * 0.98);
+        stage.block(&format!("crate {k}"), low, high);
+    }
+    let wanted = if flip { sides[which].0.to_owned() } else { String::new() };
+    (stage.flipped(), wanted)
+}
+
+#[test]
+fn a_wall_that_faces_out_of_its_room_is_named_in_every_kind_of_room() {
+    for seed in 0..200 {
+        let (found, wanted) = room(seed, true);
+        assert_eq!(found, [wanted], "seed {seed}");
+    }
+}
+
+#[test]
+fn sound_rooms_are_passed() {
+    for seed in 0..200 {
+        assert_eq!(room(seed, false).0, [""; 0], "seed {seed}");
+    }
+}
+
+#[test]
+fn a_floor_that_is_wider_than_its_room_hides_no_wall_that_faces_outwards() {
+    for seed in 0..100 {
+        let mut draw = Draw(seed);
+        let mut stage = Stage::new(&mut draw);
+        let size = DVec3::new(draw.within(2.0, 8.0), draw.within(2.0, 4.0), draw.within(2.0, 8.0));
+        let wide = draw.within(1.0, 6.0);
+        let walls = sides(DVec3::ZERO, size, 0.0, true);
+        let which = draw.below(4);
+        let mut wanted = "";
+        let upright = walls.iter().filter(|wall| wall.0 != "floor").enumerate();
+        let one_sided = stage.one_sided;
+        for (k, (name, corners)) in upright {
+            let mut corners = corners.clone();
+            if k == which {
+                corners.reverse();
+                wanted = *name;
+            }
+            stage.panel(name, one_sided, &corners);
+        }
+        ground(&mut stage, DVec3::ZERO - wide, size + wide);
+        stage.lamp(size * 0.45, 0.2);
+        assert_eq!(stage.flipped(), [wanted], "seed {seed}");
+    }
+}
+
+/// A floor of height 0 that faces up.
+fn ground(stage: &mut Stage, low: DVec3, high: DVec3) {
+    let c = |x: f64, z: f64| DVec3::new(x, 0.0, z);
+    let corners = [c(low.x, low.z), c(low.x, high.z), c(high.x, high.z), c(high.x, low.z)];
+    let material = stage.one_sided;
+    stage.panel("ground", material, &corners);
+}
+
+/// What stands about in the open or in a room, and is as it should be.
+fn sound(seed: u64) -> Vec<String> {
+    let mut draw = Draw(seed);
+    let mut stage = Stage::new(&mut draw);
+    let extent = draw.within(8.0, 30.0);
+    let (low, high) = (DVec3::new(-extent, 0.0, -extent), DVec3::new(extent, 4.0, extent));
+    if draw.coin() {
+        for (name, corners) in sides(low, high, 0.0, draw.coin()) {
+            let one_sided = stage.one_sided;
+            stage.panel(name, one_sided, &corners);
+        }
+    } else {
+        ground(&mut stage, low, high);
+    }
+    let lamp = DVec3::new(draw.within(-4.0, 4.0), draw.within(3.0, 3.9), draw.within(-4.0, 4.0));
+    stage.lamp(lamp, 0.3);
+    for k in 0..1 + draw.below(6) {
+        let at = DVec3::new(draw.within(-0.8, 0.6) * extent, 0.0, draw.within(-0.8, 0.6) * extent);
+        let (w, h, d) = (draw.within(0.5, 3.0), draw.within(0.5, 2.5), draw.within(0.4, 3.0));
+        let boarded = draw.coin();
+        let name = |part: &str| format!("{part} {k}");
+        let whole = sides(at, at + DVec3::new(w, h, d), 0.0, false);
+        let (one_sided, two_sided) = (stage.one_sided, stage.two_sided);
+        let outwards = |stage: &mut Stage, parts: &[&str], but: &str, double: bool| {
+            for (part, corners) in whole.iter().filter(|(part, _)| parts.contains(part)) {
+                let mut corners = corners.clone();
+                corners.reverse();
+                let material = if double && *part != but { two_sided } else { one_sided };
+                stage.panel(&name(part), material, &corners);
+            }
+        };
+        match draw.below(6) {
+            // A panel, a screen of three, the outside of a house, a cupboard without a bottom, a table with aprons, a box without a lid.
+            0 => outwards(&mut stage, &["north"], "", false),
+            1 => outwards(&mut stage, &["north", "west", "east"], "", false),
+            2 => outwards(&mut stage, &["north", "west", "east", "south", "ceiling"], "", false),
+            3 => outwards(&mut stage, &["north", "west", "east", "south"], "", false),
+            4 => outwards(
+                &mut stage,
+                &["north", "west", "east", "south", "ceiling"],
+                "ceiling",
+                boarded,
+            ),
+            _ => {
+                outwards(&mut stage, &["north", "west", "east", "south", "floor"], "south", boarded)
+            }
+        }
+    }
+    stage.flipped()
+}
+
+#[test]
+fn panels_furniture_and_outsides_of_houses_are_passed() {
+    for seed in 0..400 {
+        assert_eq!(sound(seed), [""; 0], "seed {seed}");
+    }
+}

@@ -16,8 +16,8 @@ use crate::solver::settle::{Below, IrradianceChange, Settled};
 use crate::solver::surfaces::{FacetMaterial, Surfaces, for_each_below};
 use crate::solver::trend::{Start, Trend};
 use crate::solver::tuning::{
-    FURTHER_MAX, GAIN_MAX, LOST_MAX, PENDING_SHARE, SCALED_RESIDUAL, SKIPPED_MAX, SWEEPS_MAX,
-    UNBALANCED_MAX, UNKNOWN_MAX, WHITE,
+    FURTHER_MAX, GAIN_MAX, LOST_MAX, MADE_MAX, PENDING_SHARE, SCALED_RESIDUAL, SKIPPED_MAX,
+    SWEEPS_MAX, UNBALANCED_MAX, UNKNOWN_MAX, WHITE,
 };
 use crate::solver::work::{Dirty, Work};
 use crate::transport;
@@ -78,8 +78,8 @@ pub(super) const CHUNK: usize = 256;
 
 impl Radiosity {
     /// [`solve`](Radiosity::solve) to a residual, relative to the mean radiosity, whatever the links: where rows of leaves that sum to
-    /// more than 1 would make light of nothing, with factors of leaves (`RowScaling`), with which none do; and if lines grow even so,
-    /// with constant elements and factors that lose light. `most_mean_w_m2` is what the mean radiosity cannot reach.
+    /// more than 1 might make light of nothing, from nothing; if it does not settle so or light is made, with factors of leaves
+    /// (`RowScaling`), with which no row does; and if lines grow even so, with constant elements and factors that lose light. `most_mean_w_m2` is what the mean radiosity cannot reach.
     pub fn solve_bounded(
         &mut self,
         surfaces: &impl Surfaces,
@@ -94,29 +94,58 @@ impl Radiosity {
         }
         let was_scaled = !std::mem::take(&mut self.scaling).is_none();
         self.constant = false;
-        let grows = is_white(surfaces) && RowScaling::gain(surfaces, links) > GAIN_MAX;
-        if !grows {
+        if !is_white(surfaces) || RowScaling::gain(surfaces, links) <= GAIN_MAX {
             let dirty = if was_scaled { Dirty::All } else { dirty };
             self.solve(surfaces, links, dirty, stop);
-        }
-        let scaled =
-            Stop::Bounded { residual: SCALED_RESIDUAL * residual, mean_w_m2: most_mean_w_m2 };
-        let mut is_solved = !grows && self.has_settled();
-        for (linear, strict) in [(true, false), (false, false), (false, true)] {
-            if is_solved {
+            if self.has_settled() {
                 return;
             }
+        }
+        // Light that hardly loses anything settles slowly: begun as a cold build does, it ends where that ends.
+        let stop =
+            Stop::Bounded { residual: SCALED_RESIDUAL * residual, mean_w_m2: most_mean_w_m2 };
+        self.start_anew(surfaces);
+        self.solve(surfaces, links, Dirty::All, stop);
+        if self.has_settled() && self.made(surfaces, links) <= MADE_MAX {
+            return;
+        }
+        for (linear, strict) in [(true, false), (false, false), (false, true)] {
             self.constant = !linear;
             let rows = RowScaling::none(surfaces, links, linear);
             self.scaling = match strict {
                 false => rows.found(surfaces, links),
                 true => rows.strict(surfaces, links),
             };
-            // Light that hardly loses anything settles slowly: begun as a cold build does, it ends where that ends.
             self.start_anew(surfaces);
-            self.solve_scaled(surfaces, links, scaled);
-            is_solved = self.has_settled() && self.keeps_light(surfaces, links);
+            self.solve_scaled(surfaces, links, stop);
+            if self.has_settled() && self.keeps_light(surfaces, links) {
+                return;
+            }
         }
+    }
+
+    /// Flux that facets whose rows sum to more than 1 in this light make of nothing, over what is emitted: 1.
+    fn made(&self, surfaces: &impl Surfaces, links: &Links) -> f64 {
+        let rows = RowScaling::none(surfaces, links, true);
+        let (mut made, mut emitted) = (0.0, self.light_arriving_w(surfaces, links));
+        for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
+            let exitance = surfaces.material(facet.0).exitance;
+            let mut of_facet = 0.0;
+            for_each_below(surfaces, facet.0, &mut |id| {
+                if !surfaces.children(id).is_empty() {
+                    return;
+                }
+                let area = surfaces.area_m2(id);
+                let above = f64::from(rows.rows[id as usize].mean) - 1.0;
+                let b = self.radiosity(id);
+                for c in 0..3 {
+                    of_facet += area * above * f64::from(b[c]);
+                    emitted += area * f64::from(exitance[c]);
+                }
+            });
+            made += of_facet.max(0.0);
+        }
+        made / emitted
     }
 
     /// Whether surfaces receive of each other what they send, but for `LOST_MAX` of what is emitted: with factors, as lines may

@@ -234,7 +234,7 @@ impl Space for SpaceState {
             let facets = self.forest.near_facets();
             parents.extend(self.came_or_went(was, facets));
             parents.extend(self.relit_facets(was, facets));
-            parents.extend(self.covered_facets());
+            parents.extend(self.covered_leaves());
         }
         let sources_differ = self.world.lights_differ(&was.world) || self.outside_differs(was);
         // Whoever gathers from a light, or from outside, gathers anew: neither knows who that is.
@@ -370,14 +370,13 @@ impl SpaceState {
         of.iter().filter(is_relit).map(|f| f.0).collect()
     }
 
-    /// The facets of elements that bodies in motion cover otherwise than before.
-    fn covered_facets(&self) -> Vec<u32> {
+    /// The leaves that bodies in motion cover otherwise than before. What is above them is gathered anew where it has links.
+    fn covered_leaves(&self) -> impl Iterator<Item = u32> + '_ {
         // Some may have been reaped since.
-        let alive = self.covered.iter().filter(|&&id| self.forest.kind(id) == Kind::Element);
-        let mut out: Vec<u32> = alive.map(|&id| self.forest.fixed(id).0).collect();
-        out.sort_unstable();
-        out.dedup();
-        out
+        let is_leaf = |id: &ElementId| {
+            self.forest.kind(*id) == Kind::Element && self.forest.children(*id).is_empty()
+        };
+        self.covered.iter().copied().filter(is_leaf).map(|id| id.0)
     }
 
     /// Whether what is distant emits otherwise than before, or came or went.

@@ -18,7 +18,7 @@ pub struct PartInside {
     pub normal: DVec3,
 }
 
-/// Elements of a patch that count as changed though no other area of them is exposed.
+/// Elements of a patch of which something else is covered.
 enum Which {
     All,
     /// Those that meet one of these boxes.
@@ -59,9 +59,8 @@ impl Forest {
             if before == after {
                 continue;
             }
-            let within = before.inside.iter().chain(&after.inside).map(|part| part.bounds);
             let which = match before.contacts == after.contacts {
-                true => Which::Within(within.collect()),
+                true => Which::Within(changed_parts(before, after)),
                 false => Which::All,
             };
             self.expose_anew(self.patch_root(patch), &which, &mut changed);
@@ -92,8 +91,7 @@ impl Forest {
         self.patch(id).is_some_and(|patch| !self.covered_of(patch).inside.is_empty())
     }
 
-    /// Finds anew what is exposed of the elements of a patch, given its root; adds those that are, or were, covered in part, and
-    /// those asked for.
+    /// Finds anew what is exposed of elements of a patch, given its root; adds them.
     fn expose_anew(&mut self, root: ElementId, which: &Which, changed: &mut Vec<ElementId>) {
         let mut stack = vec![root];
         while let Some(id) = stack.pop() {
@@ -101,29 +99,45 @@ impl Forest {
                 stack.extend(self.children(id).map(ElementId));
                 continue;
             }
-            let was = self.exposed.remove(&id.0);
-            let area_m2 = self.nodes[id.0 as usize].area_m2;
+            let shape = self.shape(id);
+            if let Which::Within(parts) = which
+                && !parts.iter().any(|bounds| shape.meets(bounds))
+            {
+                continue;
+            }
             // Below what is not covered nothing is.
             let may_be = self.parent(id).is_none_or(|parent| {
                 self.kind(parent) != Kind::Element || self.exposed.contains_key(&parent.0)
             });
-            if may_be {
-                let is_m2 = exposed_m2(&self.shape(id), self.covered(id)) as f32;
-                if is_m2 < area_m2 {
-                    self.exposed.insert(id.0, is_m2);
-                }
+            let area_m2 = self.nodes[id.0 as usize].area_m2;
+            let is_m2 = if may_be { exposed_m2(&shape, self.covered(id)) as f32 } else { area_m2 };
+            match is_m2 < area_m2 {
+                true => drop(self.exposed.insert(id.0, is_m2)),
+                false => drop(self.exposed.remove(&id.0)),
             }
-            let is_asked_for = || match which {
-                Which::All => true,
-                Which::Within(parts) => {
-                    let shape = self.shape(id);
-                    parts.iter().any(|bounds| shape.meets(bounds))
-                }
-            };
-            if was.is_some() || self.exposed.contains_key(&id.0) || is_asked_for() {
-                changed.push(id);
-                stack.extend(self.children(id).map(ElementId));
-            }
+            changed.push(id);
+            stack.extend(self.children(id).map(ElementId));
         }
     }
+}
+
+/// Boxes around what one list of parts has and the other has not.
+fn changed_parts(before: &Covered, after: &Covered) -> Vec<[DVec2; 2]> {
+    let mut out = Vec::new();
+    difference(&before.parts, &after.parts, |(_, bounds)| *bounds, &mut out);
+    difference(&before.inside, &after.inside, |part| part.bounds, &mut out);
+    out
+}
+
+/// Adds the boxes of what only one of two lists has; what does not change comes first in both.
+fn difference<T: PartialEq>(
+    one: &[T],
+    two: &[T],
+    bounds: impl Fn(&T) -> [DVec2; 2],
+    out: &mut Vec<[DVec2; 2]>,
+) {
+    let alike = one.iter().zip(two).take_while(|(p, q)| p == q).count();
+    let (one, two) = (&one[alike..], &two[alike..]);
+    out.extend(one.iter().filter(|part| !two.contains(part)).map(&bounds));
+    out.extend(two.iter().filter(|part| !one.contains(part)).map(&bounds));
 }

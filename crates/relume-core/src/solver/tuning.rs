@@ -86,6 +86,14 @@ pub(super) const UNKNOWN_MAX: f64 = 0.08;
 /// - Smaller: time: factors where rows are only a little off
 pub(super) const GAIN_MAX: f64 = 0.005;
 
+/// The same, up to which a solution counts as balanced without a look.
+///
+/// - Unit: 1
+/// - Tried: 0.0015
+/// - Larger: light is unaccounted for in gaps of fractions of a millimetre (2.4 % beside a white box 0.04 mm above a panel)
+/// - Smaller: time: a pass over all links where nothing can grow
+pub(super) const GAIN_SURE: f64 = 0.0015;
+
 /// Flux that facets with rows above 1 make in a solution, over what is emitted, from which factors of leaves count.
 ///
 /// - Unit: 1
@@ -93,6 +101,14 @@ pub(super) const GAIN_MAX: f64 = 0.005;
 /// - Larger: light is unaccounted for in white gaps
 /// - Smaller: white rooms are too dark: factors know nothing of where light is
 pub(super) const MADE_MAX: f64 = 0.05;
+
+/// Flux that rows make in a solution, those above 1 less those below, over what is emitted, from which factors of leaves count.
+///
+/// - Unit: 1
+/// - Tried: 0.01
+/// - Larger: more than a hundredth of the light may come of nothing
+/// - Smaller: white rooms are too dark, as with [`MADE_MAX`]
+pub(super) const MADE_OF_ALL_MAX: f64 = 0.01;
 
 /// Largest reflectance of a scene from which it is looked whether rows above 1 make light of nothing.
 ///

@@ -16,8 +16,8 @@ use crate::solver::settle::{Below, IrradianceChange, Settled};
 use crate::solver::surfaces::{FacetMaterial, Surfaces, for_each_below};
 use crate::solver::trend::{Start, Trend};
 use crate::solver::tuning::{
-    FURTHER_MAX, GAIN_MAX, LOST_MAX, MADE_MAX, PENDING_SHARE, SCALED_RESIDUAL, SKIPPED_MAX,
-    SWEEPS_MAX, UNBALANCED_MAX, UNKNOWN_MAX, WHITE,
+    FURTHER_MAX, GAIN_MAX, GAIN_SURE, LOST_MAX, MADE_MAX, MADE_OF_ALL_MAX, PENDING_SHARE,
+    SCALED_RESIDUAL, SKIPPED_MAX, SWEEPS_MAX, UNBALANCED_MAX, UNKNOWN_MAX, WHITE,
 };
 use crate::solver::work::{Dirty, Work};
 use crate::transport;
@@ -94,10 +94,12 @@ impl Radiosity {
         }
         let was_scaled = !std::mem::take(&mut self.scaling).is_none();
         self.constant = false;
-        if !is_white(surfaces) || RowScaling::gain(surfaces, links) <= GAIN_MAX {
+        let gain = if is_white(surfaces) { RowScaling::gain(surfaces, links) } else { 0.0 };
+        if gain <= GAIN_MAX {
             let dirty = if was_scaled { Dirty::All } else { dirty };
             self.solve(surfaces, links, dirty, stop);
-            if self.has_settled() {
+            let is_sure = gain <= GAIN_SURE || self.is_balanced(surfaces, links);
+            if self.has_settled() && is_sure {
                 return;
             }
         }
@@ -106,7 +108,7 @@ impl Radiosity {
             Stop::Bounded { residual: SCALED_RESIDUAL * residual, mean_w_m2: most_mean_w_m2 };
         self.start_anew(surfaces);
         self.solve(surfaces, links, Dirty::All, stop);
-        if self.has_settled() && self.made(surfaces, links) <= MADE_MAX {
+        if self.has_settled() && self.is_balanced(surfaces, links) {
             return;
         }
         for (linear, strict) in [(true, false), (false, false), (false, true)] {
@@ -124,9 +126,10 @@ impl Radiosity {
         }
     }
 
-    /// Flux that facets whose rows sum to more than 1 in this light make of nothing, over what is emitted: 1.
-    fn made(&self, surfaces: &impl Surfaces, links: &Links) -> f64 {
+    /// Whether facets whose rows sum to more than 1 in this light make little of nothing, and all facets together next to nothing.
+    fn is_balanced(&self, surfaces: &impl Surfaces, links: &Links) -> bool {
         let rows = RowScaling::none(surfaces, links, true);
+        let mut of_all = 0.0;
         let (mut made, mut emitted) = (0.0, self.light_arriving_w(surfaces, links));
         for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
             let exitance = surfaces.material(facet.0).exitance;
@@ -144,8 +147,9 @@ impl Radiosity {
                 }
             });
             made += of_facet.max(0.0);
+            of_all += of_facet;
         }
-        made / emitted
+        made <= MADE_MAX * emitted && of_all <= MADE_OF_ALL_MAX * emitted
     }
 
     /// Whether surfaces receive of each other what they send, but for `LOST_MAX` of what is emitted: with factors, as lines may

@@ -311,7 +311,9 @@ impl<S: Space> Follower<S> {
             self.radiosity = dark;
         } else if self.is_settled() {
             let most = mean_radiosity_limit(bound_w_m2);
-            self.radiosity.solve_bounded(&surfaces, &self.links, dirty, residual, most);
+            // From nothing a frame goes the way of a cold build.
+            let residuals = [residual, S::residual(goal, true)];
+            self.radiosity.solve_bounded(&surfaces, &self.links, dirty, residuals, most);
         } else {
             let mean = self.last_exact_mean_w_m2 * self.space.brightened(goal);
             // If the last exact solution was black, there is no growth bound.

@@ -77,7 +77,7 @@ struct Swept {
 pub(super) const CHUNK: usize = 256;
 
 impl Radiosity {
-    /// [`solve`](Radiosity::solve) to a residual, relative to the mean radiosity, whatever the links: where rows of leaves that sum to
+    /// [`solve`](Radiosity::solve) to a residual, relative to the mean radiosity (another one from nothing), whatever the links: where rows of leaves that sum to
     /// more than 1 might make light of nothing, from nothing; if it does not settle so or light is made, with factors of leaves
     /// (`RowScaling`), with which no row does; and if lines grow even so, with constant elements and factors that lose light. `most_mean_w_m2` is what the mean radiosity cannot reach.
     pub fn solve_bounded(
@@ -85,7 +85,7 @@ impl Radiosity {
         surfaces: &impl Surfaces,
         links: &Links,
         dirty: Dirty,
-        residual: f64,
+        [residual, from_nothing]: [f64; 2],
         most_mean_w_m2: f64,
     ) {
         let stop = Stop::Bounded { residual, mean_w_m2: most_mean_w_m2 };
@@ -105,7 +105,7 @@ impl Radiosity {
         }
         // Light that hardly loses anything settles slowly: begun as a cold build does, it ends where that ends.
         let stop =
-            Stop::Bounded { residual: SCALED_RESIDUAL * residual, mean_w_m2: most_mean_w_m2 };
+            Stop::Bounded { residual: SCALED_RESIDUAL * from_nothing, mean_w_m2: most_mean_w_m2 };
         self.start_anew(surfaces);
         self.solve(surfaces, links, Dirty::All, stop);
         if self.has_settled() && self.is_balanced(surfaces, links) {
@@ -709,7 +709,7 @@ mod tests {
             assert!((scaling.rows[leaf].mean - 1.0).abs() < 1e-3, "{:?}", scaling.rows);
         }
         let mut b = Radiosity::new(&plates);
-        b.solve_bounded(&plates, &links, Dirty::All, 1e-7, 2e2);
+        b.solve_bounded(&plates, &links, Dirty::All, [1e-7; 2], 2e2);
         assert!(!b.scaling.is_none() && b.has_settled());
         for id in 0..4 {
             assert!((b.radiosity(id)[0] - 100.0).abs() < 0.5, "{id}: {:?}", b.radiosity(id));

@@ -62,28 +62,45 @@ fn add_crate(
     node
 }
 
+/// A room in which 24 crates stand: `add` is given the material and the place, size and angle of each.
+fn room_of_crates(
+    two_sided: bool,
+    add: impl Fn(&mut SceneBuilder, MaterialId, (DVec3, DVec3, f64), &mut Random),
+) -> Arc<Scene> {
+    room(v(8.0, 6.0, 3.0), |b, grey| {
+        let thin = b.double_sided_material("thin", [0.5; 3], [0.0; 3]);
+        let of = if two_sided { thin } else { grey };
+        for k in 0..24 {
+            let mut r = Random::of_part(7, k);
+            let [x, y] = [(k % 6) as f64, (k / 6) as f64];
+            let at = v(0.9 + 1.25 * x + r.between(-0.1, 0.1), 1.0 + 1.35 * y, 0.0);
+            let size = v(0.75, 0.7, r.between(0.2, 0.6));
+            let angle = r.between(0.0, 1.5);
+            add(b, of, (at, size, angle), &mut r);
+        }
+    })
+}
+
+/// Sensors on the ceiling and on two walls of that room.
+fn on_the_walls() -> Vec<Sensor> {
+    let mut sensors = vec![Sensor { at: v(4.0, 3.0, 2.9999), normal: DVec3::NEG_Z }];
+    for k in 0..5 {
+        let y = 1.0 + f64::from(k);
+        sensors.push(Sensor { at: v(1e-4, y, 1.5), normal: DVec3::X });
+        sensors.push(Sensor { at: v(7.9999, y, 2.0), normal: DVec3::NEG_X });
+    }
+    sensors
+}
+
 /// A room of which crates cover a fourth of the floor was 4 to 6 % too dark at any place: what they cover counted in the floor's
 /// mean radiosity, as dark, and once more as hidden.
 #[test]
 fn crates_on_a_floor_do_not_darken_the_room() {
     for (bottom, two_sided) in [(false, false), (true, false), (false, true)] {
-        let scene = room(v(8.0, 6.0, 3.0), |b, grey| {
-            let thin = b.double_sided_material("thin", [0.5; 3], [0.0; 3]);
-            let of = if two_sided { thin } else { grey };
-            for k in 0..24 {
-                let mut r = Random::of_part(7, k);
-                let [x, y] = [(k % 6) as f64, (k / 6) as f64];
-                let at = v(0.9 + 1.25 * x + r.between(-0.1, 0.1), 1.0 + 1.35 * y, 0.0);
-                let size = v(0.75, 0.7, r.between(0.2, 0.6));
-                add_crate(b, of, (at, size, r.between(0.0, 1.5)), bottom);
-            }
+        let scene = room_of_crates(two_sided, |b, of, place, _| {
+            add_crate(b, of, place, bottom);
         });
-        let mut sensors = vec![Sensor { at: v(4.0, 3.0, 2.9999), normal: DVec3::NEG_Z }];
-        for k in 0..5 {
-            let y = 1.0 + f64::from(k);
-            sensors.push(Sensor { at: v(1e-4, y, 1.5), normal: DVec3::X });
-            sensors.push(Sensor { at: v(7.9999, y, 2.0), normal: DVec3::NEG_X });
-        }
+        let sensors = on_the_walls();
         let truth = judged(&scene, &sensors, 200);
         let found = found(&scene, 0.1, &sensors);
         let off = |(found, truth): (&f64, &Estimate)| found / truth.irradiance[0] - 1.0;
@@ -99,27 +116,14 @@ fn crates_on_a_floor_do_not_darken_the_room() {
 #[test]
 fn crates_that_slide_over_a_floor_do_not_darken_the_room() {
     for two_sided in [false, true] {
-        let scene = room(v(8.0, 6.0, 3.0), |b, grey| {
-            let thin = b.double_sided_material("thin", [0.5; 3], [0.0; 3]);
-            let of = if two_sided { thin } else { grey };
-            for k in 0..24 {
-                let mut r = Random::of_part(7, k);
-                let [x, y] = [(k % 6) as f64, (k / 6) as f64];
-                let at = v(0.9 + 1.25 * x + r.between(-0.1, 0.1), 1.0 + 1.35 * y, 0.0);
-                let size = v(0.75, 0.7, r.between(0.2, 0.6));
-                let node = add_crate(b, of, (at, size, r.between(0.0, 1.5)), k % 2 == 0);
-                let to = at + v(r.between(-0.2, 0.2), r.between(-0.2, 0.2), 0.0);
-                let (times_s, values) = (vec![0.0, 1.0], vec![at, to]);
-                let interpolation = Interpolation::Linear;
-                b.animate_translation(node, Track { times_s, values, interpolation });
-            }
+        let scene = room_of_crates(two_sided, |b, of, place, r| {
+            let node = add_crate(b, of, place, r.between(0.0, 1.0) < 0.5);
+            let to = place.0 + v(r.between(-0.2, 0.2), r.between(-0.2, 0.2), 0.0);
+            let (times_s, values) = (vec![0.0, 1.0], vec![place.0, to]);
+            let interpolation = Interpolation::Linear;
+            b.animate_translation(node, Track { times_s, values, interpolation });
         });
-        let mut sensors = vec![Sensor { at: v(4.0, 3.0, 2.9999), normal: DVec3::NEG_Z }];
-        for k in 0..5 {
-            let y = 1.0 + f64::from(k);
-            sensors.push(Sensor { at: v(1e-4, y, 1.5), normal: DVec3::X });
-            sensors.push(Sensor { at: v(7.9999, y, 2.0), normal: DVec3::NEG_X });
-        }
+        let sensors = on_the_walls();
         let mut session = Session::new(Arc::clone(&scene), at_tolerance(0.1)).unwrap();
         for (frame, time_s) in [(0, 0.0), (1, 1.0)] {
             session.step(frame, time_s).unwrap();

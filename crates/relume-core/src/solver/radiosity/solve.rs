@@ -77,9 +77,10 @@ struct Swept {
 pub(super) const CHUNK: usize = 256;
 
 impl Radiosity {
-    /// [`solve`](Radiosity::solve) to a residual, relative to the mean radiosity (another one from nothing), whatever the links: where rows of leaves that sum to
-    /// more than 1 might make light of nothing, from nothing; if it does not settle so or light is made, with factors of leaves
-    /// (`RowScaling`), with which no row does; and if lines grow even so, with constant elements and factors that lose light. `most_mean_w_m2` is what the mean radiosity cannot reach.
+    /// [`solve`](Radiosity::solve) to a residual, relative to the mean radiosity (the second one from nothing), whatever the links:
+    /// where rows of leaves that sum to more than 1 might make light of nothing, from nothing; if it does not settle so or light is
+    /// made, with factors of leaves (`RowScaling`), with which no row does; and if lines grow even so, with constant elements and
+    /// factors that lose light. `most_mean_w_m2` is what the mean radiosity cannot reach.
     pub fn solve_bounded(
         &mut self,
         surfaces: &impl Surfaces,

@@ -7,7 +7,7 @@ use crate::pair::{
     Changes, Edit, OutOfMemory, PairHash, PairId, PairTree, Pairs, Record, Scope, update,
 };
 use crate::predict::Ticks;
-use crate::solver::{Dirty, Links, Radiosity};
+use crate::solver::{Bounds, Dirty, Links, Radiosity};
 
 use super::budget;
 use super::clock::Clock;
@@ -310,10 +310,14 @@ impl<S: Space> Follower<S> {
             // Light of earlier frames would decay without end.
             self.radiosity = dark;
         } else if self.is_settled() {
-            let most = mean_radiosity_limit(bound_w_m2);
-            // From nothing a frame goes the way of a cold build.
-            let residuals = [residual, S::residual(goal, true)];
-            self.radiosity.solve_bounded(&surfaces, &self.links, dirty, residuals, most);
+            let bounds = Bounds {
+                residual,
+                // From nothing a frame goes the way of a cold build.
+                from_nothing: S::residual(goal, true),
+                mean_w_m2: mean_radiosity_limit(bound_w_m2),
+                rows_are_close: S::rows_are_close(goal),
+            };
+            self.radiosity.solve_bounded(&surfaces, &self.links, dirty, bounds);
         } else {
             let mean = self.last_exact_mean_w_m2 * self.space.brightened(goal);
             // If the last exact solution was black, there is no growth bound.

@@ -161,6 +161,10 @@ pub(crate) trait Space: Sized + Send {
     -> Option<Radiosity>;
     /// Residual to solve to, relative to the mean radiosity.
     fn residual(goal: &Self::Goal<'_>, is_cold: bool) -> f64;
+    /// Whether the sums of form factors from leaves are off by errors of links alone: not with the paper's oracle.
+    fn rows_are_close(_goal: &Self::Goal<'_>) -> bool {
+        true
+    }
     /// Upper bound of the mean radiosity at any time, W/m2, whatever the visibilities.
     fn mean_radiosity_bound_w_m2(goal: &Self::Goal<'_>) -> f64;
     /// Emitted flux relative to that of the last exact solution ([`Space::finish`] with `is_settled`): 1.

@@ -22,6 +22,6 @@ pub use groups::{GroupEnd, GroupLink, GroupLinks, PlacedLinks};
 pub use links::{Link, Links, LinksBuilder};
 pub use place::Place;
 pub use push::{RowSum, row_sums};
-pub use radiosity::{Radiosity, Stop};
+pub use radiosity::{Bounds, Radiosity, Stop};
 pub use surfaces::{FacetMaterial, SQUARE_MOMENT, Surfaces};
 pub use work::Dirty;

@@ -14,7 +14,7 @@ mod scaling;
 mod solve;
 
 use scaling::RowScaling;
-pub use solve::Stop;
+pub use solve::{Bounds, Stop};
 
 /// What came over links of groups to whom something did: few elements do, since groups are linked with large ones.
 #[derive(Clone, Debug, Default)]

@@ -110,6 +110,15 @@ pub(super) const MADE_MAX: f64 = 0.05;
 /// - Smaller: white rooms are too dark, as with [`MADE_MAX`]
 pub(super) const MADE_OF_ALL_MAX: f64 = 0.01;
 
+/// Both with the paper's oracle, which bounds factors and not errors: rows are off by tenths.
+///
+/// - Unit: 1
+/// - Tried: 0.05 and 0.01 (a room with a white lamp 10 % too dark with factors, 10 % too bright without, and frames that jump between),
+///   0.5
+/// - Larger: light is unaccounted for
+/// - Smaller: frames that jump, and the time that factors take, for nothing
+pub(super) const COARSE_MADE_MAX: f64 = 0.5;
+
 /// Largest reflectance of a scene from which it is looked whether rows above 1 make light of nothing.
 ///
 /// - Unit: 1

@@ -267,6 +267,10 @@ impl Space for SpaceState {
         goal.tuning.tolerance * if is_cold { RESIDUAL_SHARE } else { FOLLOWED_SHARE }
     }
 
+    fn rows_are_close(goal: &Goal<'_>) -> bool {
+        matches!(goal.tuning.oracle, Oracle::Error { .. })
+    }
+
     fn mean_radiosity_bound_w_m2(goal: &Goal<'_>) -> f64 {
         emission::mean_radiosity_bound_w_m2(&goal.bed.scene, goal.world)
     }

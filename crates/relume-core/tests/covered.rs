@@ -3,7 +3,7 @@
 use crate::common::{at_tolerance, facing_up, flipped, judged, v};
 use glam::{DQuat, DVec3};
 use relume_core::scene::{Interpolation, MaterialId, NodeId, Scene, SceneBuilder, Track};
-use relume_core::session::{Sensor, Session};
+use relume_core::session::{Grouping, Sensor, Session};
 use relume_judge::path::{self, Estimate, Site};
 use relume_judge::{Random, World};
 
@@ -210,5 +210,47 @@ fn deep_in_a_gap_it_is_dark() {
         let (e, noise) = (truth.irradiance[0], truth.standard_error[0]);
         assert!(*found < 3.0 * e + 3.0 * noise, "{found} in place of {e} +- {noise}");
         assert!(*found > 0.4 * e - 3.0 * noise, "{found} in place of {e} +- {noise}");
+    }
+}
+
+/// A white crate 2 mm above a white floor, at rest and sliding: light gets some widths of the gap in. What arrived beside the crate
+/// was handed to the floor under it, from which none of it got out: its underside was up to sixteen times too bright.
+#[test]
+fn light_gets_no_deeper_under_a_crate_than_some_widths_of_the_gap() {
+    for slides in [false, true] {
+        let mut b = SceneBuilder::new("gap");
+        let white = b.material("white", [0.9; 3], [0.0; 3]);
+        let glow = b.material("glow", [0.0; 3], [100.0; 3]);
+        let node = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+        b.cuboid_inward(node, "room", white, DVec3::ZERO, v(3.0, 3.0, 2.5));
+        let lamp = b.node("lamp", None, DVec3::ZERO, DQuat::IDENTITY);
+        b.polygon(lamp, "lamp", glow, &flipped(facing_up([1.0, 1.4], [1.2, 1.6], 2.4)));
+        let at = v(1.4, 1.6, 0.002);
+        let crate_ = add_crate(&mut b, white, (at, v(1.0, 0.8, 0.4), 0.3), false);
+        b.polygon(crate_, "bottom", white, &flipped(facing_up([-0.5, 0.5], [-0.4, 0.4], 0.0)));
+        if slides {
+            let (times_s, values) = (vec![0.0, 1.0], vec![at, at + v(0.3, -0.2, 0.0)]);
+            let interpolation = Interpolation::Linear;
+            b.animate_translation(crate_, Track { times_s, values, interpolation });
+        }
+        let scene = Arc::new(b.build().unwrap());
+        let grouping = Grouping::by_surface(&scene);
+        let bottom = scene
+            .patches
+            .iter()
+            .position(|patch| scene.surfaces[patch.surface.0 as usize].name == "bottom");
+        let bottom = bottom.unwrap();
+        let mut session = Session::new(Arc::clone(&scene), at_tolerance(0.1)).unwrap();
+        for (frame, time_s) in [(0, 0.0), (1, 1.0)] {
+            session.step(frame, time_s).unwrap();
+            let fluxes = session.frame().unwrap().fluxes(&grouping);
+            let found = fluxes[grouping.of_patch[bottom].unwrap() as usize].arriving_w[0];
+            let truth = path::arriving(&World::new(judged::polygons(&scene, time_s)), 2_000, 3);
+            let mean_w_m2 = truth.iter().map(|e| e.irradiance[0]).sum::<f64>()
+                / scene.patches.iter().map(|patch| patch.area_m2()).sum::<f64>();
+            // Over the whole underside, as a share of what arrives elsewhere.
+            let off = (found - truth[bottom].irradiance[0]) / (0.8 * mean_w_m2);
+            assert!(off.abs() < 0.03, "{off:+.3} at {time_s} s, slides: {slides}");
+        }
     }
 }

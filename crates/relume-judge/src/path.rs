@@ -116,6 +116,65 @@ pub fn irradiance_by_particles(
     (0..sites.len()).map(of).collect()
 }
 
+/// Flux that arrives at each polygon, W, with its standard error, by particles from the emitters: all of them from one set of
+/// paths. In place of irradiance, W.
+///
+/// `batches` (two or more) of 64 particles; the same bits on any number of threads.
+pub fn arriving(world: &World, batches: u32, seed: u64) -> Vec<Estimate> {
+    let tracer = Tracer::new(world);
+    let count = world.polygons().len();
+    let one = |index: u32| {
+        let mut random = Random::of_part(seed, u64::from(index));
+        let mut sums = vec![[0.0; 3]; count];
+        let shift = random.bits() as u32 % BATCH;
+        for k in 0..BATCH {
+            let mut cell = |k: u32| {
+                [(k % 8, random.unit()), (k / 8, random.unit())]
+                    .map(|(cell, within)| (f64::from(cell) + within) / 8.0)
+            };
+            let (from, way) = (cell(k), cell((k * 29 + shift) % BATCH));
+            let mut arrive = |polygon: usize, flux: &[f64; 3]| {
+                (0..3).for_each(|c| sums[polygon][c] += flux[c] / f64::from(BATCH));
+            };
+            tracer.follow(from, way, &mut random, &mut |_, _, _| (), &mut arrive);
+        }
+        sums
+    };
+    let add = |mut a: [Vec<[f64; 3]>; 2], b: [Vec<[f64; 3]>; 2]| {
+        for (a, b) in a.iter_mut().zip(b) {
+            for (a, b) in a.iter_mut().zip(b) {
+                (0..3).for_each(|c| a[c] += b[c]);
+            }
+        }
+        a
+    };
+    // In parts of which each is summed in order.
+    let part = |part: u32| {
+        let mut sums = [vec![[0.0; 3]; count], vec![[0.0; 3]; count]];
+        for index in (part..batches).step_by(PARTS as usize) {
+            let found = one(index);
+            let squares = found.iter().map(|f| f.map(|x| x * x)).collect();
+            sums = add(sums, [found, squares]);
+        }
+        sums
+    };
+    let parts: Vec<[Vec<[f64; 3]>; 2]> = (0..PARTS).into_par_iter().map(part).collect();
+    let zero = [vec![[0.0; 3]; count], vec![[0.0; 3]; count]];
+    let [sums, squares] = parts.into_iter().fold(zero, add);
+    let n = f64::from(batches);
+    let estimate = |(sum, square): (&[f64; 3], &[f64; 3])| {
+        let spread = |c: usize| (square[c] / n - (sum[c] / n).powi(2)).max(0.0) / (n - 1.0);
+        Estimate {
+            irradiance: sum.map(|s| s / n),
+            standard_error: [0, 1, 2].map(|c| spread(c).sqrt()),
+        }
+    };
+    sums.iter().zip(&squares).map(estimate).collect()
+}
+
+/// Parts of batches that are followed beside each other.
+const PARTS: u32 = 64;
+
 struct Tracer<'a> {
     world: &'a World,
     /// Polygons that emit, with the running sum of their shares of the flux.
@@ -230,11 +289,7 @@ impl<'a> Tracer<'a> {
         random: &mut Random,
         sums: &mut [[f64; 3]],
     ) {
-        let Some((mut polygon, mut at)) = self.on_emitter(from) else { return };
-        let exitance = self.world.polygons()[polygon].exitance;
-        let mut flux = exitance.map(|m| m / self.density[polygon]);
-        let mut way = way;
-        for depth in 0_u32.. {
+        let mut send = |at: DVec3, polygon: usize, flux: &[f64; 3]| {
             let normal = self.world.normal(polygon);
             for (site, sum) in sites.iter().zip(sums.iter_mut()) {
                 let place = site.origin + site.normal * (LIFT * self.world.size_m());
@@ -249,12 +304,33 @@ impl<'a> Tracer<'a> {
                     (0..3).for_each(|c| sum[c] += flux[c] * share);
                 }
             }
-            let (d, _) = around(normal, way);
+        };
+        self.follow(from, way, random, &mut send, &mut |_, _| ());
+    }
+
+    /// Follows a particle from an emitter until it is absorbed or lost: what leaves each place (with its polygon, W), and what arrives at
+    /// polygons, W.
+    fn follow(
+        &self,
+        from: [f64; 2],
+        way: [f64; 2],
+        random: &mut Random,
+        send: &mut dyn FnMut(DVec3, usize, &[f64; 3]),
+        arrive: &mut dyn FnMut(usize, &[f64; 3]),
+    ) {
+        let Some((mut polygon, mut at)) = self.on_emitter(from) else { return };
+        let exitance = self.world.polygons()[polygon].exitance;
+        let mut flux = exitance.map(|m| m / self.density[polygon]);
+        let mut way = way;
+        for depth in 0_u32.. {
+            send(at, polygon, &flux);
+            let (d, _) = around(self.world.normal(polygon), way);
             let Some(hit) = self.world.first_hit(at, d, Some(polygon)) else { return };
             if !hit.front {
                 return;
             }
             (at, polygon) = (at + d * hit.distance, hit.polygon);
+            arrive(polygon, &flux);
             let reflectance = self.world.polygons()[polygon].reflectance;
             (0..3).for_each(|c| flux[c] *= reflectance[c]);
             let most = reflectance.iter().fold(0.0_f64, |m, s| m.max(*s));
@@ -381,6 +457,30 @@ mod tests {
                 assert!(off <= 4.0 * error && error < 0.02 * b.irradiance[c], "{a:?} {b:?}");
             }
         }
+    }
+
+    #[test]
+    fn what_arrives_at_sides_is_their_mean_irradiance_times_their_area() {
+        let mut polygons = room(0.6, 0.0);
+        let up = [v(0.3, 0.4, 0.9), v(0.6, 0.4, 0.9), v(0.6, 0.5, 0.9), v(0.3, 0.5, 0.9)];
+        polygons.push(Polygon { exitance: [9.0, 3.0, 1.0], ..Polygon::black(up.to_vec()) });
+        let world = World::new(polygons);
+        let found = arriving(&world, 2000, 5);
+        let sides = [
+            (5, Site::mean(v(1.0, 0.0, 1.0), -DVec3::X, DVec3::Y)),
+            (0, Site::mean(DVec3::ZERO, DVec3::Y, DVec3::Z)),
+        ];
+        for (k, side) in sides {
+            let mean = irradiance(&world, &[side], 2000, 4)[0];
+            for c in 0..3 {
+                let error = mean.standard_error[c].hypot(found[k].standard_error[c]);
+                let off = (mean.irradiance[c] - found[k].irradiance[c]).abs();
+                assert!(off <= 4.0 * error && error < 0.02 * mean.irradiance[c], "{k}: {mean:?} {found:?}");
+            }
+        }
+        // Nothing gets out: what is absorbed was emitted.
+        let absorbed: f64 = found[..6].iter().map(|e| 0.4 * e.irradiance[0]).sum::<f64>() + found[6].irradiance[0];
+        assert!((absorbed / (9.0 * 0.03) - 1.0).abs() < 0.02, "{absorbed}");
     }
 
     #[test]

@@ -92,8 +92,8 @@ pub use relume_core::scene::{
     SceneError, Severity, Surface, SurfaceId, TakenBody, Track, World, outside,
 };
 pub use relume_core::session::{
-    Accuracy, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Frame,
-    FrameReport, Grouping, Hash, Leaf, Memory, Mesh, Open, Options, Oracle, PairCounts, Removed,
+    Accuracy, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Flux,
+    Frame, FrameReport, Grouping, Hash, Leaf, Memory, Mesh, Open, Options, Oracle, PairCounts, Removed,
     RowSumError, Seconds, Sensor, Session, SessionError, Snapshot, Update, Watch, Work,
 };
 pub use relume_io::{ImportOptions, Log, LogError, import, read_environment};

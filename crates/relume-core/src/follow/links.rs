@@ -17,7 +17,7 @@ pub(crate) trait Receivers {
         false
     }
     /// Part of the exchange area of two elements over which no light goes, m2.
-    fn dark_exchange_m2(&self, _a: ElementId, _b: ElementId) -> f32 {
+    fn dark_exchange_m2(&self, _a: ElementId, _b: ElementId, _exchange_m2: f32) -> f32 {
         0.0
     }
     /// Whether a link that ends there is gathered in another way.
@@ -37,7 +37,7 @@ pub(crate) fn directions(
     let g = carried.gradients;
     let exchange = match forest.rest_in_contact(link.a, link.b) {
         true => 0.0,
-        false => exchange - forest.dark_exchange_m2(link.a, link.b),
+        false => exchange - forest.dark_exchange_m2(link.a, link.b, exchange),
     };
     let one = |receiver: ElementId, source: ElementId, over_receiver, over_source| {
         let apart = forest.is_apart(link.a) || forest.is_apart(link.b);

@@ -10,6 +10,7 @@ use crate::space::{Solved, row_sums_of};
 
 use super::events::{self, Event};
 use super::factors::{Factors, Grouping};
+use super::fluxes::{self, Flux};
 use super::gather::Sensor;
 use super::sensors;
 use super::snapshot::{self, Snapshot};
@@ -100,6 +101,15 @@ impl<'a> Frame<'a> {
     /// If the grouping is of another scene.
     pub fn factors(&self, grouping: &Grouping) -> Factors {
         Factors::of(self.solved, grouping)
+    }
+
+    /// Fluxes emitted by, arriving at and absorbed by groups of patches, W, in their order. Errors: the tolerance's, in the mean over a
+    /// group. Cost: one pass over all elements.
+    ///
+    /// # Panics
+    /// If the grouping is of another scene.
+    pub fn fluxes(&self, grouping: &Grouping) -> Vec<Flux> {
+        fluxes::fluxes(self.solved, grouping)
     }
 
     /// Sums of the form factors from every leaf element, in no order of meaning: 1 in a closed scene, up to the links'

@@ -5,6 +5,7 @@
 
 use glam::{DVec2, DVec3};
 
+use super::gap::{Gap, between, open_sides, widest_m};
 use super::topology::{Polygon, components, matched, sides_of};
 use super::weld::Weld;
 use super::{BodyId, Frame, InPlane, Patch, PatchId, Scene, Sheet, Solids};
@@ -88,6 +89,7 @@ impl Scene {
 struct Group {
     placed: Vec<Placed>,
     hulls: Vec<Hull>,
+    lamps: Lamps,
     slack_m: f64,
     /// Whether they are those of a body that moves, in its frame.
     is_own: bool,
@@ -96,8 +98,8 @@ struct Group {
 /// A patch in the frame of its group.
 pub(super) struct Placed {
     pub(super) id: PatchId,
-    corners: Vec<DVec3>,
-    normal: DVec3,
+    pub(super) corners: Vec<DVec3>,
+    pub(super) normal: DVec3,
     pub(super) bounds: Aabb,
     /// Origin and axes of its plane.
     origin: DVec3,
@@ -114,8 +116,18 @@ impl Placed {
         Placed { id, corners, normal, bounds, origin: pose.point(origin), axes: [u, v] }
     }
 
+    /// Its corners in its own frame.
+    pub(super) fn outline(&self) -> Vec<DVec2> {
+        self.corners.iter().map(|&c| self.in_frame(c)).collect()
+    }
+
+    /// A point of its own frame in the group's.
+    pub(super) fn point(&self, p: DVec2) -> DVec3 {
+        self.origin + self.axes[0] * p.x + self.axes[1] * p.y
+    }
+
     /// A point of the group's frame in the patch's own.
-    fn in_frame(&self, p: DVec3) -> DVec2 {
+    pub(super) fn in_frame(&self, p: DVec3) -> DVec2 {
         let d = p - self.origin;
         DVec2::new(d.dot(self.axes[0]), d.dot(self.axes[1]))
     }
@@ -149,6 +161,11 @@ impl Lamps {
             patches: (0..scene.patches.len() as u32).filter(emits).map(patch).collect(),
             lights: scene.lights.iter().map(light).collect(),
         }
+    }
+
+    /// Whether a lamp is or may get into a box.
+    fn may_be_at(&self, bounds: &Aabb) -> bool {
+        self.lights.iter().chain(self.patches.iter().map(|p| &p.1)).any(|lamp| lamp.meets(bounds))
     }
 
     /// Whether a lamp is or may get among the polygons of a body; touching is not enough. An inner side that emits counts.
@@ -212,7 +229,7 @@ impl Group {
         let slack_m = IN_PLANE * placed.iter().map(|p| reach_m(&p.bounds)).fold(0.0, f64::max);
         let lamps = Lamps::of(scene, bodies);
         hulls.retain(|hull: &Hull| !lamps.may_be_in(scene, (&placed, hull), slack_m));
-        Group { placed, hulls, slack_m, is_own }
+        Group { placed, hulls, lamps, slack_m, is_own }
     }
 
     fn cover(&self, (scene, solids): (&Scene, &Solids), out: &mut [Covered], left: &mut usize) {
@@ -231,6 +248,31 @@ impl Group {
             for (k, patch) in self.placed.iter().enumerate() {
                 if patch.bounds.meets(&grown) && !hull.holds(k) {
                     self.stand(scene, hull, patch, (&mut out[patch.id.0 as usize], left));
+                }
+            }
+        }
+        self.narrow(scene, &order, out, left);
+    }
+
+    /// What of patches lies in narrow gaps; their numbers are in the order of their lowest coordinates.
+    fn narrow(&self, scene: &Scene, order: &[usize], out: &mut [Covered], left: &mut usize) {
+        let open = open_sides(&self.placed);
+        for (at, &one) in order.iter().enumerate() {
+            let p = &self.placed[one];
+            let reach = p.bounds.grown(widest_m((p.bounds.hi - p.bounds.lo).max_element()));
+            let may_be = |q: &&usize| self.placed[**q].bounds.lo.x <= reach.hi.x;
+            for &other in order[at + 1..].iter().take_while(may_be) {
+                let q = &self.placed[other];
+                if !reach.meets(&q.bounds) {
+                    continue;
+                }
+                let Some(gap) = between([p, q], [open[one], open[other]], self.slack_m) else {
+                    continue;
+                };
+                if !self.lamps.may_be_at(&gap.bounds.grown(2.0 * self.slack_m)) {
+                    let [on_p, on_q] = hide_gap([p, q], gap, self.is_own);
+                    on_p.add_to(scene, &mut out[p.id.0 as usize], left);
+                    on_q.add_to(scene, &mut out[q.id.0 as usize], left);
                 }
             }
         }
@@ -333,6 +375,34 @@ pub(super) fn stand(
     if add(scene, patch.id, within, (&mut *covered, left)) {
         covered.contacts.extend(inner.iter().map(|&k| placed[k].id));
     }
+}
+
+/// Part of a patch that lies in a narrow gap.
+pub(super) struct InGap {
+    pub(super) patch: PatchId,
+    part: Inside,
+}
+
+impl InGap {
+    /// Adds it to what is covered of its patch.
+    pub(super) fn add_to(self, scene: &Scene, covered: &mut Covered, left: &mut usize) {
+        *left = left.saturating_sub(1);
+        let outline = self.part.outline.clone();
+        covered.inside.push(self.part);
+        add(scene, self.patch, vec![outline], (covered, left));
+    }
+}
+
+/// What a gap hides of the two faces that it is between.
+pub(super) fn hide_gap(faces: [&Placed; 2], gap: Gap, is_own: bool) -> [InGap; 2] {
+    // No body has such a number.
+    let of = (BodyId(faces[0].id.0 | 1 << 31), faces[1].id.0);
+    let [p, q] = gap.outlines;
+    [(faces[0], p), (faces[1], q)].map(|(face, outline)| {
+        let (bounds, [u, v]) = (around(&outline), face.axes);
+        let plane = [face.origin, u, v];
+        InGap { patch: face.id, part: Inside { of, is_own, outline, bounds, plane } }
+    })
 }
 
 /// Largest coordinate of a box, metres.

@@ -7,7 +7,8 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use super::covered::{Hull, IN_PLANE, Placed, hulls_of, reach_m, stand};
+use super::covered::{Hull, IN_PLANE, Placed, hide_gap, hulls_of, reach_m, stand};
+use super::gap::{between, open_sides, widest_m};
 use super::{BodyId, Covered, Patch, PatchId, Scene};
 use crate::geometry::{Aabb, Pose};
 
@@ -28,6 +29,8 @@ struct Bodies {
     bounds: Vec<Aabb>,
     /// What may cover, by body; polygons by their number in the body.
     hulls: Vec<Vec<Hull>>,
+    /// Which sides of polygons are open, by body and by their number there.
+    open: Vec<Vec<u64>>,
 }
 
 /// A scene at one instant.
@@ -61,7 +64,12 @@ impl Bodies {
             }
             out
         };
-        Bodies { bounds: bodies().map(bounds).collect(), hulls: bodies().map(hulls).collect() }
+        let open = |body: BodyId| open_sides(&placed(scene, body, &Pose::IDENTITY));
+        Bodies {
+            bounds: bodies().map(bounds).collect(),
+            hulls: bodies().map(hulls).collect(),
+            open: bodies().map(open).collect(),
+        }
     }
 }
 
@@ -74,7 +82,8 @@ impl Covering {
         };
         self.bodies.get().map_or(0, |bodies| {
             let hulls = bodies.hulls.iter().flatten().map(hull).sum::<usize>();
-            hulls + bodies.bounds.capacity() * size_of::<Aabb>()
+            let open = bodies.open.iter().map(|sides| size_of_val(&sides[..])).sum::<usize>();
+            hulls + open + bodies.bounds.capacity() * size_of::<Aabb>()
         })
     }
 
@@ -95,7 +104,8 @@ impl Covering {
         if !(0..scene.bodies.len() as u32).map(BodyId).any(is_moved) {
             return out;
         }
-        let Bodies { bounds, hulls } = self.bodies.get_or_init(|| Bodies::of(scene));
+        let known = self.bodies.get_or_init(|| Bodies::of(scene));
+        let Bodies { bounds, hulls, .. } = known;
         let present: Vec<Present> = (0..scene.bodies.len() as u32)
             .map(BodyId)
             .filter(|&body| !scene.is_distant(body) && bounds[body.0 as usize] != Aabb::EMPTY)
@@ -125,6 +135,7 @@ impl Covering {
                 Covering::cover(&there, (hulls, &present), rest, (&mut out, &mut left));
             }
         }
+        narrow(scene, (now, rest), (known, &present), (&mut out, &mut left));
         for covered in out.values_mut() {
             covered.contacts.sort_unstable();
             covered.contacts.dedup();
@@ -193,6 +204,71 @@ impl Covering {
                 within(&third.bounds) && scene.patches_of(third.body).any(shines)
             })
     }
+}
+
+/// Pairs of polygons of two bodies that are looked at for gaps; of more none are.
+const PAIRS_MAX: usize = 1 << 20;
+
+/// Adds what of patches lies in narrow gaps between two bodies of which one is moved.
+fn narrow(
+    scene: &Scene,
+    (now, rest): (&Instant<'_>, &[Covered]),
+    (known, present): (&Bodies, &[Present]),
+    (out, left): (&mut BTreeMap<PatchId, Covered>, &mut usize),
+) {
+    let mut lamps: Option<Vec<Aabb>> = None;
+    for (k, one) in present.iter().enumerate() {
+        for other in present[k + 1..].iter().filter(|other| one.is_moved || other.is_moved) {
+            let size = |b: &Present| widest_m((b.bounds.hi - b.bounds.lo).max_element());
+            let reach_m = size(one).min(size(other));
+            if !one.bounds.grown(reach_m).meets(&other.bounds) {
+                continue;
+            }
+            let slack_m = IN_PLANE * reach_m_of(&[one, other]);
+            let near = |of: &Present, by: &Present| -> Vec<(usize, Placed)> {
+                let by = by.bounds.grown(reach_m);
+                let all = placed(scene, of.body, &of.pose).into_iter().enumerate();
+                all.filter(|(_, face)| face.bounds.meets(&by)).collect()
+            };
+            let (of_one, of_other) = (near(one, other), near(other, one));
+            if of_one.len() * of_other.len() > PAIRS_MAX {
+                continue;
+            }
+            for (i, p) in &of_one {
+                let reach = p.bounds.grown(widest_m((p.bounds.hi - p.bounds.lo).max_element()));
+                for (j, q) in of_other.iter().filter(|(_, q)| reach.meets(&q.bounds)) {
+                    let open = [(one, *i), (other, *j)];
+                    let open = open.map(|(of, at)| known.open[of.body.0 as usize][at]);
+                    let Some(gap) = between([p, q], open, slack_m) else { continue };
+                    let lamps = lamps.get_or_insert_with(|| lamps_of(scene, now, present));
+                    let bounds = gap.bounds.grown(2.0 * slack_m);
+                    if now.lights.iter().chain(&*lamps).any(|lamp| lamp.meets(&bounds)) {
+                        continue;
+                    }
+                    for part in hide_gap([p, q], gap, false) {
+                        let covered = out
+                            .entry(part.patch)
+                            .or_insert_with(|| rest[part.patch.0 as usize].clone());
+                        part.add_to(scene, covered, left);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Boxes around what emits at any time, where it is.
+fn lamps_of(scene: &Scene, now: &Instant<'_>, present: &[Present]) -> Vec<Aabb> {
+    let of_body = |of: &Present| {
+        let glowing = scene.patches_of(of.body).filter(|(id, _)| now.glows[id.0 as usize]);
+        glowing.map(|(id, patch)| Placed::new(id, patch, &of.pose).bounds).collect::<Vec<_>>()
+    };
+    present.iter().flat_map(of_body).collect()
+}
+
+/// Largest coordinate of bodies, metres.
+fn reach_m_of(bodies: &[&Present]) -> f64 {
+    bodies.iter().map(|of| reach_m(&of.bounds)).fold(0.0, f64::max)
 }
 
 /// Two bodies, of which the first may cover the second.

@@ -26,6 +26,7 @@ mod edit;
 mod edited;
 mod error;
 pub mod flatten;
+mod gap;
 mod glow;
 mod in_plane;
 mod insert;

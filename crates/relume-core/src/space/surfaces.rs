@@ -247,8 +247,8 @@ impl Receivers for Forest {
         self.are_in_contact(a, b)
     }
 
-    fn dark_exchange_m2(&self, a: ElementId, b: ElementId) -> f32 {
-        exchange_inside_m2(self, a, b) as f32
+    fn dark_exchange_m2(&self, a: ElementId, b: ElementId, exchange_m2: f32) -> f32 {
+        exchange_inside_m2(self, (a, b), f64::from(exchange_m2)) as f32
     }
 
     fn is_apart(&self, id: ElementId) -> bool {

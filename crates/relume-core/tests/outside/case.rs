@@ -73,6 +73,8 @@ pub(crate) struct Case {
     pub(crate) lit: bool,
     /// Whether form factors are looked at.
     pub(crate) factors: bool,
+    /// Whether what arrives at each surface is compared with particles of the judge.
+    pub(crate) fluxes: bool,
     /// Whether links are compared with a cold build.
     pub(crate) cold: bool,
     pub(crate) times_s: Vec<f64>,
@@ -104,6 +106,7 @@ impl Case {
             sensors: Vec::new(),
             lit: false,
             factors: true,
+            fluxes: false,
             cold: false,
             times_s: vec![0.0],
             irradiance: None,

@@ -12,6 +12,7 @@
 #![allow(clippy::disallowed_methods)]
 
 mod case;
+mod interior;
 mod many;
 mod moving;
 mod near;
@@ -57,6 +58,7 @@ pub(crate) const KINDS: &[Kind] = &[
     Kind { name: "motion", draw: moving::motion, tolerances: COARSE },
     Kind { name: "closet", draw: moving::closet, tolerances: COARSE },
     Kind { name: "table", draw: moving::table, tolerances: COARSE },
+    Kind { name: "interior", draw: interior::interior, tolerances: COARSE },
     Kind { name: "device", draw: near::device, tolerances: LIGHT },
     Kind { name: "downlight", draw: thin::downlight, tolerances: LIGHT },
 ];

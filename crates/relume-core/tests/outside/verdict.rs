@@ -101,6 +101,7 @@ pub(crate) fn judge(case: &Case) -> Verdict {
         run(case, &scene, &options, &mut verdict, &mut |session, report, time_s, verdict| {
             energy(case, report, time_s, verdict);
             sensors(case, session, time_s, verdict);
+            fluxes(case, session, time_s, verdict);
         });
     }
     verdict
@@ -306,6 +307,68 @@ fn energy(case: &Case, report: &FrameReport, time_s: f64, verdict: &mut Verdict)
             f64::max(BALANCE, case.tolerance) * e.emitted_w,
         );
     }
+}
+
+/// Batches of particles.
+const PARTICLES: u32 = 4_000;
+
+/// Surfaces with less of the exposed area than this are looked at together alone.
+const SMALL: f64 = 0.01;
+
+/// What is darker than this share of the mean is measured by it.
+const DARK: f64 = 0.1;
+
+/// By how many tolerances the mean irradiance of one surface may be off.
+const OF_ONE: f64 = 2.0;
+
+/// Mean irradiances of surfaces: the root of their mean square error over the area within the tolerance, none off by much more, and all
+/// together by a quarter of it.
+fn fluxes(case: &Case, session: &Session, time_s: f64, verdict: &mut Verdict) {
+    if !case.fluxes {
+        return;
+    }
+    let grouping = Grouping::by_surface(session.scene());
+    let found = session.frame().unwrap().fluxes(&grouping);
+    let (world, names) = case.world(time_s);
+    let particles = path::arriving(&world, PARTICLES, 78);
+    let (mut exact, mut noise) = (BTreeMap::new(), BTreeMap::new());
+    for (name, e) in names.iter().zip(&particles) {
+        *exact.entry(name.as_str()).or_insert(0.0) += e.irradiance[0];
+        *noise.entry(name.as_str()).or_insert(0.0_f64) += e.standard_error[0].powi(2);
+    }
+    let mut areas = BTreeMap::new();
+    for (name, polygon) in names.iter().zip(world.polygons()) {
+        *areas.entry(name.as_str()).or_insert(0.0) += polygon.area_m2();
+    }
+    let area_m2: f64 = areas.values().sum();
+    let all_w: f64 = exact.values().sum();
+    let (mut sum, mut squares, mut noises) = (0.0, 0.0, 0.0);
+    for (name, found) in grouping.names.iter().zip(&found) {
+        let (Some(&w), Some(&square)) = (exact.get(name.as_str()), noise.get(name.as_str())) else {
+            continue;
+        };
+        let (off, error) = (found.arriving_w[0] - w, square.sqrt());
+        sum += off;
+        noises += square;
+        let share = areas[name.as_str()] / area_m2;
+        // What is dark beside the rest is measured by a tenth of that.
+        let here = w.max(DARK * all_w * share);
+        if here > 0.0 {
+            squares += share * ((off.abs() - error).max(0.0) / here).powi(2);
+        }
+        if share > SMALL {
+            let what = format!(
+                "{name} at {time_s} s: {:.4} W arrive, not {w:.4} +- {error:.0e}",
+                found.arriving_w[0]
+            );
+            verdict.add("flux", what, off.abs(), OF_ONE * case.tolerance * here + NOISE * error);
+        }
+    }
+    let what = format!("irradiance of surfaces at {time_s} s, root mean square");
+    verdict.add("rms", what, squares.sqrt(), case.tolerance);
+    let what =
+        format!("all that arrives at {time_s} s: {:+.3} % of {all_w:.4} W", 100.0 * sum / all_w);
+    verdict.add("all", what, sum.abs(), case.tolerance / 4.0 * all_w + NOISE * noises.sqrt());
 }
 
 /// Batches of paths of the first try and the last, which has a sixth of the tolerance or is as good as it gets.

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::{DVec2, DVec3};
 
 use super::{ElementId, Forest, Kind, exposed_m2};
-use crate::geometry::{Aabb, common};
+use crate::geometry::{Aabb, Moments, common};
 use crate::scene::{BodyId, Covered, Instant, LightId, PatchId, Scene, World};
 
 /// Part of an element that lies within a body.
@@ -16,7 +16,12 @@ pub struct PartInside {
     pub corners: Vec<DVec3>,
     /// Unit normal.
     pub normal: DVec3,
+    /// Whether it is all of the element.
+    pub is_whole: bool,
 }
+
+/// Share of an element from which a part is all of it: rounding.
+const WHOLE: f64 = 1.0 - 1e-6;
 
 /// Elements of a patch of which something else is covered.
 enum Which {
@@ -79,7 +84,9 @@ impl Forest {
             let outline = common(&part.outline, own);
             if outline.len() > 2 {
                 let corners = outline.iter().map(|p| origin + u * p.x + v * p.y).collect();
-                out.push(PartInside { of: (part.of, part.is_own), corners, normal: u.cross(v) });
+                let is_whole = Moments::of(&outline).area >= WHOLE * shape.area();
+                let (of, normal) = ((part.of, part.is_own), u.cross(v));
+                out.push(PartInside { of, corners, normal, is_whole });
             }
         }
         out

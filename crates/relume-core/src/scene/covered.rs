@@ -32,10 +32,10 @@ const CONVEX_MAX: usize = 128;
 /// Polygons of a surface, and covered parts of a patch, that are looked at.
 const POLYGONS_MAX: usize = 4_096;
 
-/// Part of a patch that lies within a body.
+/// Part of a patch that lies within a body, or in a narrow gap.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inside {
-    /// The body, and a number of what of it hangs together.
+    /// The body, and a number of what of it hangs together; of a gap numbers that no body has.
     pub of: (BodyId, u32),
     /// Whether the patch is one of the same body's, which moves; then places are in that body's frame, else in the world.
     pub is_own: bool,
@@ -52,7 +52,7 @@ pub struct Inside {
 pub struct Covered {
     /// Disjoint convex polygons in the patch's frame, counter-clockwise, with boxes around them (low, high); metres.
     pub parts: Vec<(Vec<DVec2>, [DVec2; 2])>,
-    /// What of it lies within bodies: what that exchanges with what lies within the same body, no light does. Of one body disjoint.
+    /// What of it lies within bodies or narrow gaps: what that exchanges with what lies within the same one, no light does. Of one disjoint.
     pub inside: Vec<Inside>,
     /// Patches that touch it, and inner sides of what stands on it: what they exchange leaves neither. Ascending.
     pub contacts: Vec<PatchId>,
@@ -62,7 +62,7 @@ impl Scene {
     /// What of each patch is covered by what rests on it; empty where nothing is. That is where it touches another patch or
     /// another shows in its place ([`Sheet::lies_to`]), and where a body of polygons that look outwards, or are two-sided, stands on
     /// it or sticks in it: one that is closed but for a border in the patch's plane or behind it, so that boxes without a bottom
-    /// count, all wound alike, and without lamps in it. Bodies that never move cover each other, a body that moves only itself.
+    /// count, all wound alike, and without lamps in it; and what lies in narrow gaps (`scene/gap.rs`). Bodies that never move cover each other, a body that moves only itself.
     /// Exact to a millionth of the largest coordinate. Of patches that are covered by more than 0.999 by one thing nothing is said.
     /// Those that `is_displaced` names are not where the file has them: they cover themselves alone, as if they moved.
     pub fn covered(&self, solids: &Solids, is_displaced: &dyn Fn(BodyId) -> bool) -> Vec<Covered> {

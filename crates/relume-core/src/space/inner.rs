@@ -1,4 +1,4 @@
-//! What elements exchange within bodies, where no light is.
+//! What elements exchange within bodies and narrow gaps, where no light is.
 //!
 //! A box that is sunk into a floor and a wall covers a part of both, and these parts see each other within it. Exchange areas have that
 //! in them; light is carried by the rest.

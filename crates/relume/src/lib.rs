@@ -84,7 +84,7 @@ pub mod scene {
     pub use relume_io::{FrameRange, ImportOptions, Instants, import, read_file};
 }
 
-pub use relume_core::geometry::Pose;
+pub use relume_core::geometry::{Aabb, Pose};
 pub use relume_core::glam;
 pub use relume_core::scene::{
     Body, BodyId, Camera, Edits, Held, Interpolation, Light, LightId, LightKind, Material,

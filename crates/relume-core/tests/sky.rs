@@ -260,7 +260,12 @@ fn path_traced(scene: &Scene, outside: &Outside, sensor: &Sensor, paths: u32) ->
         sum / f64::from(count)
     };
     let found: Vec<f64> = (0..batches).into_par_iter().map(batch).collect();
-    let n = batches as f64;
+    mean_and_error(&found)
+}
+
+/// Mean of independent estimates, with its standard error.
+fn mean_and_error(found: &[f64]) -> (f64, f64) {
+    let n = found.len() as f64;
     let mean = found.iter().sum::<f64>() / n;
     let spread = found.iter().map(|e| (e - mean).powi(2)).sum::<f64>();
     (mean, (spread / (n * (n - 1.0))).sqrt())

@@ -213,8 +213,7 @@ fn path_traced(scene: &Scene, outside: &Outside, sensor: &Sensor, paths: u32) ->
     let batches = 64_u64;
     let batch = |k: u64| {
         let mut random = Random::of_part(7, k);
-        let mut sum = 0.0;
-        let count = paths / batches as u32;
+        let (mut sum, count) = (0.0, paths / batches as u32);
         let turned = random.unit();
         for n in 0..count {
             let (mut at, mut normal, mut weight, mut on) = (sensor.at, sensor.normal, 1.0, None);

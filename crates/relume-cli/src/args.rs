@@ -84,7 +84,8 @@ pub(crate) enum Command {
     /// Solve a clip frame by frame and from scratch side by side, and say where they differ.
     ///
     /// Compares all links (which there are, exchange areas, visibilities, gradients: bit for bit),
-    /// the numbers of elements, and the radiosities, which may differ by what the residuals allow.
+    /// the numbers of elements, the coarse solution and groups (bit for bit), and the radiosities, which may
+    /// differ by what the residuals allow.
     /// Stops at the first frame that differs, names the first link in question, and exits with 1.
     #[command(after_help = "Example:  relume verify scene.glb --frames 0-48x12 --tolerance 0.1")]
     Verify(VerifyArgs),

@@ -135,8 +135,8 @@ impl Clip {
     /// The same clip with a lamp at a place in the world (metres): what is half the scene's extent away gets
     /// 1 W/m2 at most.
     pub(crate) fn with_lamp(&self, at: DVec3) -> Clip {
-        let extent =
-            self.scene.bounds(self.time_of(self.frames[0])).map_or(1.0, |(a, b)| a.distance(b));
+        let bounds = self.scene.bounds(self.time_of(self.frames[0]));
+        let extent = bounds.map_or(1.0, |bounds| bounds.diagonal());
         let intensity = extent * extent / 4.0;
         let light = Some(format!("a lamp at {:.4},{:.4},{:.4}", at.x, at.y, at.z));
         let scene = Arc::new(self.scene.with_point_light(at, [intensity; 3]));

@@ -265,13 +265,13 @@ mod tests {
                 .find(|p| scene.materials[p.material.0 as usize].exitance[0] > 0.0)
                 .map(|p| (p, p.body))
                 .unwrap();
-            let (min, max) = scene.bounds(0.0).unwrap();
+            let bounds = scene.bounds(0.0).unwrap();
             for frame in 0..20 {
                 let pose = scene.pose(body, f64::from(frame) / FPS).unwrap();
                 assert_eq!(pose.direction(patch.frame.normal), DVec3::NEG_Y);
                 for corner in patch.corners_in_body() {
                     let p = pose.point(corner);
-                    assert!(min.cmple(p).all() && p.cmple(max).all(), "{p}");
+                    assert!(bounds.lo.cmple(p).all() && p.cmple(bounds.hi).all(), "{p}");
                 }
             }
         }

@@ -85,11 +85,11 @@ fn overview(out: &mut String, scene: &Scene) -> fmt::Result {
         number(scene.area_m2())
     )?;
     match scene.bounds(0.0) {
-        Some((min, max)) => writeln!(
+        Some(bounds) => writeln!(
             out,
             "bounds     {} to {} m at the start",
-            triple(min.to_array()),
-            triple(max.to_array())
+            triple(bounds.lo.to_array()),
+            triple(bounds.hi.to_array())
         ),
         None => writeln!(out, "bounds     nothing is present at the start"),
     }

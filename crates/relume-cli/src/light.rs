@@ -64,9 +64,9 @@ fn lit_from_within(
     let beside = clip.with_lamp(eye);
     let lit = share_lit(&beside, &views).unwrap_or(0.0);
     if lit < LIT_MIN
-        && let Some((low, high)) = clip.scene.bounds(clip.time_of(clip.frames[0]))
+        && let Some(bounds) = clip.scene.bounds(clip.time_of(clip.frames[0]))
     {
-        let within = clip.with_lamp(low.midpoint(high));
+        let within = clip.with_lamp(bounds.centre());
         let anew = Viewing::new(&within.scene, flags)?;
         if share_lit(&within, &anew).is_some_and(|more| more > lit) {
             clip.say(&outside::said_of_lamp(&clip.scene.name, "in the middle of the scene"));

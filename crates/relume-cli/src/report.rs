@@ -179,7 +179,7 @@ impl SceneSummary {
             area_m2: scene.area_m2(),
             bounds: scene
                 .bounds(0.0)
-                .map(|(min, max)| Bounds { min: min.to_array(), max: max.to_array() }),
+                .map(|bounds| Bounds { min: bounds.lo.to_array(), max: bounds.hi.to_array() }),
             content,
         }
     }

@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use clap::Args;
 use glam::DVec3;
+use relume::Aabb;
 use relume::scene::{Projection, Scene};
 use relume_picture::picture::{View, Viewpoint};
 
@@ -114,8 +115,8 @@ struct Turn {
 impl Viewing {
     /// The views of a scene that flags ask for.
     pub(crate) fn new(scene: &Scene, flags: &ViewFlags) -> Result<Viewing, Failure> {
-        let bounds = scene.bounds(0.0).unwrap_or_default();
-        let middle = bounds.0.midpoint(bounds.1);
+        let bounds = scene.bounds(0.0).unwrap_or(Aabb { lo: DVec3::ZERO, hi: DVec3::ZERO });
+        let middle = bounds.centre();
         let look_at = flags.look_at.map_or(middle, |triple| triple.0);
         let up = flags.up.map_or(DVec3::Y, |triple| triple.0);
         let viewpoint = match (flags.eye, flags.overview) {
@@ -132,7 +133,7 @@ impl Viewing {
                 let eye = viewpoint.at(scene, 0.0).map_err(Failure::new)?;
                 let eye = eye.world_from_camera.translation;
                 // Within the scene it would circle through walls.
-                let within = eye.cmpgt(bounds.0).all() && eye.cmplt(bounds.1).all();
+                let within = eye.cmpgt(bounds.lo).all() && eye.cmplt(bounds.hi).all();
                 let about = if within && flags.look_at.is_none() { eye } else { look_at };
                 Some(Turn { about, up, frames })
             }
@@ -211,7 +212,7 @@ mod tests {
     #[test]
     fn a_place_looks_at_the_middle_unless_told_otherwise() {
         let scene = scene();
-        let middle = scene.bounds(0.0).map(|(low, high)| low.midpoint(high)).unwrap();
+        let middle = scene.bounds(0.0).unwrap().centre();
         let view = Viewing::new(&scene, &flags()).unwrap().at(&scene, 0, 24.0).unwrap();
         let centre = glam::DVec2::new(50.0, 50.0);
         assert!(view.project(middle, 100, 100).unwrap().distance(centre) < 1e-9);
@@ -229,7 +230,7 @@ mod tests {
         let flags = ViewFlags { turntable: Some(4), ..flags() };
         let views = Viewing::new(&scene, &flags).unwrap();
         let eye = |frame| views.at(&scene, frame, 24.0).unwrap().world_from_camera.translation;
-        let middle = scene.bounds(0.0).map(|(low, high)| low.midpoint(high)).unwrap();
+        let middle = scene.bounds(0.0).unwrap().centre();
         assert_eq!(eye(0), eye(4));
         let opposite = 2.0 * middle - eye(0);
         assert!((eye(2) - opposite.with_y(1.0)).length() < 1e-9, "{}", eye(2));

@@ -60,6 +60,28 @@ pub(crate) fn clutter() -> Scene {
     b.build().unwrap()
 }
 
+/// A room with a row of small crates close to each other: groups of several of them.
+fn row_of_crates() -> Scene {
+    let mut b = SceneBuilder::new("row");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let red = b.material("red", [0.7, 0.2, 0.1], [0.0; 3]);
+    let glow = b.material("glow", [0.1; 3], [9.0, 8.0, 7.0]);
+    let (walls, lamp) = (b.body("walls"), b.body("lamp"));
+    let (corners, triangles) = cube(1.0, true);
+    b.mesh(walls, "walls", grey, &corners, &triangles);
+    let at = |x: f64, half: f64| {
+        let place = move |c: &[f64; 3]| [c[0] * half + x, c[1] * half, c[2] * half];
+        cube(1.0, false).0.iter().map(place).collect::<Vec<_>>()
+    };
+    b.mesh(lamp, "lamp", glow, &at(0.8, 0.1), &cube(1.0, false).1);
+    for k in 0..24 {
+        let body = b.body(&format!("crate {k}"));
+        let corners = at(0.034 * f64::from(k) - 0.6, 0.015);
+        b.mesh(body, "crate", red, &corners, &cube(1.0, false).1);
+    }
+    b.build().unwrap()
+}
+
 /// A room with so many by so many tables, each with four chairs about it and cups on it: chairs of 72 patches, tables of large
 /// patches and small ones, cups of 12 small ones.
 fn furnished(rows: u32) -> Scene {
@@ -146,6 +168,8 @@ pub(crate) fn check(session: &mut Session, why: &str) {
     for (x, y) in a.radiosity.iter().flatten().zip(b.radiosity.iter().flatten()) {
         assert!((x - y).abs() <= bound, "{why}: {x} {y}, mean {mean}");
     }
+    let found = compare(session.solved().unwrap(), other.solved().unwrap());
+    assert_eq!(found.map(|found| found.in_words("followed", "from scratch")), None, "{why}");
 }
 
 /// A command drawn at random, of any kind that does not change the scene.
@@ -719,6 +743,36 @@ fn a_body_of_many_patches_is_taken_up_where_it_rests() {
     check(&mut session, "and leaves, and the first is put down");
     assert_eq!(session.solve().unwrap().hash(), hash);
     assert!(2 * taken < all, "{taken} of {all} pairs");
+}
+
+#[test]
+fn groups_that_come_apart_leave_the_coarse_solution_of_a_cold_build() {
+    let mut session = Session::new(row_of_crates(), at_tolerance(0.2)).unwrap();
+    let report = session.solve().unwrap().report().clone();
+    assert!(report.link_kinds.is_some_and(|kinds| kinds.group_group > 0), "{report:?}");
+    // Out of the row, and from either end, so that others of their groups are seen past nothing that moved.
+    let aside = v(0.0, 0.1, 0.0);
+    let takes = [("crate 0", Some(aside)), ("crate 23", Some(aside)), ("crate 0", None)];
+    for (name, to) in takes.into_iter().chain([("crate 12", Some(aside)), ("crate 23", None)]) {
+        let body = session.scene().body_named(name).unwrap();
+        place(&mut session, body, to);
+        check(&mut session, &format!("{name} at {to:?}"));
+    }
+}
+
+#[test]
+fn a_body_that_comes_absent_leaves_the_coarse_solution_of_a_cold_build() {
+    let mut session = Session::new(room(), at_tolerance(0.4)).unwrap();
+    start(&mut session);
+    session.solve().unwrap();
+    let (corners, triangles) = cube(0.03, false);
+    let new = NewBody::new("new").with_mesh("new", MaterialId(1), &corners, &triangles);
+    let body = BodyId(session.scene().bodies.len() as u32);
+    session.apply(Command::Insert(new)).unwrap();
+    session.apply(Command::hide(body)).unwrap();
+    check(&mut session, "one comes that is not there");
+    session.apply(Command::SetPresence(body, None)).unwrap();
+    check(&mut session, "and appears");
 }
 
 /// Costs of taking bodies of a furnished room up, beside those of moving them on.

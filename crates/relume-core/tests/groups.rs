@@ -8,7 +8,7 @@ use crate::common::{Random, at_tolerance, leaf_area, shipped, sliding, still, tu
 use glam::{DQuat, DVec3};
 use relume_core::scene::outside::{Day, Outside, Sky, Sun, SunPlace};
 use relume_core::scene::{LightKind, MaterialId, NodeId, PatchId, Scene, SceneBuilder};
-use relume_core::session::{FrameReport, Options, Session, Snapshot, radiosity_gap};
+use relume_core::session::{FrameReport, Options, Session, Snapshot, compare, radiosity_gap};
 use relume_judge::path::{Site, irradiance};
 
 /// A torus with lumps of `around` by `around / 2` quadrilaterals, each of two triangles.
@@ -178,6 +178,8 @@ fn follow_in(scene: Arc<Scene>, seed: u64) {
         assert_eq!(state(&report), state(&want), "seed {seed} at {time_s}");
         let gap = radiosity_gap(warm.solved().unwrap(), of_cold.solved().unwrap());
         assert!(gap.is_ok(), "seed {seed} at {time_s}: {gap:?}");
+        let found = compare(warm.solved().unwrap(), of_cold.solved().unwrap());
+        assert_eq!(found, None, "seed {seed} at {time_s}");
         // What comes over groups counts in them, after elements were put together too.
         let rows = [&report, &want].map(|report| report.row_sum_error.unwrap().rms);
         assert!((rows[0] - rows[1]).abs() < 1e-4, "seed {seed} at {time_s}: {rows:?}");

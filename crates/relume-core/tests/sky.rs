@@ -213,8 +213,7 @@ fn path_traced(scene: &Scene, outside: &Outside, sensor: &Sensor, paths: u32) ->
     let batches = 64_u64;
     let batch = |k: u64| {
         let mut random = Random::of_part(7, k);
-        let mut sum = 0.0;
-        let count = paths / batches as u32;
+        let (mut sum, count) = (0.0, paths / batches as u32);
         let turned = random.unit();
         for n in 0..count {
             let (mut at, mut normal, mut weight, mut on) = (sensor.at, sensor.normal, 1.0, None);
@@ -260,7 +259,12 @@ fn path_traced(scene: &Scene, outside: &Outside, sensor: &Sensor, paths: u32) ->
         sum / f64::from(count)
     };
     let found: Vec<f64> = (0..batches).into_par_iter().map(batch).collect();
-    let n = batches as f64;
+    mean_and_error(&found)
+}
+
+/// Mean of independent estimates, with its standard error.
+fn mean_and_error(found: &[f64]) -> (f64, f64) {
+    let n = found.len() as f64;
     let mean = found.iter().sum::<f64>() / n;
     let spread = found.iter().map(|e| (e - mean).powi(2)).sum::<f64>();
     (mean, (spread / (n * (n - 1.0))).sqrt())

@@ -19,6 +19,7 @@ mod options;
 mod range;
 mod regular;
 mod surface;
+mod tuning;
 mod view3d;
 
 pub use environment::read_environment;

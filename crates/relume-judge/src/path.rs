@@ -475,11 +475,15 @@ mod tests {
             for c in 0..3 {
                 let error = mean.standard_error[c].hypot(found[k].standard_error[c]);
                 let off = (mean.irradiance[c] - found[k].irradiance[c]).abs();
-                assert!(off <= 4.0 * error && error < 0.02 * mean.irradiance[c], "{k}: {mean:?} {found:?}");
+                assert!(
+                    off <= 4.0 * error && error < 0.02 * mean.irradiance[c],
+                    "{k}: {mean:?} {found:?}"
+                );
             }
         }
         // Nothing gets out: what is absorbed was emitted.
-        let absorbed: f64 = found[..6].iter().map(|e| 0.4 * e.irradiance[0]).sum::<f64>() + found[6].irradiance[0];
+        let absorbed: f64 =
+            found[..6].iter().map(|e| 0.4 * e.irradiance[0]).sum::<f64>() + found[6].irradiance[0];
         assert!((absorbed / (9.0 * 0.03) - 1.0).abs() < 0.02, "{absorbed}");
     }
 

@@ -84,7 +84,7 @@ pub mod scene {
     pub use relume_io::{FrameRange, ImportOptions, Instants, import, read_file};
 }
 
-pub use relume_core::geometry::Pose;
+pub use relume_core::geometry::{Aabb, Pose};
 pub use relume_core::glam;
 pub use relume_core::scene::{
     Body, BodyId, Camera, Edits, Held, Interpolation, Light, LightId, LightKind, Material,
@@ -93,7 +93,7 @@ pub use relume_core::scene::{
 };
 pub use relume_core::session::{
     Accuracy, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Flux,
-    Frame, FrameReport, Grouping, Hash, Leaf, Memory, Mesh, Open, Options, Oracle, PairCounts, Removed,
-    RowSumError, Seconds, Sensor, Session, SessionError, Snapshot, Update, Watch, Work,
+    Frame, FrameReport, Grouping, Hash, Leaf, Memory, Mesh, Open, Options, Oracle, PairCounts,
+    Removed, RowSumError, Seconds, Sensor, Session, SessionError, Snapshot, Update, Watch, Work,
 };
 pub use relume_io::{ImportOptions, Log, LogError, import, read_environment};

@@ -1,4 +1,4 @@
-//! docs/tuning.md: the calibration constants, made of the files `tuning.rs` of the engine's rooms, of pictures and of the command.
+//! docs/tuning.md: the calibration constants, made of the files `tuning.rs` of the engine's rooms, of readers, of pictures and of the command.
 //!
 //! `RELUME_DOCS=1 cargo test -p relume tuning::` writes the page anew.
 
@@ -89,6 +89,7 @@ fn rooms() -> Vec<(String, Vec<Constant>)> {
     dirs.sort();
     let name = |dir: &PathBuf| dir.file_name().unwrap().to_str().unwrap().to_owned();
     let mut rooms: Vec<(String, PathBuf)> = dirs.into_iter().map(|dir| (name(&dir), dir)).collect();
+    rooms.push(("files".into(), engine().join("../../relume-io/src")));
     rooms.push(("pictures".into(), engine().join("../../relume-picture/src/picture")));
     rooms.push(("the command".into(), engine().join("../../relume-cli/src")));
     let mut found = Vec::new();
@@ -102,7 +103,7 @@ fn rooms() -> Vec<(String, Vec<Constant>)> {
 
 const HEAD: &str = "# Calibration constants\n\n\
     Numbers that were chosen, not derived: each trades accuracy against time or memory. The page is made of the files\n\
-    `tuning.rs` of the engine's rooms, of pictures and of the command; a test holds the two equal (`RELUME_DOCS=1 cargo test -p relume tuning::` writes it).\n\
+    `tuning.rs` of the engine's rooms, of readers of files, of pictures and of the command; a test holds the two equal (`RELUME_DOCS=1 cargo test -p relume tuning::` writes it).\n\
     \"Not varied\": no other value is on record. What was measured is in [tolerance.md](tolerance.md), [exchange.md](exchange.md)\n\
     and [decisions](decisions).\n";
 

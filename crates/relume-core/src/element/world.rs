@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::forest::Forest;
 use super::ids::{ElementId, Kind};
 use super::split::{Shape, bilinear};
-use crate::geometry::{Aabb, Plane, Pose};
+use crate::geometry::{Aabb, Interval, Plane, Pose};
 use crate::scene::{BodyId, Frame, Light, LightId, LightKind, PatchId, Scene, World};
 
 /// Relative rounding of what files hold: coordinates in single precision.
@@ -394,13 +394,13 @@ impl WorldElement {
         DVec2::new(shift.x * yy - shift.y * xy, shift.y * xx - shift.x * xy) / det
     }
 
-    /// Signed distances of the corners from a plane: smallest and largest, metres.
+    /// Signed distances of the corners from a plane, metres.
     #[inline]
-    pub fn span(&self, plane: &Plane) -> (f64, f64) {
+    pub fn span(&self, plane: &Plane) -> Interval {
         // Written out: as a map it is a call for each corner.
         let [p, q, r, s] = &self.corners;
         let d = [plane.distance(*p), plane.distance(*q), plane.distance(*r), plane.distance(*s)];
-        (d[0].min(d[1]).min(d[2].min(d[3])), d[0].max(d[1]).max(d[2].max(d[3])))
+        Interval { lo: d[0].min(d[1]).min(d[2].min(d[3])), hi: d[0].max(d[1]).max(d[2].max(d[3])) }
     }
 }
 

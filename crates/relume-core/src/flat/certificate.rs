@@ -7,7 +7,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::element::ElementId;
-use crate::geometry::{Aabb, shaft_meets_box};
+use crate::geometry::{Aabb, Interval, shaft_meets_box};
 use crate::pair::{CertificateTests, Moves};
 use crate::predict::MotionBounds;
 use crate::scene::{BodyId, Drift};
@@ -15,6 +15,7 @@ use crate::scene::{BodyId, Drift};
 use super::forest::FlatForest;
 use super::plane::{ROUNDING, Segment, in_space};
 use super::scene::{BodyIndex, FlatScene};
+use super::tuning::ALIKE;
 use super::view::PlaneView;
 
 /// A scene in the plane at one instant, with what comes.
@@ -40,10 +41,6 @@ struct Ends {
 
 /// What is farther apart than this share of the coordinates is so whatever rounding does.
 const CLEAR: f64 = 1e-9;
-
-/// Least share of the largest coordinates that the smallest ones may be for rounding to be told from
-/// what touches.
-const ALIKE: f64 = 0.01;
 
 impl CertificateTests for PlaneCertificateTests<'_> {
     fn motion_bounds(&self) -> &MotionBounds {
@@ -84,7 +81,7 @@ impl CertificateTests for PlaneCertificateTests<'_> {
             let slack = 2.0 * slack_m(least, ends.size_m);
             let behind = |one: &Segment, other: &Segment, by: Drift, of: Drift| {
                 let known = !matches!(of, Drift::Turns(_));
-                let shift = by.reach().difference(&of.reach()).along(in_space(one.normal())).1;
+                let shift = by.reach().difference(&of.reach()).along(in_space(one.normal())).hi;
                 known && farthest(one, other) + shift <= slack
             };
             let (drift_a, drift_b) = (self.drift(h, body_a), self.drift(h, body_b));
@@ -241,12 +238,12 @@ impl Sweep<'_> {
         ];
         normals.into_iter().any(|n| {
             let span = |s: &Segment, by: &Aabb| {
-                let (p, q, by) = (n.dot(s.start), n.dot(s.end), by.along(in_space(n)));
-                (p.min(q) + by.0, p.max(q) + by.1)
+                Interval::of([n.dot(s.start), n.dot(s.end)]) + by.along(in_space(n))
             };
-            let (a, b, c) = (span(a, &moves.a), span(b, &moves.b), span(c, &moves.c));
+            let ends = span(a, &moves.a).union(span(b, &moves.b));
+            let c = span(c, &moves.c);
             let margin = CLEAR * self.size_m * n.length();
-            a.0.min(b.0) > c.1 + margin || a.1.max(b.1) < c.0 - margin
+            ends.lo > c.hi + margin || ends.hi < c.lo - margin
         })
     }
 
@@ -262,7 +259,7 @@ impl Sweep<'_> {
         let shift = match rides {
             // It keeps its distances.
             true => 0.0,
-            false => self.moves.c.difference(by).along(in_space(end.normal())).1,
+            false => self.moves.c.difference(by).along(in_space(end.normal())).hi,
         };
         (rides || !turns) && farthest(end, c) + shift <= half_m
     }
@@ -271,13 +268,15 @@ impl Sweep<'_> {
     fn is_on_one_side(&self, c: &Segment, half_m: f64) -> bool {
         let normal: DVec3 = in_space(c.normal());
         let span = |end: &Segment, by: &Aabb, rides: bool| {
-            let (p, q) = (c.distance(end.start), c.distance(end.end));
-            let shift = if rides { (0.0, 0.0) } else { by.difference(&self.moves.c).along(normal) };
-            (p.min(q) + shift.0, p.max(q) + shift.1)
+            let shift = match rides {
+                true => Interval::ZERO,
+                false => by.difference(&self.moves.c).along(normal),
+            };
+            Interval::of([c.distance(end.start), c.distance(end.end)]) + shift
         };
         let known = !self.moves.turning.2 || (self.rides.0 && self.rides.1);
-        let (a, b) =
-            (span(self.a, &self.moves.a, self.rides.0), span(self.b, &self.moves.b, self.rides.1));
-        known && (a.0.min(b.0) >= -half_m || a.1.max(b.1) <= half_m)
+        let a = span(self.a, &self.moves.a, self.rides.0);
+        let both = a.union(span(self.b, &self.moves.b, self.rides.1));
+        known && (both.lo >= -half_m || both.hi <= half_m)
     }
 }

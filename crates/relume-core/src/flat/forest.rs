@@ -37,6 +37,16 @@ const NONE: u32 = u32::MAX;
 /// Levels that a path has room for.
 const LEVELS_MAX: u32 = 15;
 
+/// A side of a wall.
+#[derive(Clone, Debug)]
+struct Facet {
+    wall: WallIndex,
+    /// Whether it is the back.
+    back: bool,
+    /// Segment in the body's frame.
+    local: Segment,
+}
+
 /// What never changes.
 #[derive(Clone, Debug)]
 struct Fixed {
@@ -46,8 +56,7 @@ struct Fixed {
     /// Children of the scene and of each body.
     groups: Vec<Range<u32>>,
     facets: Vec<ElementId>,
-    /// Of each facet: its wall, whether it is the back, and its segment in the body's frame.
-    walls: Vec<(WallIndex, bool, Segment)>,
+    walls: Vec<Facet>,
     wall_body: Vec<BodyIndex>,
     group_length: Vec<f64>,
 }
@@ -76,9 +85,10 @@ impl FlatForest {
             let first = 1 + bodies + walls.len() as u32;
             for k in body.walls.clone() {
                 let wall = &scene.walls()[k as usize];
-                walls.push((WallIndex(k), false, wall.local));
+                walls.push(Facet { wall: WallIndex(k), back: false, local: wall.local });
                 if wall.material.two_sided {
-                    walls.push((WallIndex(k), true, wall.local.reversed()));
+                    let local = wall.local.reversed();
+                    walls.push(Facet { wall: WallIndex(k), back: true, local });
                 }
             }
             groups.push(first..1 + bodies + walls.len() as u32);
@@ -86,7 +96,7 @@ impl FlatForest {
         let len = 1 + bodies + walls.len() as u32;
         let node = |id: u32| Node { parent: NONE, first_child: NONE, facet: id, path: 1, users: 0 };
         let lengths = |facets: &Range<u32>| {
-            facets.clone().map(|f| walls[(f - 1 - bodies) as usize].2.length()).sum()
+            facets.clone().map(|f| walls[(f - 1 - bodies) as usize].local.length()).sum()
         };
         let group_length = std::iter::once(0.0).chain(groups[1..].iter().map(lengths)).collect();
         FlatForest {
@@ -120,7 +130,7 @@ impl FlatForest {
     /// Bytes held, what all forests of a scene share included.
     pub fn memory_bytes(&self) -> u64 {
         let lists = self.vacant.capacity() + self.loose.capacity() + self.changed.capacity();
-        let facet = size_of::<(WallIndex, bool, Segment)>() + size_of::<ElementId>();
+        let facet = size_of::<Facet>() + size_of::<ElementId>();
         let fixed = self.fixed.facets.len() * facet;
         (self.nodes.capacity() * size_of::<Node>() + lists * size_of::<u32>() + fixed) as u64
     }
@@ -184,13 +194,13 @@ impl FlatForest {
         ElementKey { facet: node.facet, path: node.path }
     }
 
-    fn of_facet(&self, id: ElementId) -> &(WallIndex, bool, Segment) {
+    fn of_facet(&self, id: ElementId) -> &Facet {
         &self.fixed.walls[(self.nodes[id.0 as usize].facet - 1 - self.fixed.bodies) as usize]
     }
 
     /// The wall of an element, and whether it is on its back.
     pub fn wall(&self, id: ElementId) -> (WallIndex, bool) {
-        let (wall, back, _) = *self.of_facet(id);
+        let Facet { wall, back, .. } = *self.of_facet(id);
         (wall, back)
     }
 
@@ -199,7 +209,7 @@ impl FlatForest {
         match self.kind(id) {
             FlatKind::Scene | FlatKind::Vacant => None,
             FlatKind::Body(body) => Some(body),
-            FlatKind::Element => Some(self.fixed.wall_body[self.of_facet(id).0.0 as usize]),
+            FlatKind::Element => Some(self.fixed.wall_body[self.of_facet(id).wall.0 as usize]),
         }
     }
 
@@ -210,7 +220,7 @@ impl FlatForest {
 
     /// Where an element is in its body's frame. Neighbours share their ends bit for bit.
     pub fn local(&self, id: ElementId) -> Segment {
-        let (whole, level) = (self.of_facet(id).2, self.level(id));
+        let (whole, level) = (self.of_facet(id).local, self.level(id));
         let path = self.nodes[id.0 as usize].path;
         let place = (0..level).rev().fold(0, |place, l| place << 1 | path >> (2 * l) & 1);
         let share = |k: u32| match k >> level {
@@ -224,7 +234,7 @@ impl FlatForest {
     pub fn length(&self, id: ElementId) -> f64 {
         match self.fixed.group_length.get(id.0 as usize) {
             Some(sum) => *sum,
-            None => self.of_facet(id).2.length() / f64::from(1 << self.level(id)),
+            None => self.of_facet(id).local.length() / f64::from(1 << self.level(id)),
         }
     }
 

@@ -21,6 +21,7 @@ mod session;
 mod state;
 mod strings;
 mod surfaces;
+mod tuning;
 mod view;
 
 pub use forest::FlatForest;

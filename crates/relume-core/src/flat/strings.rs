@@ -8,6 +8,7 @@
 use glam::DVec2;
 
 use super::plane::{Segment, rounding};
+use super::tuning::WIDER;
 
 /// The region between the parts of two segments that face each other: a convex quadrilateral.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,9 +20,6 @@ pub struct Shaft {
     /// What counts as rounding, m.
     rounding_m: f64,
 }
-
-/// By how many times the rounding a shaft is widened where candidates for the shafts within it are sought.
-const WIDER: f64 = 1e3;
 
 impl Shaft {
     /// `None` if the segments do not face each other.

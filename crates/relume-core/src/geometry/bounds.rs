@@ -1,6 +1,53 @@
-//! Axis-aligned boxes and the shafts between them.
+//! Intervals, axis-aligned boxes and the shafts between them.
+
+use std::ops::Add;
 
 use glam::DVec3;
+
+/// Closed interval of numbers of one unit. Empty where `lo` exceeds `hi`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// Smallest number.
+    pub lo: f64,
+    /// Largest number.
+    pub hi: f64,
+}
+
+impl Interval {
+    /// The interval that holds nothing.
+    pub const EMPTY: Interval = Interval { lo: f64::INFINITY, hi: f64::NEG_INFINITY };
+
+    /// The interval of 0 alone.
+    pub const ZERO: Interval = Interval { lo: 0.0, hi: 0.0 };
+
+    /// The smallest interval around some numbers.
+    #[inline]
+    pub fn of(numbers: impl IntoIterator<Item = f64>) -> Interval {
+        numbers.into_iter().fold(Interval::EMPTY, Interval::with)
+    }
+
+    /// This interval grown to hold a number.
+    #[inline]
+    pub fn with(self, x: f64) -> Interval {
+        Interval { lo: self.lo.min(x), hi: self.hi.max(x) }
+    }
+
+    /// The smallest interval around both.
+    #[inline]
+    pub fn union(self, other: Interval) -> Interval {
+        Interval { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
+    }
+}
+
+impl Add for Interval {
+    type Output = Interval;
+
+    /// The interval of all sums of a number of this one and one of the other.
+    #[inline]
+    fn add(self, other: Interval) -> Interval {
+        Interval { lo: self.lo + other.lo, hi: self.hi + other.hi }
+    }
+}
 
 /// An axis-aligned box, metres. Empty where a `lo` exceeds its `hi`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,13 +126,13 @@ impl Aabb {
         Aabb { lo: self.lo - other.hi, hi: self.hi - other.lo }
     }
 
-    /// How far the vectors of the box go along a direction, at least and at most.
+    /// How far the vectors of the box go along a direction.
     #[inline]
-    pub fn along(&self, direction: DVec3) -> (f64, f64) {
+    pub fn along(&self, direction: DVec3) -> Interval {
         let forwards = direction.cmpge(DVec3::ZERO);
         let lo = DVec3::select(forwards, self.lo, self.hi);
         let hi = DVec3::select(forwards, self.hi, self.lo);
-        (direction.dot(lo), direction.dot(hi))
+        Interval { lo: direction.dot(lo), hi: direction.dot(hi) }
     }
 
     /// Length of the space diagonal, metres; 0 for an empty box.

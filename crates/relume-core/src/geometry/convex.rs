@@ -75,11 +75,11 @@ impl ConvexPolygon {
     }
 
     /// The parts in front of and behind `plane`; either may be empty.
-    pub fn split(&self, plane: &Plane) -> (ConvexPolygon, ConvexPolygon) {
+    pub fn split(&self, plane: &Plane) -> [ConvexPolygon; 2] {
         let none = ConvexPolygon { corners: [DVec3::ZERO; CAPACITY], len: 0 };
         let (mut front, mut back) = (none, none);
         if self.len < 3 {
-            return (front, back);
+            return [front, back];
         }
         let mut p = self.corners[self.len - 1];
         let mut dp = plane.distance(p);
@@ -98,7 +98,7 @@ impl ConvexPolygon {
             }
             (p, dp) = (q, dq);
         }
-        (front, back)
+        [front, back]
     }
 
     fn push(&mut self, p: DVec3) {
@@ -129,7 +129,7 @@ impl ConvexPolygon {
 ///
 /// # Panics
 /// With fewer than five corners.
-pub fn split_convex(corners: &[DVec2]) -> (Vec<DVec2>, Vec<DVec2>) {
+pub fn split_convex(corners: &[DVec2]) -> [Vec<DVec2>; 2] {
     let n = corners.len();
     assert!(n >= 5, "a polygon of {n} corners is not split by a chord");
     let mut best = (f64::INFINITY, 0, 2);
@@ -138,8 +138,7 @@ pub fn split_convex(corners: &[DVec2]) -> (Vec<DVec2>, Vec<DVec2>) {
             if i == 0 && j == n - 1 {
                 continue;
             }
-            let (one, two) = parts(corners, i, j);
-            let (a, b) = (2.0 * polygon_area(&one), 2.0 * polygon_area(&two));
+            let [a, b] = parts(corners, i, j).map(|part| 2.0 * polygon_area(&part));
             // Uneven areas and long chords both cost.
             let cost = (a - b).abs() + (corners[i] - corners[j]).length_squared();
             if cost < best.0 {
@@ -150,9 +149,9 @@ pub fn split_convex(corners: &[DVec2]) -> (Vec<DVec2>, Vec<DVec2>) {
     parts(corners, best.1, best.2)
 }
 
-fn parts(corners: &[DVec2], i: usize, j: usize) -> (Vec<DVec2>, Vec<DVec2>) {
+fn parts(corners: &[DVec2], i: usize, j: usize) -> [Vec<DVec2>; 2] {
     let two = corners[j..].iter().chain(&corners[..=i]).copied().collect();
-    (corners[i..=j].to_vec(), two)
+    [corners[i..=j].to_vec(), two]
 }
 
 /// Area of a polygon by the shoelace formula, in the square of its unit; exact up to rounding.
@@ -180,7 +179,7 @@ mod tests {
         let disc: Vec<DVec2> = (0..32)
             .map(|k| DVec2::from_angle(f64::from(k) * std::f64::consts::TAU / 32.0))
             .collect();
-        let (one, two) = split_convex(&disc);
+        let [one, two] = split_convex(&disc);
         assert!((polygon_area(&one) + polygon_area(&two) - polygon_area(&disc)).abs() < 1e-14);
         assert!((polygon_area(&one) / polygon_area(&disc) - 0.5).abs() < 0.05);
     }

@@ -3,15 +3,10 @@
 use glam::DVec2;
 
 use super::polygon_area;
+use super::tuning::{CUT_LEAST, CUT_LINES_MAX};
 
 /// A straight line on a plane, from one point to another, metres.
 pub type Segment = [DVec2; 2];
-
-/// Lines that are looked at for one cut: the longest.
-const LINES_MAX: usize = 256;
-
-/// Parts of a smaller share of the area are not cut off.
-const SLIVER: f64 = 1e-4;
 
 /// The part of a line within a convex polygon; `None` where there is no more than rounding, or where it runs along an
 /// edge of the polygon. `slack_m`, metres, is what rounding may amount to.
@@ -42,12 +37,12 @@ pub fn cut_along(
     segments: &[Segment],
     share: f64,
     slack_m: f64,
-) -> Option<(Vec<DVec2>, Vec<DVec2>)> {
+) -> Option<[Vec<DVec2>; 2]> {
     let mut within: Vec<Segment> =
         segments.iter().filter_map(|&s| segment_within(polygon, s, slack_m)).collect();
-    if within.len() > LINES_MAX {
+    if within.len() > CUT_LINES_MAX {
         within.sort_by(|s, t| length(t).total_cmp(&length(s)));
-        within.truncate(LINES_MAX);
+        within.truncate(CUT_LINES_MAX);
     }
     let mut best: Option<(f64, Segment)> = None;
     for &line in &within {
@@ -58,9 +53,9 @@ pub fn cut_along(
             best = Some((covered, line));
         }
     }
-    let (one, two) = halves(polygon, best?.1, slack_m);
-    let least = SLIVER * polygon_area(polygon);
-    (polygon_area(&one) > least && polygon_area(&two) > least).then_some((one, two))
+    let parts = halves(polygon, best?.1, slack_m);
+    let least = CUT_LEAST * polygon_area(polygon);
+    parts.iter().all(|part| polygon_area(part) > least).then_some(parts)
 }
 
 /// Start and unit direction of each edge; the inside is on the left.
@@ -109,7 +104,7 @@ fn chord(polygon: &[DVec2], [p, q]: Segment) -> f64 {
 }
 
 /// The parts of a polygon on the left and on the right of a line; corners within the slack of it belong to both.
-fn halves(polygon: &[DVec2], [p, q]: Segment, slack_m: f64) -> (Vec<DVec2>, Vec<DVec2>) {
+fn halves(polygon: &[DVec2], [p, q]: Segment, slack_m: f64) -> [Vec<DVec2>; 2] {
     let along = (q - p).normalize_or_zero();
     let side = |r: DVec2| along.perp_dot(r - p);
     let (mut left, mut right) = (Vec::new(), Vec::new());
@@ -128,7 +123,7 @@ fn halves(polygon: &[DVec2], [p, q]: Segment, slack_m: f64) -> (Vec<DVec2>, Vec<
             right.push(cut);
         }
     }
-    (left, right)
+    [left, right]
 }
 
 #[cfg(test)]
@@ -157,7 +152,7 @@ mod tests {
     #[test]
     fn segments_on_one_line_count_together() {
         let wall = [across(2.0, 0.0, 1.5), across(2.0, 2.4, 4.0), across(2.0, 2.4, 4.0)];
-        let (one, two) = cut_along(&rectangle(), &wall, 0.6, SLACK_M).unwrap();
+        let [one, two] = cut_along(&rectangle(), &wall, 0.6, SLACK_M).unwrap();
         assert!(
             (polygon_area(&one) - 8.0).abs() < 1e-12 && (polygon_area(&two) - 16.0).abs() < 1e-12
         );
@@ -168,7 +163,7 @@ mod tests {
     #[test]
     fn a_cut_through_corners_makes_triangles() {
         let diagonal = [[DVec2::ZERO, DVec2::new(6.0, 4.0)]];
-        let (one, two) = cut_along(&rectangle(), &diagonal, 0.5, SLACK_M).unwrap();
+        let [one, two] = cut_along(&rectangle(), &diagonal, 0.5, SLACK_M).unwrap();
         assert_eq!((one.len(), two.len()), (3, 3));
     }
 }

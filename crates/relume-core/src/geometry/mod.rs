@@ -7,8 +7,9 @@ mod convex;
 mod cut;
 mod pose;
 mod region;
+mod tuning;
 
-pub use bounds::{Aabb, ShaftOfBoxes, shaft_meets_box};
+pub use bounds::{Aabb, Interval, ShaftOfBoxes, shaft_meets_box};
 pub use convex::{ConvexPolygon, Plane, polygon_area, split_convex};
 pub use cut::{Segment, cut_along, segment_within};
 pub use pose::Pose;

@@ -10,7 +10,7 @@ use glam::DVec3;
 use crate::element::{
     ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldPatch, WorldView,
 };
-use crate::geometry::{Aabb, Plane, Pose, shaft_meets_box};
+use crate::geometry::{Aabb, Interval, Plane, Pose, shaft_meets_box};
 use crate::predict::MotionBounds;
 use crate::scene::{BodyId, Drift, PatchId};
 
@@ -39,9 +39,6 @@ struct Ends<'a> {
 
 /// What lies farther than this from an end's plane, in halves of the slack, does not cover it.
 const OFF: f64 = 8.0;
-
-/// The span of nothing.
-const NO_SPAN: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 
 impl CertificateTests for SpaceCertificateTests<'_> {
     fn motion_bounds(&self) -> &MotionBounds {
@@ -226,27 +223,25 @@ impl SpaceCertificateTests<'_> {
         let (turns_a, turns_b, turns_c) = moves.turning;
         // Distances of an end from the blocker's plane at all times.
         let span = |e: &WorldElement, by: &Aabb| {
-            let (lo, hi) = e.span(&c.plane);
-            let shift = by.difference(&moves.c).along(c.plane.normal);
-            (lo + shift.0, hi + shift.1)
+            e.span(&c.plane) + by.difference(&moves.c).along(c.plane.normal)
         };
-        let spans = (span(a, &moves.a), span(b, &moves.b));
+        let spans = [span(a, &moves.a), span(b, &moves.b)];
         let tilt_m = self.tilt_m(&c, half);
         let end =
             |e: &WorldElement, (of, on): (Option<BodyId>, Option<PatchId>), by, turns, span| {
                 // What rides with the end keeps its distances.
                 let rides = of == Some(body);
                 let shift = match rides {
-                    true => (0.0, 0.0),
+                    true => Interval::ZERO,
                     false => moves.c.difference(by).along(e.plane.normal),
                 };
                 let is_other_side = twin.is_some() && twin == on;
                 let end = OneEnd { e, rides, shift, turns, span, is_other_side };
-                end.beside(&c, turns_c, (half, tilt_m))
+                end.beside(&c, turns_c, half, tilt_m)
             };
         let (patch_a, patch_b) = ends.patches;
-        let at_a = end(a, (ends.bodies.0, patch_a), &moves.a, turns_a, spans.0);
-        let at_b = end(b, (ends.bodies.1, patch_b), &moves.b, turns_b, spans.1);
+        let at_a = end(a, (ends.bodies.0, patch_a), &moves.a, turns_a, spans[0]);
+        let at_b = end(b, (ends.bodies.1, patch_b), &moves.b, turns_b, spans[1]);
         if at_a.may_cover || at_b.may_cover {
             return true;
         }
@@ -254,8 +249,8 @@ impl SpaceCertificateTests<'_> {
             return false;
         }
         // Both ends on one side of the blocker's plane.
-        let ((a_lo, a_hi), (b_lo, b_hi)) = spans;
-        turns_c || !(a_lo.min(b_lo) >= -half || a_hi.max(b_hi) <= half)
+        let both = spans[0].union(spans[1]);
+        turns_c || !(both.lo >= -half || both.hi <= half)
     }
 
     /// Distance from a blocker's plane up to which it may cover an end, however it is turned, metres.
@@ -283,11 +278,11 @@ impl SpaceCertificateTests<'_> {
             Some(body) => self.motion_bounds.drift(h, body).reach(),
             None => self.widest(h, b),
         };
-        let shift = by.difference(&drift.reach()).along(plane.normal).1;
+        let shift = by.difference(&drift.reach()).along(plane.normal).hi;
         let elements = [a, b].iter().all(|&id| self.forest.kind(id) == Kind::Element);
         let (far, slack) = if elements {
             let b = WorldElement::new(self.view, self.forest, b, false);
-            (b.span(&plane).1, b.rounding_m + patch.rounding_m)
+            (b.span(&plane).hi, b.rounding_m + patch.rounding_m)
         } else {
             let bounds = self.view.end_box(self.forest.fixed(b));
             let n = plane.normal;
@@ -318,12 +313,12 @@ struct OneEnd<'a> {
     e: &'a WorldElement,
     /// Whether the blocker rides on the end's body.
     rides: bool,
-    /// Displacement of the blocker against the end along the end's normal: least and most, metres.
-    shift: (f64, f64),
+    /// Displacement of the blocker against the end along the end's normal, metres.
+    shift: Interval,
     /// Whether the end turns.
     turns: bool,
     /// Distances of the end's corners from the blocker's plane at all times, metres.
-    span: (f64, f64),
+    span: Interval,
     /// Whether the blocker is the other side of the end's polygon.
     is_other_side: bool,
 }
@@ -331,18 +326,17 @@ struct OneEnd<'a> {
 impl OneEnd<'_> {
     /// Position of the blocker; `half` is half of the slack, `tilt_m` the distance from the blocker's plane up to which it may
     /// cover an end however it is turned, metres.
-    fn beside(&self, c: &OccluderPolygon<'_>, turns_c: bool, (half, tilt_m): (f64, f64)) -> AtEnd {
+    fn beside(&self, c: &OccluderPolygon<'_>, turns_c: bool, half: f64, tilt_m: f64) -> AtEnd {
         let OneEnd { e, rides, shift, turns, span, is_other_side } = *self;
-        let corners = c.corners.iter().map(|&p| e.plane.distance(p));
-        let (lo, hi) = corners.fold(NO_SPAN, |(lo, hi), d| (f64::min(lo, d), f64::max(hi, d)));
+        let Interval { lo, hi } = Interval::of(c.corners.iter().map(|&p| e.plane.distance(p)));
         // The end's plane does not turn against what bounds the blocker's corners.
         let known = rides || !turns;
         let off = match known {
-            true => hi + shift.0 > OFF * half || lo + shift.1 < -OFF * half,
-            false => !turns_c && (span.0 > tilt_m || span.1 < -tilt_m),
+            true => hi + shift.lo > OFF * half || lo + shift.hi < -OFF * half,
+            false => !turns_c && (span.lo > tilt_m || span.hi < -tilt_m),
         };
         let turned = !rides && (turns || turns_c);
         let faces = turned || c.plane.normal.dot(e.plane.normal).abs() > 0.5 - 1e-9;
-        AtEnd { behind: known && hi + shift.1 <= half, may_cover: !is_other_side && !off && faces }
+        AtEnd { behind: known && hi + shift.hi <= half, may_cover: !is_other_side && !off && faces }
     }
 }

@@ -14,6 +14,15 @@ pub struct CoarseBrightness {
     reference_area_m2: f64,
 }
 
+/// Changes of canonical brightness; `None` where there is none.
+#[derive(Clone, Debug, Default)]
+pub struct BrightnessShifts {
+    /// That of each coarse element, by number.
+    pub coarse: Vec<Option<Shift>>,
+    /// That of each punctual light.
+    pub lights: Vec<Option<Shift>>,
+}
+
 impl CoarseBrightness {
     /// From the brightness of each coarse element, the mean intensity of each punctual light, and the area below which
     /// elements weigh less than others, m2. Values are rounded down to 1, 1.5, 2, 3, 4 ..., so that they seldom change.
@@ -34,6 +43,16 @@ impl CoarseBrightness {
         }
     }
 
+    /// Whether there are no coarse elements.
+    pub fn is_empty(&self) -> bool {
+        self.coarse.is_empty()
+    }
+
+    /// Whether that of all coarse elements is known ([`CoarseBrightness::renumber`]).
+    pub fn is_known(&self) -> bool {
+        !self.coarse.contains(&Brightness::UNKNOWN)
+    }
+
     /// Brightness of an element or punctual light.
     #[inline]
     pub fn of(&self, forest: &Forest, id: ElementId) -> Brightness {
@@ -44,14 +63,14 @@ impl CoarseBrightness {
         forest.coarse(id).map_or(Brightness::UNIFORM, |c| self.coarse[c])
     }
 
-    /// Changes since `before` of each coarse element, by number, and of each punctual light; `None` where there is none.
-    pub fn shifts(&self, before: &CoarseBrightness) -> (Vec<Option<Shift>>, Vec<Option<Shift>>) {
+    /// Changes since `before`.
+    pub fn shifts(&self, before: &CoarseBrightness) -> BrightnessShifts {
         let elements = before.coarse.iter().zip(&self.coarse);
         let lights = before.lights.iter().zip(&self.lights);
-        (
-            elements.map(|(before, after)| Shift::between(before, after)).collect(),
-            lights.map(|(&before, &after)| Shift::of_light(before, after)).collect(),
-        )
+        BrightnessShifts {
+            coarse: elements.map(|(before, after)| Shift::between(before, after)).collect(),
+            lights: lights.map(|(&before, &after)| Shift::of_light(before, after)).collect(),
+        }
     }
 
     /// Renumbers coarse elements; `old_of` holds the old number of each. Of what had none, or several, no margin withstands the
@@ -74,7 +93,29 @@ fn coarsen(x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::margin::{Growth, Margin};
     use super::*;
+
+    #[test]
+    fn no_margin_withstands_the_next_change_of_an_element_that_had_no_number() {
+        let uniform = |count| CoarseBrightness::new(vec![Brightness::UNIFORM; count], vec![], 1.0);
+        let mut before = uniform(1);
+        assert!(before.is_known());
+        before.renumber(&[Some(0), None]);
+        assert!(!before.is_known());
+        // Equal to what any constant in place of the unknown would be.
+        let shifts = uniform(2).shifts(&before).coarse;
+        assert_eq!(shifts[0], None);
+        let shift = shifts[1].expect("what was unknown has changed");
+        let growth = Growth::of_pair(&shift, &Shift::default());
+        for both_ways in [false, true] {
+            let link = Margin::Link { on: [Margin::ENDLESS - 1; 2], both_ways };
+            assert_eq!(link.after(&growth), None);
+        }
+        for is_link in [false, true] {
+            assert_eq!(Margin::of_error(is_link, Margin::ENDLESS - 1).after(&growth), None);
+        }
+    }
 
     #[test]
     fn rounding_keeps_half_powers_of_two() {

@@ -21,7 +21,7 @@ use super::coarse_brightness::CoarseBrightness;
 use super::ends::{BoxShaft, LightPlace, body_of};
 use super::hash::pair_key;
 use super::margin::{Margin, SideMargin};
-use super::oracle::{End, Estimate, Oracle, estimate};
+use super::oracle::{End, Estimate, Norm, Oracle, estimate};
 use super::space::{Hierarchy, Judge};
 use super::tree::{Carried, CullReason, Gradients, in_steps};
 use super::tuning::{
@@ -435,7 +435,7 @@ impl SpaceJudge<'_> {
     }
 
     /// Both ends of a pair as the error oracle weighs them.
-    fn ends(&self, pair: &Elements<'_>, brightness: &CoarseBrightness) -> (End, End) {
+    fn ends(&self, pair: &Elements<'_>, brightness: &CoarseBrightness) -> [End; 2] {
         let (place_a, place_b) = pair.places;
         let end = |id, area| End {
             area: if self.forest.is_distant(id) { 0.0 } else { area },
@@ -449,7 +449,7 @@ impl SpaceJudge<'_> {
                 false => self.forest.area_m2(self.forest.patch_root(self.patch_of(id))),
             },
         };
-        (end(pair.ids.0, place_a.area), end(pair.ids.1, place_b.area))
+        [end(pair.ids.0, place_a.area), end(pair.ids.1, place_b.area)]
     }
 
     /// What a pair exchanges without occlusion; as an error the verdict, where that alone decides.
@@ -475,8 +475,8 @@ impl SpaceJudge<'_> {
         {
             let (clear, nothing) = (Visibility::CLEAR, BlockerSizes::NOTHING);
             let ends = self.ends(pair, brightness);
-            let scale = (brightness.reference_area_m2(), threshold);
-            let e = estimate(&x, &clear, (&ends.0, &ends.1), &nothing, scale);
+            let norm = norm_of(brightness, threshold);
+            let e = estimate(&x, &clear, ends.each_ref(), &nothing, &norm);
             let wish = self.wish(pair.ids, &ends, &e);
             if let Some(refined) = refined(&e, wish, threshold, Margin::ENDLESS, 0) {
                 return Err(refined);
@@ -584,9 +584,9 @@ impl SpaceJudge<'_> {
         let Exchanged { x, overstated, by_points } = exchanged;
         let (v, way) = (&seen.v, seen.way);
         let ends = self.ends(pair, brightness);
-        let scale = (brightness.reference_area_m2(), threshold);
-        let around = |end: &End| end.surface_area.min(SPOT_AROUND * brightness.reference_area_m2());
-        let around = (around(&ends.0), around(&ends.1));
+        let norm = norm_of(brightness, threshold);
+        let around = |end: &End| end.surface_area.min(SPOT_AROUND * norm.reference_area_m2);
+        let around = ends.each_ref().map(around);
         let sizes = match &seen.crossed {
             Some(crossed) => {
                 let (blockers, lamps) = (crossed.clone(), pair.found.lamps.clone());
@@ -594,7 +594,7 @@ impl SpaceJudge<'_> {
             }
             None => pair.shaft.sizes_of(&pair.found, around),
         };
-        let e = estimate(x, v, (&ends.0, &ends.1), &sizes, scale);
+        let e = estimate(x, v, ends.each_ref(), &sizes, &norm);
         let wish = self.wish(pair.ids, &ends, &e);
         // In another light the errors by points may be enough to refine, and that perhaps the other side.
         let until_points = by_points
@@ -716,7 +716,7 @@ impl SpaceJudge<'_> {
     fn wish(
         &self,
         ids: (ElementId, ElementId),
-        (a, b): &(End, End),
+        [a, b]: &[End; 2],
         e: &Estimate,
     ) -> Option<(Side, SideMargin)> {
         let (better, margin) = e.side(a, b);
@@ -799,9 +799,9 @@ impl SpaceJudge<'_> {
                 };
                 let receiver = end(element, e.area, self.reference_area(brightness, element));
                 let source = end(light, 0.0, f64::INFINITY);
-                let scale = (brightness.reference_area_m2(), threshold);
-                let error =
-                    estimate(x, v, (&receiver, &source), &BlockerSizes::NOTHING, scale).on[0];
+                let norm = norm_of(brightness, threshold);
+                let ends = [&receiver, &source];
+                let error = estimate(x, v, ends, &BlockerSizes::NOTHING, &norm).on[0];
                 if !may_split {
                     return (Verdict::Link, Margin::Firm);
                 }
@@ -909,6 +909,11 @@ impl Places {
             None => at.shaft((own_a, own_b), None, self.patches),
         }
     }
+}
+
+/// Norm of the error oracle.
+fn norm_of(brightness: &CoarseBrightness, threshold: f64) -> Norm {
+    Norm { reference_area_m2: brightness.reference_area_m2(), threshold }
 }
 
 /// A link that is partly hidden is looked at from more points, the more so the larger its `error`: how far V

@@ -41,13 +41,22 @@ pub(super) struct End {
     pub(super) surface_area: f64,
 }
 
+/// Norm that errors are measured in.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Norm {
+    /// Area at which an element weighs 1, m2.
+    pub(super) reference_area_m2: f64,
+    /// Error that a link may make, relative.
+    pub(super) threshold: f64,
+}
+
 /// Errors of a link, each relative to its threshold's unit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Estimate {
     /// The errors on the two receivers.
     pub(super) on: [f64; 2],
     /// Part of the error that splitting each end would remove.
-    mends: (f64, f64),
+    mends: [f64; 2],
 }
 
 impl Estimate {
@@ -66,7 +75,7 @@ impl Estimate {
     /// The larger, unless splitting the smaller mends far more: where both mend about as much the
     /// smallest motion would make the other side the better one, and everything below anew.
     pub(super) fn side(&self, a: &End, b: &End) -> (Side, u16) {
-        let (one, two) = self.mends;
+        let [one, two] = self.mends;
         let (large, small, by_large, by_small) = match no_smaller(a.area, b.area) {
             true => (Side::A, Side::B, one, two),
             false => (Side::B, Side::A, two, one),
@@ -88,9 +97,9 @@ impl Estimate {
 pub(super) fn estimate(
     x: &Exchange,
     v: &Visibility,
-    (a, b): (&End, &End),
+    [a, b]: [&End; 2],
     blockers: &BlockerSizes,
-    (reference_area, threshold): (f64, f64),
+    &Norm { reference_area_m2, threshold }: &Norm,
 ) -> Estimate {
     // Fewer than a bundle: clipped, without noise.
     let noise = if v.segments < SEGMENTS as u32 {
@@ -99,35 +108,36 @@ pub(super) fn estimate(
         ((v.value * (1.0 - v.value) + 0.02) / f64::from(v.segments)).sqrt() * NOISE
     };
     let sends = |over: &Variation, spread: f64| length(v.value * (over.slope + over.bend), spread);
-    let over = |over: &Variation, edge: f64, (spot, near): (f64, f64)| Uneven {
+    let over = |over: &Variation, edge: f64, end: usize| Uneven {
         bend: BENT * v.value * over.bend,
         edge,
         sends: sends(over, edge),
-        spot: SPOT * spot,
-        jump: JUMP * near,
+        spot: SPOT * blockers.spots[end],
+        jump: JUMP * blockers.near[end],
     };
     // The points that V is found from tell no more than those of the kernel.
     let least = match x.is_steep && v.segments > 0 {
         true => STEEP * (v.value / SEEN).min(1.0),
         false => 0.0,
     };
-    let over_a = over(&x.over_a, v.spread_a.max(least), (blockers.spots.0, blockers.near.0));
-    let over_b = over(&x.over_b, v.spread_b.max(least), (blockers.spots.1, blockers.near.1));
+    let over_a = over(&x.over_a, v.spread_a.max(least), 0);
+    let over_b = over(&x.over_b, v.spread_b.max(least), 1);
     let link = LinkSize {
         exchange: x.area_m2,
         noise,
         least_shadow: SHADOW_AREAS * blockers.least_m2,
         shadow: SHADOW_AREAS * blockers.all_m2,
-        reference_area,
+        reference_area: reference_area_m2,
         threshold,
-        leverage: blockers.leverage.0,
+        leverage: blockers.leverage[0],
     };
-    let back = LinkSize { leverage: blockers.leverage.1, ..link };
-    let (on_a, by_a, by_b) =
-        one_way(&link, Over { end: a, uneven: &over_a }, Over { end: b, uneven: &over_b });
-    let (on_b, cy_b, cy_a) =
-        one_way(&back, Over { end: b, uneven: &over_b }, Over { end: a, uneven: &over_a });
-    Estimate { on: [on_a, on_b], mends: (by_a + cy_a, by_b + cy_b) }
+    let back = LinkSize { leverage: blockers.leverage[1], ..link };
+    let (over_a, over_b) = (Over { end: a, uneven: &over_a }, Over { end: b, uneven: &over_b });
+    let (on_a, on_b) = (one_way(&link, over_a, over_b), one_way(&back, over_b, over_a));
+    Estimate {
+        on: [on_a.error, on_b.error],
+        mends: [on_a.by_receiver + on_b.by_source, on_a.by_source + on_b.by_receiver],
+    }
 }
 
 /// The hypotenuse; `f64::hypot` is the platform's, and differs from one to another.
@@ -189,14 +199,24 @@ struct Over<'a> {
     uneven: &'a Uneven,
 }
 
-/// Error on the receiver, and the parts of it that splitting receiver and source would mend.
+/// Error of a link on one of its receivers.
+struct OneWay {
+    /// All of it.
+    error: f64,
+    /// Part of it that splitting the receiver would mend.
+    by_receiver: f64,
+    /// Part of it that splitting the source would mend.
+    by_source: f64,
+}
+
+/// Error on the receiver.
 fn one_way(
     link: &LinkSize,
     Over { end: receiver, uneven: over_receiver }: Over<'_>,
     Over { end: source, uneven: over_source }: Over<'_>,
-) -> (f64, f64, f64) {
+) -> OneWay {
     if receiver.area <= 0.0 {
-        return (0.0, 0.0, 0.0);
+        return OneWay { error: 0.0, by_receiver: 0.0, by_source: 0.0 };
     }
     let by_area = (receiver.area / receiver.reference_area).sqrt();
     let scale = receiver.reference_area.min(link.least_shadow).max(f64::MIN_POSITIVE);
@@ -226,5 +246,5 @@ fn one_way(
         true => 0.0,
         false => (by_receiver.powi(2) + by_source.powi(2) + by_noise.powi(2)).sqrt(),
     };
-    (error, by_receiver, by_source)
+    OneWay { error, by_receiver, by_source }
 }

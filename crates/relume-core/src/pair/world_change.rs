@@ -4,8 +4,9 @@ use crate::element::{ElementId, Forest, Kind, WorldElement, WorldView};
 use crate::scene::{BodyId, LightKind, PatchId, Scene};
 use crate::transport::Shaft;
 
+use super::coarse_brightness::BrightnessShifts;
 use super::ends::{BoxShaft, LightPlace, body_of};
-use super::margin::{Growth, Shift};
+use super::margin::Growth;
 use super::verdict::Stale;
 
 /// Motion of a node of the forest's fixed part: its bodies that moved, appeared or vanished.
@@ -23,10 +24,8 @@ pub struct WorldChange<'a> {
     old: &'a WorldView,
     motion: Vec<Motion>,
     movers: Vec<BodyId>,
-    /// Change of brightness of each coarse element, by number; `None` where it did not change.
-    shifts: Vec<Option<Shift>>,
-    /// Change of intensity of each punctual light.
-    lights: Vec<Option<Shift>>,
+    /// Changes of brightness; no lists where there are none.
+    shifts: BrightnessShifts,
     /// Nodes above the coarse level with a changed coarse element or light below.
     brightness_changed_below: Vec<bool>,
     /// Whether all margins count from the first instant.
@@ -83,8 +82,7 @@ impl<'a> WorldChange<'a> {
             old,
             motion,
             movers,
-            shifts: Vec::new(),
-            lights: Vec::new(),
+            shifts: BrightnessShifts::default(),
             brightness_changed_below: Vec::new(),
             knows_margins: true,
             regrouped: &[],
@@ -117,12 +115,14 @@ impl<'a> WorldChange<'a> {
         &mut self,
         forest: &Forest,
         coarse: &[u32],
-        (shifts, lights): (Vec<Option<Shift>>, Vec<Option<Shift>>),
+        shifts: BrightnessShifts,
     ) {
         self.brightness_changed_below = vec![false; forest.kept_len() as usize];
-        let elements = coarse.iter().zip(&shifts).filter(|(_, shift)| shift.is_some());
-        let is_shifted =
-            |id: &u32| forest.light(ElementId(*id)).is_some_and(|light| lights[light].is_some());
+        let elements = coarse.iter().zip(&shifts.coarse).filter(|(_, shift)| shift.is_some());
+        let is_shifted = |id: &u32| {
+            let light = forest.light(ElementId(*id));
+            light.is_some_and(|light| shifts.lights[light].is_some())
+        };
         let below = elements.map(|(&id, _)| id).chain((0..forest.fixed_len()).filter(is_shifted));
         for id in below {
             let mut above = forest.parent(ElementId(id));
@@ -133,17 +133,17 @@ impl<'a> WorldChange<'a> {
                 above = forest.parent(id);
             }
         }
-        (self.shifts, self.lights) = (shifts, lights);
+        self.shifts = shifts;
     }
 
     /// Staleness of a pair by changes of brightness.
     pub(super) fn brightness(&self, forest: &Forest, a: ElementId, b: ElementId) -> Stale {
-        if self.shifts.is_empty() {
+        if self.shifts.coarse.is_empty() {
             return Stale::Nothing;
         }
         let shifted = |id: ElementId| match (forest.coarse(id), forest.light(id)) {
-            (Some(number), _) => self.shifts[number].is_some(),
-            (None, Some(light)) => self.lights[light].is_some(),
+            (Some(number), _) => self.shifts.coarse[number].is_some(),
+            (None, Some(light)) => self.shifts.lights[light].is_some(),
             (None, None) => self.brightness_changed_below[id.0 as usize],
         };
         // Above the coarse level no verdict depends on brightness.
@@ -158,10 +158,10 @@ impl<'a> WorldChange<'a> {
     /// Growth of the errors of a pair at or below the coarse level since its margin was counted; `None` if unknown.
     pub(super) fn growth(&self, forest: &Forest, a: ElementId, b: ElementId) -> Option<Growth> {
         let shift = |id| {
-            let of_light = || forest.light(id).and_then(|light| self.lights[light]);
+            let of_light = || forest.light(id).and_then(|light| self.shifts.lights[light]);
             forest
                 .coarse(id)
-                .map_or_else(of_light, |number| self.shifts[number])
+                .map_or_else(of_light, |number| self.shifts.coarse[number])
                 .unwrap_or_default()
         };
         self.knows_margins.then(|| Growth::of_pair(&shift(a), &shift(b)))

@@ -8,6 +8,7 @@ use std::fmt;
 use crate::element::{ElementId, ElementKey};
 use crate::pair::{Carried, Gradients, PairHash, pair_key};
 
+use super::coarse_values::{CoarseQuantity, CoarseValue};
 use super::names::ElementName;
 use super::solution::{Elements, named_leaves};
 use crate::follow::Follower;
@@ -73,6 +74,15 @@ pub enum Difference {
         /// In the second.
         two: u64,
     },
+    /// The links agree, but not a value of the coarse solution or of groups.
+    Coarse {
+        /// Of which quantity.
+        what: CoarseQuantity,
+        /// Its ends: that of one element twice.
+        ends: Box<(ElementName, ElementName)>,
+        /// Its values in the first session and in the second; `None` in the one that lacks it.
+        values: Box<[Option<CoarseValue>; 2]>,
+    },
     /// Only one of them has this leaf.
     Leaf {
         /// Its name.
@@ -103,21 +113,23 @@ pub struct RadiosityGap {
 }
 
 /// Compares two sessions solved over the same scene with the same options: all links with what
-/// they carry, bit for bit; the numbers of elements and leaves; and the radiosities of all leaves.
+/// they carry, bit for bit; the numbers of elements and leaves; the coarse solution (its links, and the brightness that verdicts
+/// weigh by), groups and their links, bit for bit; and the radiosities of all leaves.
 ///
 /// Two solutions B1, B2 of the same links with residuals r1, r2 (relative to the mean radiosity)
 /// may differ by (r1 + r2) / (1 - rho_max) of the mean radiosity, and by rounding to single
 /// precision. The first difference in the order of the elements' names is returned, links before
-/// counts before radiosities; `None` where there is none.
+/// counts before the coarse solution before radiosities; `None` where there is none.
 ///
 /// Links are compared by their hash first, computed anew from the links of both; only where it
-/// differs they are sorted. Cost: linear in links and n log n in elements where all is well.
+/// differs they are sorted. Cost: linear in links and n log n in elements, coarse links and links of groups where all is well.
 pub fn compare<S: Elements>(one: &Follower<S>, two: &Follower<S>) -> Option<Difference> {
     let both = Both { one, two };
     if !one.space.is_of_the_scene_of(&two.space) {
         return Some(Difference::Scene);
     }
-    both.links().or_else(|| both.counts()).or_else(|| both.radiosities().err())
+    let links = both.links().or_else(|| both.counts());
+    links.or_else(|| both.coarse()).or_else(|| both.radiosities().err())
 }
 
 /// How far apart the radiosities of two sessions are that [`compare`] finds no difference between;
@@ -194,6 +206,16 @@ impl<S: Elements> Both<'_, S> {
         ];
         let differs = counts.into_iter().find(|(_, one, two)| one != two);
         differs.map(|(what, one, two)| Difference::Count { what, one, two })
+    }
+
+    /// The first value that differs, in the order of quantities and names.
+    fn coarse(&self) -> Option<Difference> {
+        let (one, two) = (self.one.space.coarse_values(), self.two.space.coarse_values());
+        let same = one.iter().zip(&two).take_while(|(a, b)| a == b).count();
+        let first = [one, two].map(|values| values.get(same).copied());
+        let (what, ends) = first.iter().flatten().map(CoarseValue::name).min()?;
+        let values = first.map(|value| value.filter(|value| value.name() == (what, ends)));
+        Some(Difference::Coarse { what, ends: self.ends(ends), values: Box::new(values) })
     }
 
     fn radiosities(&self) -> Result<RadiosityGap, Difference> {
@@ -344,6 +366,24 @@ impl Difference {
             ),
             Difference::Count { what, one: a, two: b } => {
                 format!("the links agree, but there are {a} {what} {one}, {b} {two}")
+            }
+            Difference::Coarse { what, ends, values } => {
+                let [a, b] = values.as_ref().map(|value| match value {
+                    Some(value) => value.in_numbers(),
+                    None => "nothing".to_owned(),
+                });
+                let of = match what {
+                    CoarseQuantity::Brightness => format!("the brightness of {}", ends.0),
+                    CoarseQuantity::Group => format!("the {}", ends.0),
+                    CoarseQuantity::Link => {
+                        format!("the coarse link to {} from {}", ends.0, ends.1)
+                    }
+                    CoarseQuantity::OpenLink => {
+                        format!("the coarse link past all to {} from {}", ends.0, ends.1)
+                    }
+                    CoarseQuantity::GroupLink => link(ends),
+                };
+                format!("the links agree, but {of} has {a} {one}, {b} {two}")
             }
             Difference::Leaf { element, which } => {
                 format!("{element} is a leaf {} only", name(which))

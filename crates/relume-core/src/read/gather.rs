@@ -18,6 +18,7 @@ use crate::space::{Solved, place_of};
 
 use super::choice::at_share;
 use super::tuning::{GAP_FAR, GATHER_FAR, GATHER_PART};
+use crate::read::tuning::SENSOR_SPLITS;
 
 /// A place and a direction at which irradiance is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,9 +35,6 @@ const SENSOR_ROUNDING: f64 = 1.0 / (1 << 20) as f64;
 
 /// How far what lies on a patch is lifted off it, in roundings of its corners.
 const LIFT: f64 = 8.0;
-
-/// Halvings of a leaf that falls into too many pieces; then its middle decides.
-const SPLITS: u32 = 6;
 
 /// What a look is for.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -240,14 +238,14 @@ impl<'a> Look<'a> {
         let way_m = e.bounds.distance(&Aabb::of([self.point]));
         let is_near = e.radius > way_m || way_m < self.reach_m;
         if self.purpose == Purpose::Sensor && is_near {
-            return self.add_parts(id, &seen, (&in_the_way, SPLITS), &mut out.parts);
+            return self.add_parts(id, &seen, (&in_the_way, SENSOR_SPLITS), &mut out.parts);
         }
         let (factor, b) = if in_the_way.is_empty() && !is_near {
             let factor = form_factor_from_point(self.point, self.normal, &seen);
             (factor, self.solved.radiosity.radiosity(id.0))
         } else {
             // The part in view may be much brighter or darker than the rest.
-            let (factor, moment) = self.factor_past(&seen, &in_the_way, SPLITS);
+            let (factor, moment) = self.factor_past(&seen, &in_the_way, SENSOR_SPLITS);
             let at = moment / factor.max(f64::MIN_POSITIVE);
             (factor, radiosity_at(self.solved, &e, id, at))
         };
@@ -348,7 +346,7 @@ impl<'a> Look<'a> {
             }
             return;
         }
-        let (factor, moment) = self.factor_past(part, occluders, SPLITS);
+        let (factor, moment) = self.factor_past(part, occluders, SENSOR_SPLITS);
         if factor > 0.0 {
             out.push(Part { leaf, at: moment / factor, nearest_m, factor });
         }
@@ -365,7 +363,7 @@ impl<'a> Look<'a> {
         let all: Vec<&Occluder> = occluders.iter().collect();
         let in_the_way = self.in_the_way(&seen, &all)?;
         let mut parts = Vec::new();
-        self.add_parts(leaf, &seen, (&in_the_way, SPLITS), &mut parts);
+        self.add_parts(leaf, &seen, (&in_the_way, SENSOR_SPLITS), &mut parts);
         Some(parts[at_share(parts.iter().map(|p| p.factor), where_)?])
     }
 

@@ -5,6 +5,7 @@
 mod accuracy;
 mod bends;
 mod choice;
+mod coarse_values;
 mod compare;
 mod events;
 mod factors;
@@ -22,6 +23,7 @@ mod snapshot;
 mod solution;
 mod tuning;
 
+pub use coarse_values::{CoarseQuantity, CoarseValue};
 pub use compare::{Difference, RadiosityGap, Which, compare, radiosity_gap};
 pub use events::{Event, EventKind};
 pub use factors::{Closure, Factors, Grouping, Open, PartFactors};

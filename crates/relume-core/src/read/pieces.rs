@@ -17,6 +17,7 @@ use super::tuning::{
     AROUND, FITS, PIECES_APART, PIECES_CELLS_MAX, PIECES_CLIPPED_MAX, PIECES_CLOSER, PIECES_NEAR,
     PIECES_UNSEEN, PIECES_UNSEEN_NEAR, PIECES_UNSEEN_PARTLY, SEEN_MIN,
 };
+use crate::read::tuning::{BESIDE, OPPOSITE};
 use crate::space::{Solved, SpaceState};
 
 /// What is needed to share out what links carry.
@@ -60,13 +61,6 @@ struct Look {
     is_near: bool,
     is_clear: bool,
 }
-
-/// Pieces are side by side if their middles are closer than this share of their radii.
-const BESIDE: f64 = 1.01;
-
-/// Pieces lie opposite each other about a third if the sum of the ways to them is shorter than this share
-/// of one.
-const OPPOSITE: f64 = 0.1;
 
 impl<'a> Sharing<'a> {
     pub(super) fn new(solved: &'a Solved) -> Sharing<'a> {

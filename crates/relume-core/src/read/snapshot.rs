@@ -13,6 +13,7 @@ use crate::space::{Solved, SpaceState};
 
 use super::bends::Bends;
 use super::tuning::VISIBLE;
+use crate::read::tuning::FACES_ALONG;
 
 /// The solution at one instant.
 #[derive(Clone, Debug)]
@@ -63,9 +64,6 @@ impl Leaf {
     }
 }
 
-/// Cosine of the angle by which the normal of a sensor may differ from that of its patch.
-const FACES_ALONG: f64 = 0.9;
-
 impl Snapshot {
     /// Irradiance that the mesh says is at a point of a surface, W/m2, linear RGB: on the nearest
     /// patch that faces along `normal` (to within 25 degrees) and has the point on it, no further
@@ -74,8 +72,7 @@ impl Snapshot {
     /// Linear over a leaf, with jumps between leaves: across the edge of a shadow it is right in the
     /// mean and wrong on either side. [`super::Frame::irradiance_at`] has no such limit.
     pub fn irradiance_at(&self, point: DVec3, normal: DVec3) -> Option<[f64; 3]> {
-        let (lo, hi) = self.scene.bounds_in(&self.world)?;
-        let near_m = 1e-3 * (hi - lo).length();
+        let near_m = 1e-3 * self.scene.bounds_in(&self.world)?.diagonal();
         let mut found: Vec<(f64, PatchId, DVec2)> = Vec::new();
         for (k, patch) in self.scene.patches.iter().enumerate() {
             let Some(pose) = self.world.pose(patch.body) else { continue };

@@ -6,6 +6,7 @@ use crate::element::{ElementId, ElementKey, Kind};
 use crate::follow::Follower;
 use crate::space::SpaceState;
 
+use super::coarse_values::{CoarseValue, coarse_values};
 use super::names::{ElementName, name_of};
 
 /// Elements of a solved state by id and by name.
@@ -28,6 +29,10 @@ pub trait Elements {
     fn is_present(&self, id: ElementId) -> bool;
     /// The largest reflectance of all materials and channels in use.
     fn reflectance_max(&self) -> f64;
+    /// Values of the coarse solution and of groups, in the order of their quantities and names; none in the plane.
+    fn coarse_values(&self) -> Vec<CoarseValue> {
+        Vec::new()
+    }
     /// Whether keys have one meaning in both states.
     fn is_of_the_scene_of(&self, other: &Self) -> bool;
 }
@@ -80,6 +85,10 @@ impl Elements for SpaceState {
         let SpaceState { scene, world, .. } = self;
         let all = scene.patches.iter().flat_map(|patch| world.reflectance(scene, patch));
         all.fold(0.0, f64::max)
+    }
+
+    fn coarse_values(&self) -> Vec<CoarseValue> {
+        coarse_values(self)
     }
 
     fn is_of_the_scene_of(&self, other: &SpaceState) -> bool {

@@ -252,3 +252,43 @@ pub(super) const NEGLIGIBLE_SHARE: f64 = 0.001;
 /// - Larger: time of readings
 /// - Smaller: leaves do not settle
 pub(super) const RECONSTRUCTION_SWEEPS: u32 = 8;
+
+/// Distance of a row sum from 1 up to which it is taken for an error of the links.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: open scenes that are closed by force
+/// - Smaller: coarse tables that are refused
+pub(super) const CLOSED_WITHIN: f64 = 0.1;
+
+/// Halvings of a leaf before a sensor that falls into too many pieces; then its middle decides.
+///
+/// - Unit: halvings
+/// - Tried: not varied
+/// - Larger: time of sensors close to clutter
+/// - Smaller: errors there
+pub(super) const SENSOR_SPLITS: u32 = 6;
+
+/// Cosine of the angle by which the normal of a point may differ from that of its patch.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: points of curved surfaces that find no patch
+/// - Smaller: points that find the patch around a corner
+pub(super) const FACES_ALONG: f64 = 0.9;
+
+/// Distance of the middles of two pieces, over the sum of their radii, up to which they are side by side.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: time of tables
+/// - Smaller: errors between neighbours
+pub(super) const BESIDE: f64 = 1.01;
+
+/// Sum of the ways from a piece to two others, over one of them, up to which these lie opposite each other about it.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: errors of pieces that are close on one side
+/// - Smaller: pieces that are cut in vain
+pub(super) const OPPOSITE: f64 = 0.1;

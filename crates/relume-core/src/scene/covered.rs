@@ -10,6 +10,9 @@ use super::topology::{Polygon, components, matched, sides_of};
 use super::weld::Weld;
 use super::{BodyId, Frame, InPlane, Patch, PatchId, Scene, Sheet, Solids};
 use crate::geometry::{Aabb, Moments, Plane, Pose, Segment, common, difference, within_outlines};
+use crate::scene::tuning::{
+    COVERED_CUTS_MAX, COVERED_PARTS_MAX, COVERED_WHOLLY, COVERING_POLYGONS_MAX,
+};
 
 /// What lies this close to a plane, as a share of the largest coordinate, lies in it: a few roundings of 32-bit numbers.
 pub(super) const IN_PLANE: f64 = 1e-6;
@@ -17,20 +20,8 @@ pub(super) const IN_PLANE: f64 = 1e-6;
 /// Bodies are cut this far above a patch to see what they cover, in roundings.
 const ABOVE: f64 = 4.0;
 
-/// Of what covers more than this share of a patch nothing is taken: the patch is wholly dark, and counts nowhere twice.
-const WHOLLY: f64 = 0.999;
-
 /// Parts of less than this share of a patch are rounding.
 const SLIVER: f64 = 1e-9;
-
-/// Cuts made in one scene; what would be found after that is not: a count, so that it is the same everywhere.
-const CUTS_MAX: usize = 2_000_000;
-
-/// Polygons of a body of which it is asked whether it is convex.
-const CONVEX_MAX: usize = 128;
-
-/// Polygons of a surface, and covered parts of a patch, that are looked at.
-const POLYGONS_MAX: usize = 4_096;
 
 /// Part of a patch that lies within a body, or in a narrow gap.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,7 +62,7 @@ impl Scene {
         let (moving, at_rest): (Vec<BodyId>, Vec<BodyId>) = bodies
             .filter(|&body| !self.is_distant(body))
             .partition(|&b| self.moves(b) || is_displaced(b));
-        let mut cuts_left = CUTS_MAX;
+        let mut cuts_left = COVERED_CUTS_MAX;
         let mut cover = |bodies: &[BodyId], is_own: bool| {
             Group::new(self, bodies, is_own).cover((self, solids), &mut out, &mut cuts_left);
         };
@@ -354,7 +345,7 @@ pub(super) fn stand(
         let [p, q] = if along.dot(q - p) < 0.0 { [q, p] } else { [p, q] };
         outline.push([p, q].map(|c| patch.in_frame(c)));
     }
-    if outline.is_empty() || outline.len() > POLYGONS_MAX {
+    if outline.is_empty() || outline.len() > COVERED_PARTS_MAX {
         return;
     }
     *left = left.saturating_sub(outline.len());
@@ -418,7 +409,7 @@ impl Hull {
             let height = |c: DVec3| (c - one.corners[0]).dot(one.normal);
             polygons().all(|other| other.corners.iter().all(|&c| height(c) <= slack_m))
         };
-        self.polygons.len() <= CONVEX_MAX && polygons().all(behind)
+        self.polygons.len() <= COVERING_POLYGONS_MAX && polygons().all(behind)
     }
 
     /// Whether a box lies in front of one of the polygons of a convex body; touching counts.
@@ -451,7 +442,7 @@ fn add(
     let mut fresh: Vec<Vec<DVec2>> = by.iter().map(|p| common(p, whole)).collect();
     fresh.retain(|p| wide(p));
     let fresh_m2: f64 = fresh.iter().map(|p| Moments::of(p).area).sum();
-    if fresh.is_empty() || fresh_m2 > WHOLLY * whole_m2 {
+    if fresh.is_empty() || fresh_m2 > COVERED_WHOLLY * whole_m2 {
         return !fresh.is_empty();
     }
     for (part, bounds) in &covered.parts {
@@ -467,7 +458,7 @@ fn add(
         fresh = rest;
     }
     fresh.retain(|p| wide(p));
-    if *left == 0 || covered.parts.len() + fresh.len() > POLYGONS_MAX {
+    if *left == 0 || covered.parts.len() + fresh.len() > COVERED_PARTS_MAX {
         // Without the cuts parts would count twice.
         covered.parts.clear();
     } else {
@@ -542,7 +533,9 @@ pub(super) fn hulls_of(scene: &Scene, (placed, first): (&[Placed], usize), out: 
         hull.twins.sort_unstable();
         hull.is_convex = hull.is_convex(placed, IN_PLANE * reach_m(&hull.bounds));
     }
-    out.extend(hulls.into_iter().filter(|hull| (3..=POLYGONS_MAX).contains(&hull.polygons.len())));
+    out.extend(
+        hulls.into_iter().filter(|hull| (3..=COVERED_PARTS_MAX).contains(&hull.polygons.len())),
+    );
 }
 
 #[cfg(test)]

@@ -11,9 +11,7 @@ use super::covered::{Hull, IN_PLANE, Placed, hide_gap, hulls_of, reach_m, stand}
 use super::gap::{between, open_sides, widest_m};
 use super::{BodyId, Covered, Patch, PatchId, Scene};
 use crate::geometry::{Aabb, Pose};
-
-/// Cuts made at one instant; what would be found after that is not: a count, so that it is the same everywhere.
-const CUTS_MAX: usize = 200_000;
+use crate::scene::tuning::COVERING_CUTS_MAX;
 
 /// Bodies that may cover or be covered where one of them is moved.
 #[derive(Clone, Debug, Default)]
@@ -115,7 +113,7 @@ impl Covering {
                 Some(Present { body, pose, bounds, is_moved: is_moved(body) })
             })
             .collect();
-        let mut left = CUTS_MAX;
+        let mut left = COVERING_CUTS_MAX;
         for one in present.iter().filter(|one| !hulls[one.body.0 as usize].is_empty()) {
             let meets = |other: &&Present| {
                 let reach = one.bounds.union(other.bounds);

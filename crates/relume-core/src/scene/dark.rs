@@ -11,9 +11,7 @@ use glam::DVec3;
 use super::shell::{Effort, Lies, Shell};
 use super::{BodyId, LightKind, Motion, NodeId, Note, Patch, PatchId, Scene, Severity};
 use crate::geometry::{Aabb, Pose};
-
-/// Parts of an animation in which bounds of what moves are taken.
-const SLICES: u32 = 64;
+use crate::scene::tuning::SLICES;
 
 /// Boxes that overlap by less than this share of their coordinates touch.
 const TOUCHING: f64 = 1e-6;

@@ -7,12 +7,10 @@ use glam::{DVec2, DVec3};
 
 use super::{BodyId, Patch, PatchId, Scene};
 use crate::geometry::{Aabb, Plane, Pose, Segment, segment_within};
+use crate::scene::tuning::HINGE_INSTANTS;
 
 /// What lies this close to a plane, as a share of the largest coordinate, lies in it: a few roundings of 32-bit numbers.
 const IN_PLANE: f64 = 1e-6;
-
-/// Instants of an animation at which an edge must be in one place to count as at rest.
-const INSTANTS: u32 = 64;
 
 impl Scene {
     /// For each patch, lines along which others meet its plane within it. Bodies that never move meet each other, a body that
@@ -40,8 +38,9 @@ impl Scene {
         if self.is_inserted(body) || from_s >= to_s {
             return Vec::new();
         }
-        let at = |k: u32| from_s + (to_s - from_s) * f64::from(k) / f64::from(INSTANTS);
-        let poses: Vec<Pose> = (0..=INSTANTS).map(|k| self.motion.place(node, at(k))).collect();
+        let at = |k: u32| from_s + (to_s - from_s) * f64::from(k) / f64::from(HINGE_INSTANTS);
+        let poses: Vec<Pose> =
+            (0..=HINGE_INSTANTS).map(|k| self.motion.place(node, at(k))).collect();
         let corners: Vec<Vec<DVec3>> =
             self.patches_of(body).map(|(_, patch)| patch.corners_in_body().collect()).collect();
         let first = poses[0];

@@ -42,18 +42,29 @@ impl Scene {
         joins.scene(self)
     }
 
-    /// Fronts of patches by what they move with and whether they are two-sided or mere obstructions.
-    fn groups(&self) -> BTreeMap<(Option<BodyId>, bool, bool), Vec<PatchId>> {
+    /// Fronts of patches that may be joined, by what they have in common.
+    fn groups(&self) -> BTreeMap<Alike, Vec<PatchId>> {
         let mut groups: BTreeMap<_, Vec<PatchId>> = BTreeMap::new();
         for (id, patch) in (0..).map(PatchId).zip(&self.patches) {
             if patch.twin.is_none_or(|twin| twin > id) {
                 let carrier = self.moves(patch.body).then_some(patch.body);
                 let obstructs = self.obstructions.contains(&patch.surface);
-                groups.entry((carrier, patch.twin.is_some(), obstructs)).or_default().push(id);
+                let alike = Alike { carrier, two_sided: patch.twin.is_some(), obstructs };
+                groups.entry(alike).or_default().push(id);
             }
         }
         groups
     }
+}
+
+/// What patches have in common that are joined.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Alike {
+    /// The body that they move with, where they move.
+    carrier: Option<BodyId>,
+    two_sided: bool,
+    /// Whether they are mere obstructions.
+    obstructs: bool,
 }
 
 /// Polygons that several patches make up.

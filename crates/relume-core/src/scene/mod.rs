@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use crate::geometry::{Pose, polygon_area};
+use crate::geometry::{Aabb, Pose, polygon_area};
 
 mod assemble;
 mod builder;
@@ -330,32 +330,30 @@ impl Scene {
         self.motion.moves(self.bodies[body.0 as usize].node)
     }
 
-    /// The smallest and largest world coordinates of all patches present at `time_s`, distant ones aside, metres;
-    /// `None` while none is.
-    pub fn bounds(&self, time_s: f64) -> Option<(DVec3, DVec3)> {
+    /// Smallest box around all patches present at `time_s`, distant ones aside; `None` while none is.
+    pub fn bounds(&self, time_s: f64) -> Option<Aabb> {
         self.bounds_of(|body| self.pose(body, time_s))
     }
 
     /// The same at time 0 of the bodies that the scene was made with, removed ones among them.
-    pub fn made_bounds(&self) -> Option<(DVec3, DVec3)> {
+    pub fn made_bounds(&self) -> Option<Aabb> {
         self.bounds_of(|body| self.pose(body, 0.0).filter(|_| !self.is_inserted(body)))
     }
 
     /// The same of those that are present in a world.
-    pub fn bounds_in(&self, now: &World) -> Option<(DVec3, DVec3)> {
+    pub fn bounds_in(&self, now: &World) -> Option<Aabb> {
         self.bounds_of(|body| now.pose(body))
     }
 
-    fn bounds_of(&self, pose: impl Fn(BodyId) -> Option<Pose>) -> Option<(DVec3, DVec3)> {
-        let mut bounds: Option<(DVec3, DVec3)> = None;
+    fn bounds_of(&self, pose: impl Fn(BodyId) -> Option<Pose>) -> Option<Aabb> {
+        let mut bounds = Aabb::EMPTY;
         for body in (0..self.bodies.len() as u32).map(BodyId).filter(|&b| !self.is_distant(b)) {
             let Some(pose) = pose(body) else { continue };
             for point in self.patches_of(body).flat_map(|(_, p)| p.corners_in_body()) {
-                let p = pose.point(point);
-                bounds = Some(bounds.map_or((p, p), |(min, max)| (min.min(p), max.max(p))));
+                bounds = bounds.with(pose.point(point));
             }
         }
-        bounds
+        (!bounds.is_empty()).then_some(bounds)
     }
 
     /// The same scene with nothing that emits: what form factors are found in, so that every surface

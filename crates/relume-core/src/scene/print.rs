@@ -8,6 +8,7 @@ use glam::{DVec2, DVec3};
 
 use super::coverage::{Cover, Wrap};
 use super::pyramid::{Pyramid, Sums};
+use crate::scene::tuning::PRINT_RESOLUTION;
 
 /// Images and vertex colours on a patch, in the frame of its body.
 #[derive(Clone, Debug)]
@@ -50,9 +51,6 @@ pub struct Printed {
     /// Share of the material's exitance, by channel.
     pub emission: [f64; 3],
 }
-
-/// Blocks of an image along a side of what a pixel covers.
-const RESOLUTION: f64 = 4.0;
 
 impl Print {
     /// The mean over the parallelogram of these two sides around a point, both in the frame of the body, metres;
@@ -103,7 +101,7 @@ impl Sheet {
     fn around(&self, places: [DVec2; 3], weights: [f64; 3], along: [[f64; 3]; 2]) -> Sums {
         let mix = |w: [f64; 3]| places[0] * w[0] + places[1] * w[1] + places[2] * w[2];
         let (middle, sides) = (mix(weights), along.map(mix));
-        let cover = Cover { pyramid: &self.pyramid, wrap: self.wrap, resolution: RESOLUTION };
+        let cover = Cover { pyramid: &self.pyramid, wrap: self.wrap, resolution: PRINT_RESOLUTION };
         let corner = |x: f64, y: f64| middle + sides[0] * x + sides[1] * y;
         let corners = [corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)];
         let mut mean = cover.mean([corners[0], corners[1], corners[2]]);

@@ -14,10 +14,7 @@ use super::draft::{Draft, DraftNode};
 use super::limits::{COORDINATE_MAX_M, is_place};
 use super::motion::unit;
 use super::{Interpolation, Node, NodeId, RotationTrack, SceneError, Track};
-
-/// Share of a scale by which it may be uneven and still count as uniform: what rigs in the wild have
-/// from rounding, a tenth of a millimetre of a metre.
-pub(super) const UNEVEN: f64 = 1e-4;
+use crate::scene::tuning::UNEVEN_MAX;
 
 /// What is left of a draft's nodes without their scales.
 pub(super) struct Rigid {
@@ -161,10 +158,10 @@ fn turned(turn: DMat3, q: DQuat) -> DQuat {
 }
 
 /// What a matrix makes of the axes of rotations that it is conjugated with (det Q times Q, with Q its
-/// orthogonal part), if it is a similarity up to [`UNEVEN`].
+/// orthogonal part), if it is a similarity up to [`UNEVEN_MAX`].
 fn of_similarity(above: DMat3) -> Option<DMat3> {
     let size = above.determinant().abs().cbrt();
-    let is_near = |q: DMat3| largest(above - q * size) <= UNEVEN * size;
+    let is_near = |q: DMat3| largest(above - q * size) <= UNEVEN_MAX * size;
     if !(size > 0.0 && size.is_finite()) {
         return None;
     }
@@ -190,7 +187,7 @@ fn about_one_axis(turns: &[DQuat], above: DMat3) -> Option<DMat3> {
     if axis == DVec3::ZERO {
         return Some(DMat3::IDENTITY);
     }
-    if axes().any(|v| v.cross(axis).length() > UNEVEN) {
+    if axes().any(|v| v.cross(axis).length() > UNEVEN_MAX) {
         return None;
     }
     // L [a]x L^-1 must be [b]x, b of unit length: then every turn about a becomes one about b.
@@ -204,7 +201,7 @@ fn about_one_axis(turns: &[DQuat], above: DMat3) -> Option<DMat3> {
     let k = above * cross(axis) * above.inverse();
     let b =
         0.5 * DVec3::new(k.y_axis.z - k.z_axis.y, k.z_axis.x - k.x_axis.z, k.x_axis.y - k.y_axis.x);
-    let is_turn = largest(k - cross(b)) <= UNEVEN && (b.length() - 1.0).abs() <= UNEVEN;
+    let is_turn = largest(k - cross(b)) <= UNEVEN_MAX && (b.length() - 1.0).abs() <= UNEVEN_MAX;
     let outer = |b: DVec3| DMat3::from_cols(b * axis.x, b * axis.y, b * axis.z);
     is_turn.then(|| outer(b.normalize()))
 }

@@ -11,6 +11,7 @@ use super::topology::{Polygon, Side, components, grouped, matched, sides_of};
 use super::weld::Weld;
 use super::{BodyId, PatchId, Scene};
 use crate::geometry::{Aabb, Plane};
+use crate::scene::tuning::{SHELL_LOOKS_MAX, SHELL_PIECES_MAX};
 
 /// Volume over area of a shell at least, in weld tolerances: two polygons back to back close nothing in.
 const THICK: f64 = 16.0;
@@ -19,18 +20,12 @@ const THICK: f64 = 16.0;
 const TOUCHES: f64 = 0.25;
 const INSIDE: f64 = 0.75;
 
-/// Pieces that a polygon is cut into at most to see whether one is inside; beyond it counts as inside.
-const PIECES_MAX: usize = 256;
-
-/// Corners looked at in one scene; what is not settled by then counts as inside. About a second.
-const LOOKS_MAX: usize = 20_000_000;
-
 /// What may still be spent on questions about shells: a count, so that the answers are the same everywhere.
 pub(super) struct Effort(usize);
 
 impl Effort {
     pub(super) fn new() -> Effort {
-        Effort(LOOKS_MAX)
+        Effort(SHELL_LOOKS_MAX)
     }
 
     /// Whether as much is left, which is then spent.
@@ -335,7 +330,7 @@ impl Shell {
                 }
             }
             pieces = next;
-            if pieces.len() > PIECES_MAX {
+            if pieces.len() > SHELL_PIECES_MAX {
                 return Lies::Inside;
             }
         }

@@ -11,6 +11,7 @@ use super::shell;
 use super::topology::Polygon;
 use super::weld::Weld;
 use super::{BodyId, Scene};
+use crate::scene::tuning::SOLID_FACES_MAX;
 
 /// A closed convex solid, in its body's frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,9 +69,6 @@ pub struct Solids {
 /// How far behind each face of a solid its furthest corner is at least, in weld tolerances.
 const THICK: f64 = 16.0;
 
-/// Faces beyond which nobody looks whether a solid is convex.
-const FACES_MAX: usize = 1_024;
-
 impl Scene {
     /// Its convex solids: closed, convex groups of one-sided patches of one body that look outwards
     /// and meet along whole sides.
@@ -116,7 +114,7 @@ impl Scene {
             let volume = group.iter().map(|face| face.cone(&weld)).sum::<f64>();
             let enclosure = if volume > 0.0 { Enclosure::Body } else { Enclosure::Space };
             group.iter().for_each(|f| out.enclosures[f.patch as usize] = enclosure);
-            if group.len() <= FACES_MAX
+            if group.len() <= SOLID_FACES_MAX
                 && is_convex(&group, &weld)
                 && let Some(solid) = solid(body, &group, &weld)
             {

@@ -41,7 +41,7 @@ pub(super) struct Topology {
 impl Topology {
     /// The polygons present at `time_s`.
     pub(super) fn of(scene: &Scene, time_s: f64) -> Topology {
-        let diagonal = scene.bounds(time_s).map_or(0.0, |(min, max)| min.distance(max));
+        let diagonal = scene.bounds(time_s).map_or(0.0, |bounds| bounds.diagonal());
         let mut weld = Weld::new(WELD * diagonal);
         let mut polygons = Vec::new();
         for body in (0..scene.bodies.len() as u32).map(BodyId) {

@@ -93,7 +93,7 @@ impl Estimate {
     /// Cost: some million tests of two polygons at most.
     pub fn of(scene: &Scene, time_s: f64, options: &Options) -> Estimate {
         let placed = placed(scene, time_s);
-        let extent_m = scene.bounds(time_s).map_or(0.0, |(low, high)| low.distance(high));
+        let extent_m = scene.bounds(time_s).map_or(0.0, |bounds| bounds.diagonal());
         let facing = count_facing(&placed, 1e-6 * extent_m, TRIED);
         let patches = placed.len() as u64;
         let grouped = match options.oracle {

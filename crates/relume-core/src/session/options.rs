@@ -1,6 +1,7 @@
 //! Options of a session.
 
 use crate::follow::Update;
+use crate::space::Bedding;
 
 use super::tuning::LINK_SHARE;
 
@@ -74,10 +75,10 @@ impl Options {
         Ok(())
     }
 
-    /// Whether builds start with groups of patches, and with coarse elements.
-    pub(super) fn bedding(&self) -> (bool, bool) {
+    /// What builds start with.
+    pub(super) fn bedding(&self) -> Bedding {
         let weighs = self.oracle == Oracle::Error;
-        (weighs && self.groups, weighs)
+        Bedding { groups: weighs && self.groups, coarse: weighs }
     }
 
     /// The oracle in the pair tree's terms.

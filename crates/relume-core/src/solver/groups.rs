@@ -55,6 +55,15 @@ struct Root {
     ends: Vec<(u32, u8)>,
 }
 
+/// End of a link that is an element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct ElementEnd {
+    id: u32,
+    link: u32,
+    /// Which end of the link.
+    side: u8,
+}
+
 /// All of them.
 #[derive(Clone, Debug, Default)]
 pub struct GroupLinks {
@@ -71,7 +80,7 @@ pub struct GroupLinks {
     /// By the first of their facets.
     roots: Vec<Root>,
     /// Ends that are elements, by their ids.
-    elements: Vec<(u32, u32, u8)>,
+    elements: Vec<ElementEnd>,
     /// Place of each element among those that are ends, by id; [`NONE`] for others.
     element_places: Vec<u32>,
     /// Mean of x^2 / radius^2 over an element.
@@ -143,7 +152,9 @@ impl GroupLinks {
                         let after = roots.partition_point(|root| root.facets.start <= facets.start);
                         roots[after - 1].ends.push((k, side));
                     }
-                    GroupEnd::Element { id, .. } => elements.push((*id, k, side)),
+                    GroupEnd::Element { id, .. } => {
+                        elements.push(ElementEnd { id: *id, link: k, side });
+                    }
                 }
             }
         }
@@ -173,6 +184,16 @@ impl GroupLinks {
     pub fn between(&self, ids: [u32; 2]) -> Option<&GroupLink> {
         let place = self.by_ids.binary_search_by_key(&ids, |&k| self.ids[k as usize]).ok()?;
         Some(&self.links[self.by_ids[place] as usize])
+    }
+
+    /// Links with the ids of their ends.
+    pub fn iter(&self) -> impl Iterator<Item = ([u32; 2], &GroupLink)> {
+        self.ids.iter().copied().zip(&self.links)
+    }
+
+    /// Factors of the facets of an end.
+    pub fn factors(&self, facets: &Range<u32>, first: u32) -> &[f32] {
+        &self.factors[first as usize..first as usize + facets.len()]
     }
 
     /// What both ends of one of these exchange, m2.
@@ -212,7 +233,7 @@ impl GroupLinks {
                 }
             }
         }
-        self.elements.iter_mut().for_each(|(id, ..)| *id = to.new_of(*id));
+        self.elements.iter_mut().for_each(|end| end.id = to.new_of(end.id));
         self.elements.sort_unstable();
         self.element_places = places_of(&self.elements);
         self.by_ids = in_order(&self.ids);
@@ -307,9 +328,9 @@ impl GroupLinks {
     }
 
     fn at_elements(&self, leaving: &[[[f32; 3]; 2]]) -> Vec<Linear> {
-        let of_element = |ends: &[(u32, u32, u8)]| {
+        let of_element = |ends: &[ElementEnd]| {
             let mut h = Linear::default();
-            for &(_, k, side) in ends {
+            for &ElementEnd { link: k, side, .. } in ends {
                 let link = &self.links[k as usize];
                 if let GroupEnd::Element { mean, radius, gradient, .. } =
                     &link.ends[usize::from(side)]
@@ -325,8 +346,8 @@ impl GroupLinks {
             }
             h
         };
-        let by_element: Vec<&[(u32, u32, u8)]> =
-            self.elements.chunk_by(|one, other| one.0 == other.0).collect();
+        let by_element: Vec<&[ElementEnd]> =
+            self.elements.chunk_by(|one, other| one.id == other.id).collect();
         by_element.par_iter().map(|ends| of_element(ends)).collect()
     }
 
@@ -370,7 +391,7 @@ impl GroupLinks {
             + self.factors.capacity() * 4
             + self.facets.capacity() * 8
             + self.places.capacity() * 4
-            + self.elements.capacity() * 12
+            + self.elements.capacity() * size_of::<ElementEnd>()
             + self.element_places.capacity() * 4
             + (self.ids.capacity() * 8 + self.by_ids.capacity() * 4)
             + ends) as u64
@@ -378,10 +399,10 @@ impl GroupLinks {
 }
 
 /// Number of each element among those of some ends (ascending), by id.
-fn places_of(elements: &[(u32, u32, u8)]) -> Vec<u32> {
-    let mut out = vec![NONE; elements.last().map_or(0, |end| end.0 as usize + 1)];
-    for (place, ends) in elements.chunk_by(|one, other| one.0 == other.0).enumerate() {
-        out[ends[0].0 as usize] = place as u32;
+fn places_of(elements: &[ElementEnd]) -> Vec<u32> {
+    let mut out = vec![NONE; elements.last().map_or(0, |end| end.id as usize + 1)];
+    for (place, ends) in elements.chunk_by(|one, other| one.id == other.id).enumerate() {
+        out[ends[0].id as usize] = place as u32;
     }
     out
 }

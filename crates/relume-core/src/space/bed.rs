@@ -8,6 +8,15 @@ use crate::scene::{BodyId, Scene};
 
 use super::coarse;
 
+/// What builds start with.
+#[derive(Clone, Copy)]
+pub(crate) struct Bedding {
+    /// Whether with groups of patches.
+    pub(crate) groups: bool,
+    /// Whether with coarse elements.
+    pub(crate) coarse: bool,
+}
+
 /// A scene, and what starts from it.
 #[derive(Clone)]
 pub(crate) struct Bed {
@@ -19,12 +28,11 @@ pub(crate) struct Bed {
 }
 
 impl Bed {
-    /// Of a scene of which some bodies are not where it has them at rest; with groups of patches and coarse elements, or
-    /// not.
+    /// Of a scene of which some bodies are not where it has them at rest.
     pub(crate) fn new(
         scene: Arc<Scene>,
         displaced: &BTreeSet<BodyId>,
-        (groups, coarse): (bool, bool),
+        Bedding { groups, coarse }: Bedding,
     ) -> Bed {
         let is_displaced = |body: BodyId| displaced.contains(&body) || scene.is_inserted(body);
         let mut seed = match groups {

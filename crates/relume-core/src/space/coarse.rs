@@ -163,6 +163,16 @@ impl Coarse {
         self.brightness.renumber(numbers);
     }
 
+    /// Coarse links, and the same with nothing in the way.
+    pub(crate) fn links(&self) -> [&Links; 2] {
+        [&self.links, &self.open]
+    }
+
+    /// Rounded brightness of the coarse elements.
+    pub(crate) fn brightness(&self) -> &CoarseBrightness {
+        &self.brightness
+    }
+
     /// Radiosity of a coarse element.
     pub(super) fn radiosity(&self, id: u32) -> [f32; 3] {
         self.radiosity.radiosity(id)

@@ -32,7 +32,7 @@ fn emitted_w(
     let mean = |c: [f64; 3]| c.iter().sum::<f64>() / 3.0;
     let area_m2 = scene.area_m2();
     // Of what moves, patches are placed about its origin, which is the scene's middle.
-    let middle = scene.bounds(0.0).map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
+    let middle = scene.bounds(0.0).map_or(DVec3::ZERO, |bounds| bounds.centre());
     let factor = |p: &Patch| p.most_factor(if scene.moves(p.body) { DVec3::ZERO } else { middle });
     let of_patch = |p: &Patch| {
         let exitance = mean(exitance(p));

@@ -14,7 +14,7 @@ mod surfaces;
 mod tally;
 mod tuning;
 
-pub(crate) use bed::Bed;
+pub(crate) use bed::{Bed, Bedding};
 pub(crate) use groups::{Before, group_links, replanted_links};
 pub(crate) use phases::Goal;
 pub use state::SpaceState;

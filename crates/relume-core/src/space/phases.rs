@@ -72,7 +72,9 @@ impl Space for SpaceState {
 
     fn is_at(&self, goal: &Goal<'_>) -> bool {
         let pending = [&self.touched, &self.covered, &self.regrouped];
-        self.world == *goal.world && pending.iter().all(|list| list.is_empty())
+        // The brightness of a body that came is found in a frame, though the body may be absent.
+        let is_known = self.coarse.brightness.is_known();
+        self.world == *goal.world && is_known && pending.iter().all(|list| list.is_empty())
     }
 
     fn stay(&mut self, goal: &Goal<'_>) -> bool {
@@ -162,14 +164,16 @@ impl Space for SpaceState {
         let Bed { scene, seed, coarse_ids } = goal.bed;
         let changed = self.coarse.follow(seed, changes);
         let relit = change.is_none() || self.world.any_relit(&was.world);
-        if !changed && !relit && self.touched.is_empty() && self.regrouped.is_empty() {
+        let is_known = self.coarse.brightness.is_known();
+        let is_otherwise = !self.touched.is_empty() || !self.regrouped.is_empty();
+        if !changed && !relit && is_known && !is_otherwise {
             return;
         }
         let before = std::mem::take(&mut self.coarse.brightness);
         self.coarse.solve((scene, &self.world), seed, coarse_ids);
         if let Some(change) = change {
-            let (shifts, of_lights) = self.coarse.brightness.shifts(&before);
-            change.set_brightness_shifts(seed, coarse_ids, (shifts, of_lights));
+            let shifts = self.coarse.brightness.shifts(&before);
+            change.set_brightness_shifts(seed, coarse_ids, shifts);
         }
     }
 

@@ -8,6 +8,7 @@ use crate::solver::{Surfaces, row_sums};
 use super::Solved;
 use super::state::SpaceState;
 use super::surfaces::LitForest;
+use super::tuning::UNBALANCED;
 
 /// Row sums and energies: a pass over all links and elements.
 pub(super) fn balance(solved: &Solved) -> Balance {
@@ -15,9 +16,6 @@ pub(super) fn balance(solved: &Solved) -> Balance {
     let is_off = energy.unbalanced() > UNBALANCED || !solved.radiosity.is_linear();
     Balance { rows, energy, suspects: if is_off { suspects(solved) } else { Vec::new() } }
 }
-
-/// Share of what is emitted that may be unaccounted for before surfaces are named.
-const UNBALANCED: f64 = 0.01;
 
 fn flux(solved: &Solved) -> (RowSumError, Energy) {
     let SpaceState { scene, forest, view, .. } = &solved.space;
@@ -30,9 +28,9 @@ fn flux(solved: &Solved) -> (RowSumError, Energy) {
     let is_surface = |id: u32| forest.receives(ElementId(id));
     let Solved { links, radiosity, .. } = solved;
     let (rows, mut energy) = balance_of(&surfaces, links, radiosity, facets, &is_surface);
-    let lights = lights_w(solved);
-    energy.emitted_w += lights.0 + from_outside_w(&surfaces, solved);
-    energy.escaped_w += lights.0 - lights.1;
+    let lights = lights_flux(solved);
+    energy.emitted_w += lights.emitted_w + from_outside_w(&surfaces, solved);
+    energy.escaped_w += lights.emitted_w - lights.arriving_w;
     (rows, energy)
 }
 
@@ -54,12 +52,19 @@ fn from_outside_w(surfaces: &LitForest<'_>, solved: &Solved) -> f64 {
     sum
 }
 
-/// Flux of the punctual lights and the part of it that arrives, W. A directional light emits what
-/// arrives.
-fn lights_w(solved: &Solved) -> (f64, f64) {
+/// Flux of the punctual lights.
+#[derive(Default)]
+struct LightsFlux {
+    /// All of it, W. A directional light emits what arrives.
+    emitted_w: f64,
+    /// The part that arrives, W.
+    arriving_w: f64,
+}
+
+fn lights_flux(solved: &Solved) -> LightsFlux {
     let SpaceState { scene, forest, view, world, .. } = &solved.space;
     if scene.lights.is_empty() {
-        return (0.0, 0.0);
+        return LightsFlux::default();
     }
     let mut arriving = vec![0.0; scene.lights.len()];
     for link in solved.tree.links() {
@@ -69,7 +74,7 @@ fn lights_w(solved: &Solved) -> (f64, f64) {
             }
         }
     }
-    let mut sums = (0.0, 0.0);
+    let mut sums = LightsFlux::default();
     for (k, light) in scene.lights.iter().enumerate() {
         if view.light(k).is_none() {
             continue;
@@ -80,8 +85,8 @@ fn lights_w(solved: &Solved) -> (f64, f64) {
             LightKind::Spot { inner, outer } => spot_sr(inner, outer),
             LightKind::Directional => arriving[k],
         };
-        sums.0 += intensity * all;
-        sums.1 += intensity * arriving[k];
+        sums.emitted_w += intensity * all;
+        sums.arriving_w += intensity * arriving[k];
     }
     sums
 }

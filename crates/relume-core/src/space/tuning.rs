@@ -74,3 +74,11 @@ pub(super) const VACANT_ELEMENTS: usize = 32;
 /// - Larger: slivers of floors beside crates are dark
 /// - Smaller: rounding on covered elements
 pub(super) const COVERED: f64 = 1e-4;
+
+/// Share of what is emitted that may be unaccounted for before surfaces are named.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: surfaces at fault stay unnamed
+/// - Smaller: surfaces are named that are off by errors of links
+pub(super) const UNBALANCED: f64 = 0.01;

@@ -287,7 +287,7 @@ mod tests {
             let receiver = place(&receiver, DVec3::ZERO, [0.0; 3]);
             let at = DVec3::new(away[0], away[1], 1.0).normalize() * distance;
             let source = place(&source, at, [turn[0] + PI, turn[1], turn[2]]);
-            prop_assume!(receiver.span(&source.plane).0 > 0.0 && source.span(&receiver.plane).0 > 0.0);
+            prop_assume!(receiver.span(&source.plane).lo > 0.0 && source.span(&receiver.plane).lo > 0.0);
             let ready = Receiver::new(&receiver);
             let bend = ready.polynomial(ready.bend(Simd::detect(), &source));
             let corners = &source.corners[..source.len];

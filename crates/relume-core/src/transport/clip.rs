@@ -6,7 +6,7 @@
 use glam::{DVec2, DVec3};
 
 use super::silhouette::Silhouette;
-use crate::geometry::Plane;
+use crate::geometry::{Interval, Plane};
 
 /// Fragments after which what is left is taken as it is: a guard, never met with few occluders.
 pub(super) const FRAGMENTS_MAX: usize = 256;
@@ -163,23 +163,23 @@ impl Target<'_> {
         // Only signs and ratios are used.
         let slack = self.on_line * (n.x.abs() + n.y.abs());
         let line = Line { a: n.x, b: n.y, c: -n.dot(point), slack };
-        let (low, high) = self.span(&line);
-        if high > 0.0 && low < 0.0 {
+        let span = self.span(&line);
+        if span.hi > 0.0 && span.lo < 0.0 {
             lines.push(line);
         }
-        high > 0.0
+        span.hi > 0.0
     }
 
-    /// Smallest and largest signed distance from a line, or of the bounds where these do not meet it.
+    /// Signed distances from a line, or of the bounds where these do not meet it.
     #[inline]
-    fn span(&self, line: &Line) -> (f64, f64) {
+    fn span(&self, line: &Line) -> Interval {
         let at = line.a * self.middle.x + line.b * self.middle.y + line.c;
         let reach = line.a.abs() * self.half.x + line.b.abs() * self.half.y;
         if at.abs() >= reach {
-            return (at - reach, at + reach);
+            return Interval { lo: at - reach, hi: at + reach };
         }
         let sides = self.corners.iter().map(|&t| line.side(t));
-        sides.fold((0.0, 0.0), |(low, high), d| (d.min(low), d.max(high)))
+        sides.fold(Interval::ZERO, |all, d| Interval { lo: d.min(all.lo), hi: d.max(all.hi) })
     }
 }
 
@@ -345,11 +345,11 @@ impl Cutter {
         self.rest.clear();
         self.rest.extend_from_slice(self.left.get(k));
         for at in self.lines_of(shadow) {
-            let (low, high) = self.find_sides(at);
-            if high <= 0.0 {
+            let sides = self.find_sides(at);
+            if sides.hi <= 0.0 {
                 return false;
             }
-            if low < 0.0 {
+            if sides.lo < 0.0 {
                 self.inside.clear();
                 let outside = |p| self.next.corners.push(p);
                 split(&self.rest, &self.sides, &mut self.inside, outside);
@@ -365,11 +365,11 @@ impl Cutter {
         self.rest.clear();
         self.rest.extend_from_slice(self.left.get(k));
         for at in self.lines_of(shadow) {
-            let (low, high) = self.find_sides(at);
-            if high <= 0.0 {
+            let sides = self.find_sides(at);
+            if sides.hi <= 0.0 {
                 return;
             }
-            if low < 0.0 {
+            if sides.lo < 0.0 {
                 self.inside.clear();
                 split(&self.rest, &self.sides, &mut self.inside, |_| {});
                 std::mem::swap(&mut self.rest, &mut self.inside);
@@ -378,17 +378,17 @@ impl Cutter {
         self.dark.push(&self.rest);
     }
 
-    /// Finds on which side of a line the corners of the rest are; the lowest and the highest, and 0.
-    fn find_sides(&mut self, line: usize) -> (f64, f64) {
+    /// Finds on which side of a line the corners of the rest are; the interval of their distances and 0.
+    fn find_sides(&mut self, line: usize) -> Interval {
         let line = self.lines[line];
-        let (mut low, mut high) = (0.0_f64, 0.0_f64);
+        let mut all = Interval::ZERO;
         self.sides.clear();
         self.sides.extend(self.rest.iter().map(|&c| {
             let d = line.side(c);
-            (low, high) = (low.min(d), high.max(d));
+            all = all.with(d);
             d
         }));
-        (low, high)
+        all
     }
 }
 

@@ -40,14 +40,14 @@ pub fn overlap_m2<'a>(
 ) -> f64 {
     let mut common = ConvexPolygon::new(&a.corners[..a.len]);
     for plane in sides(b) {
-        common = common.split(&plane).0;
+        [common, _] = common.split(&plane);
     }
     let mut pieces = vec![common];
     for cover in covers {
         let before = std::mem::take(&mut pieces);
         for mut rest in before {
             for edge in cover.edges {
-                let (inside, outside) = rest.split(edge);
+                let [inside, outside] = rest.split(edge);
                 pieces.push(outside);
                 rest = inside;
             }

@@ -19,6 +19,7 @@ use super::tuning::{
 use crate::element::{WorldElement, WorldLight, bilinear, bilinear_area};
 use crate::geometry::{ConvexPolygon, Plane, no_smaller};
 use crate::scene::LightKind;
+use crate::transport::tuning::{NEAR_HALVINGS, UNEVEN};
 
 /// Rounding of places, as a share of the largest coordinate.
 const ROUNDED: f64 = 1e-12;
@@ -65,17 +66,16 @@ pub struct Exchange {
 #[inline]
 pub fn meeting(a: &WorldElement, b: &WorldElement) -> Meeting {
     let slack = a.rounding_m + b.rounding_m;
-    let (b_lo, b_hi) = b.span(&a.plane);
-    let (a_lo, a_hi) = a.span(&b.plane);
-    if b_hi <= slack {
-        let is_flat = b_lo >= -slack && a_lo >= -slack && a_hi <= slack;
+    let (of_a, of_b) = (a.span(&b.plane), b.span(&a.plane));
+    if of_b.hi <= slack {
+        let is_flat = of_b.lo >= -slack && of_a.lo >= -slack && of_a.hi <= slack;
         let opposed = is_flat && a.plane.normal.dot(b.plane.normal) < -0.5;
         return if opposed { Meeting::Coplanar } else { Meeting::BackFacing };
     }
-    if a_hi <= slack {
+    if of_a.hi <= slack {
         return Meeting::BackFacing;
     }
-    if a_lo < -slack || b_lo < -slack { Meeting::Cut } else { Meeting::Facing }
+    if of_a.lo < -slack || of_b.lo < -slack { Meeting::Cut } else { Meeting::Facing }
 }
 
 /// Exchange of two elements in contact that have `overlap_m2` in common: all that leaves it arrives.
@@ -86,9 +86,6 @@ pub fn contact_exchange(a: &WorldElement, b: &WorldElement, overlap_m2: f64) -> 
     };
     Exchange { area_m2: overlap_m2, over_a: over(a), over_b: over(b), is_steep: false }
 }
-
-/// Relative standard deviation that contact over a part of an end counts for at most.
-const UNEVEN: f64 = 4.0;
 
 /// Exchange area of two elements that meet as `meeting` says, not [`Meeting::BackFacing`].
 ///
@@ -307,32 +304,33 @@ fn exchange_of_grids(a: &WorldElement, b: &WorldElement) -> Exchange {
 /// The closed form from points of each side to the whole of the other; the area from the smaller side, or where it
 /// may be wrong the smaller area.
 fn close_exchange(simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
-    let (of_a, of_b) = facing_parts(a, b);
+    let [of_a, of_b] = facing_parts(a, b);
     if of_a.corners().len() < 3 || of_b.corners().len() < 3 {
         return Exchange::default();
     }
-    let (from_a, over_a, steep_a) = integrate_polygon(simd, a, &of_a, of_b.corners());
-    let (from_b, over_b, steep_b) = integrate_polygon(simd, b, &of_b, of_a.corners());
-    let (large, small) = (from_a.max(from_b), from_a.min(from_b));
-    let bend = over_a.bend.min(over_b.bend);
+    let from_a = integrate_polygon(simd, a, &of_a, of_b.corners());
+    let from_b = integrate_polygon(simd, b, &of_b, of_a.corners());
+    let (large, small) = (from_a.area_m2.max(from_b.area_m2), from_a.area_m2.min(from_b.area_m2));
+    let bend = from_a.over.bend.min(from_b.over.bend);
     let disagree = large - small > AGREE * large || small <= 0.0;
     // Where nearly all of the smaller end is seen, what its edges lose lies between the points.
     let is_full = large > FULL * a.area.min(b.area);
-    let is_steep = disagree || is_full || bend > EXCHANGE_BENT || steep_a || steep_b;
+    let is_bent = bend > EXCHANGE_BENT || from_a.is_steep || from_b.is_steep;
+    let is_steep = disagree || is_full || is_bent;
     let area_m2 = match is_steep {
         true => small,
-        false if no_smaller(b.area, a.area) => from_a,
-        false => from_b,
+        false if no_smaller(b.area, a.area) => from_a.area_m2,
+        false => from_b.area_m2,
     };
-    Exchange { area_m2, over_a, over_b, is_steep }
+    Exchange { area_m2, over_a: from_a.over, over_b: from_b.over, is_steep }
 }
 
 /// The parts of two elements that face each other.
-fn facing_parts(a: &WorldElement, b: &WorldElement) -> (ConvexPolygon, ConvexPolygon) {
+fn facing_parts(a: &WorldElement, b: &WorldElement) -> [ConvexPolygon; 2] {
     let slack = a.rounding_m + b.rounding_m;
     let part =
         |e: &WorldElement, plane| ConvexPolygon::new(&e.corners[..e.len]).clipped(plane, slack);
-    (part(a, &b.plane), part(b, &a.plane))
+    [part(a, &b.plane), part(b, &a.plane)]
 }
 
 impl Exchange {
@@ -340,7 +338,7 @@ impl Exchange {
     ///
     /// Error: 1e-4 of the exchange area, or 1e-7 of the smaller element's area.
     pub fn along_outlines(self, a: &WorldElement, b: &WorldElement) -> Exchange {
-        let (of_a, of_b) = facing_parts(a, b);
+        let [of_a, of_b] = facing_parts(a, b);
         if of_a.corners().len() < 3 || of_b.corners().len() < 3 {
             return self;
         }
@@ -373,30 +371,39 @@ pub fn exchange_of_polygons((a, of_a): (&[DVec3], DVec3), (b, of_b): (&[DVec3], 
     exchange_along_outlines(one.corners(), two.corners(), 1e-4 * most).min(most)
 }
 
-/// Integral over `part` of `e` of the form factor to `seen`, m2, its variation over `e`, and whether points
-/// beside each other find too different ones for the integral to be right.
+/// Integral of the form factor over an end of a pair.
+struct Integral {
+    /// Its value, m2.
+    area_m2: f64,
+    /// Variation of the form factor over the end.
+    over: Variation,
+    /// Whether points beside each other find too different ones for the integral to be right.
+    is_steep: bool,
+}
+
+/// Integral over `part` of `e` of the form factor to `seen`.
 fn integrate_polygon(
     simd: Simd,
     e: &WorldElement,
     part: &ConvexPolygon,
     seen: &[DVec3],
-) -> (f64, Variation, bool) {
+) -> Integral {
     let c = part.corners();
     let viewer = Viewer { simd, e, seen };
     let mut fit = Fit::default();
     let mut sum = 0.0;
     if c.len() == 4 {
-        sum = viewer.integrate(&[c[0], c[1], c[2], c[3]], DEPTH, &mut fit);
+        sum = viewer.integrate(&[c[0], c[1], c[2], c[3]], NEAR_HALVINGS, &mut fit);
     } else {
         for k in 1..c.len() - 1 {
-            sum += viewer.integrate(&[c[0], c[k], c[k + 1], c[k + 1]], DEPTH, &mut fit);
+            sum += viewer.integrate(&[c[0], c[k], c[k + 1], c[k + 1]], NEAR_HALVINGS, &mut fit);
         }
     }
     let variation = fit.variation();
     // Where the other's plane cuts the element, a straight line does not fit what arrives.
     let whole = part.area() >= 0.999 * e.area;
     let bend = if whole { variation.bend } else { variation.bend.max(1.0) };
-    (sum, Variation { bend, ..variation }, fit.is_steep)
+    Integral { area_m2: sum, over: Variation { bend, ..variation }, is_steep: fit.is_steep }
 }
 
 /// The end of a near pair from whose points the other is seen.
@@ -443,9 +450,6 @@ impl Viewer<'_> {
         Some(fit.value - before)
     }
 }
-
-/// Halvings of a quadrilateral in the near field.
-const DEPTH: u32 = 1;
 
 /// "Exchange area" of a punctual light and an element: the integral over the element of
 /// cos / r^2 (point and spot, with the cone's falloff; sr) or of cos (directional; m2), so that

@@ -19,6 +19,7 @@ use crate::element::{
 use crate::geometry::{Pose, part_in_front};
 use crate::scene::BodyId;
 use crate::transport::point::form_factor_from_point;
+use crate::transport::tuning::GROUP_SEGMENTS;
 
 mod sight;
 
@@ -57,9 +58,6 @@ pub struct Slope {
 
 /// Place of a Gauss point from the middle, in halves of a side.
 const GAUSS: f64 = 0.577_350_269_189_625_8;
-
-/// Segments that a pair with a group is sampled by.
-pub const GROUP_SEGMENTS: u32 = 16;
 
 /// Body in whose frame a pair is evaluated, if both ends belong to it.
 pub fn common_body(

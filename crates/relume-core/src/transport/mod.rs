@@ -30,14 +30,14 @@ pub use exchange::{
     Exchange, Meeting, Variation, contact_exchange, exchange, exchange_by_points,
     exchange_of_points, exchange_of_polygons, light_at, light_exchange, meeting,
 };
-pub use group::{GROUP_SEGMENTS, GroupSight, Slope, Spread, common_body};
+pub use group::{GroupSight, Slope, Spread, common_body};
 pub use kernel::Simd;
 pub use point::form_factor_from_point;
 pub use prepared_view::{Clipping, FactorPast, PreparedView, form_factor_past};
 pub use segments::{SEGMENTS, SegmentBundle};
 pub use share::Visibility;
 pub use side::Side;
-pub use tuning::{CELLS_MAX, CLIPPED_MAX};
+pub use tuning::{CELLS_MAX, CLIPPED_MAX, GROUP_SEGMENTS};
 pub use visibility::{
     BlockerSizes, Candidates, InShaft, Shaft, clipping, light_visibility, prepare_view,
     segment_is_clear, visibility,

@@ -19,6 +19,7 @@ use super::tuning::{
 use crate::element::WorldElement;
 use crate::geometry::{Aabb, ConvexPolygon, Plane, Pose, no_smaller};
 use crate::scene::Solid;
+use crate::transport::tuning::{DRAWN_IN, SEEN_SLIVER};
 
 /// Share of a form factor below which what is left of it is rounding.
 const NOTHING: f64 = 1e-12;
@@ -74,11 +75,11 @@ impl<'a> Between<'a> {
         };
         let all = || self.iter().zip(&self.faces);
         let is_outside = move |solid: u32| {
-            all().any(|(corners, face)| face.1 == Some(solid) && span((corners, face)).0 > slack)
+            all().any(|(corners, face)| face.1 == Some(solid) && span((corners, face)).lo > slack)
         };
         let hides = move |(corners, face): &(&[DVec3], &(DVec3, Option<u32>))| match face.1 {
             Some(solid) if without.contains(&solid) => false,
-            Some(solid) => span((corners, face)).1 >= -slack || !is_outside(solid),
+            Some(solid) => span((corners, face)).hi >= -slack || !is_outside(solid),
             None => true,
         };
         all().filter(hides).map(|(corners, _)| corners)
@@ -297,7 +298,12 @@ impl<'a> Clipping<'a> {
 
     /// Whether no point sees more of the other end than slivers that rounding leaves between shadows.
     fn sees_next_to_nothing(&self) -> bool {
-        self.prepare_view.scratch.views.points.iter().all(|&(all, clear)| clear <= SLIVER * all)
+        self.prepare_view
+            .scratch
+            .views
+            .points
+            .iter()
+            .all(|&(all, clear)| clear <= SEEN_SLIVER * all)
     }
 
     /// Visibility from four points, and how far it may be off: about its root mean square.
@@ -342,13 +348,6 @@ impl<'a> Clipping<'a> {
     }
 }
 
-/// Share of the other end below which what a point sees may be a sliver between shadows.
-const SLIVER: f64 = 1e-4;
-
-/// Share of the way to the middle by which the corners of an end are drawn in, so that none lies in the plane of
-/// what stands on the end.
-const DRAWN_IN: f64 = 0.005;
-
 /// Whether the first end is the one to look from: the smaller, unless shadows move much more for it, or one faces
 /// the other with a part only: points behind the other's plane see nothing.
 ///
@@ -357,7 +356,7 @@ const DRAWN_IN: f64 = 0.005;
 /// the size of the other. What nearly touches an end is to be looked at from the other.
 fn looks_best(a: &WorldElement, b: &WorldElement, between: &Between<'_>) -> bool {
     let slack = a.rounding_m + b.rounding_m;
-    let facing = |e: &WorldElement, plane: &Plane| match e.span(plane).0 >= -slack {
+    let facing = |e: &WorldElement, plane: &Plane| match e.span(plane).lo >= -slack {
         true => 1.0,
         false => ConvexPolygon::new(&e.corners[..e.len]).clipped(plane, slack).area() / e.area,
     };

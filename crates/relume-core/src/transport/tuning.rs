@@ -186,3 +186,44 @@ pub(super) const FACING: f64 = 0.7303;
 /// - Larger: time: 4 rays take 5 to 22 % of a cold build; eight times as many changed no error (12.4 % by area either way)
 /// - Smaller: visibilities of facets are noise
 pub(super) const FACET_RAYS: usize = 4;
+
+/// Segments that a pair with a group is sampled by.
+///
+/// - Unit: segments
+/// - Tried: not varied
+/// - Larger: time of links with groups
+/// - Smaller: noise of their visibility
+pub const GROUP_SEGMENTS: u32 = 16;
+
+/// Relative standard deviation that contact over a part of an end counts for at most.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: links along contacts
+/// - Smaller: light that leaks along contacts
+pub(super) const UNEVEN: f64 = 4.0;
+
+/// Halvings of a quadrilateral in the near field.
+///
+/// - Unit: halvings
+/// - Tried: not varied
+/// - Larger: time of close pairs: it grows fourfold
+/// - Smaller: pairs that count as steep
+pub(super) const NEAR_HALVINGS: u32 = 1;
+
+/// Share of the other end below which what a point sees may be a sliver between shadows.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: light that is lost through narrow gaps
+/// - Smaller: light through gaps that rounding makes
+pub(super) const SEEN_SLIVER: f64 = 1e-4;
+
+/// Share of the way to the middle by which the corners of an end are drawn in, so that none lies in the plane of what stands on
+/// the end.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: edges of shadows beside contacts
+/// - Smaller: corners that what stands on the end hides
+pub(super) const DRAWN_IN: f64 = 0.005;

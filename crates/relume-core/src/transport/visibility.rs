@@ -2,7 +2,7 @@
 //! clipping ([`clipping`]).
 
 use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldView};
-use crate::geometry::{Aabb, Plane, Pose, ShaftOfBoxes, shaft_meets_box};
+use crate::geometry::{Aabb, Interval, Plane, Pose, ShaftOfBoxes, shaft_meets_box};
 use crate::scene::{BodyId, InPlane, PatchId};
 
 use super::clip::keep_in_front;
@@ -67,28 +67,37 @@ impl InShaft {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BlockerSizes {
     /// For each end how unevenly lamps in the shaft light it (`spot`): 1.
-    pub spots: (f64, f64),
+    pub spots: [f64; 2],
     /// Area of the smallest blocker, m2.
     pub least_m2: f64,
     /// Area of all blockers, m2.
     pub all_m2: f64,
     /// For each end, how far an edge of a blocker moves over the other end, at most, in units of how far the point on
     /// this one moves that it is seen from: the ratio of the blocker's distances from the two centres.
-    pub leverage: (f64, f64),
+    pub leverage: [f64; 2],
     /// For each end, how near a blocker is for its size: the square of its radius over the distance of its centre from the
     /// nearest blocker, at most 1. Where one stands on an end, light that arrives there stops at a line: 1.
-    pub near: (f64, f64),
+    pub near: [f64; 2],
 }
 
 impl BlockerSizes {
     /// Nothing stands between the ends.
     pub const NOTHING: BlockerSizes = BlockerSizes {
-        spots: (0.0, 0.0),
+        spots: [0.0; 2],
         least_m2: f64::INFINITY,
         all_m2: f64::INFINITY,
-        leverage: (0.0, 0.0),
-        near: (0.0, 0.0),
+        leverage: [0.0; 2],
+        near: [0.0; 2],
     };
+}
+
+/// Distances from planes within which polygons count as on them, metres.
+#[derive(Clone, Copy)]
+struct Within {
+    /// From that of a blocker, or of an end that it is behind.
+    slack_m: f64,
+    /// From that of an end that it covers.
+    margin_m: f64,
 }
 
 /// Relation of a patch to a shaft.
@@ -137,22 +146,24 @@ impl<'a> Lifted<'a> {
     }
 }
 
-/// Distances of a polygon's corners from a plane: smallest and largest, metres.
+/// Distances of a polygon's corners from a plane, metres.
 #[inline]
-fn span(polygon: &OccluderPolygon<'_>, plane: &Plane) -> (f64, f64) {
-    let with = |(lo, hi): (f64, f64), &c: &DVec3| {
-        let d = plane.distance(c);
-        (lo.min(d), hi.max(d))
-    };
-    polygon.corners.iter().fold((f64::INFINITY, f64::NEG_INFINITY), with)
+fn span(polygon: &OccluderPolygon<'_>, plane: &Plane) -> Interval {
+    Interval::of(polygon.corners.iter().map(|&c| plane.distance(c)))
+}
+
+/// The larger of two numbers, by end.
+#[inline]
+fn larger(one: [f64; 2], other: [f64; 2]) -> [f64; 2] {
+    [one[0].max(other[0]), one[1].max(other[1])]
 }
 
 /// Reach of two elements to either side of a plane, the smaller of both, metres; negative where they
 /// stay away from it.
 #[inline]
 fn reach(plane: &Plane, a: &WorldElement, b: &WorldElement) -> f64 {
-    let ((a_lo, a_hi), (b_lo, b_hi)) = (a.span(plane), b.span(plane));
-    (-a_lo.min(b_lo)).min(a_hi.max(b_hi))
+    let both = a.span(plane).union(b.span(plane));
+    (-both.lo).min(both.hi)
 }
 
 impl<'a> Shaft<'a> {
@@ -204,15 +215,15 @@ impl<'a> Shaft<'a> {
         // A lamp beside the ends lights the one unevenly, though it blocks nothing.
         let unseen = if self.forest.glows(patch) { Standing::Beside } else { Standing::Out };
         let (above_a, above_b) = (span(&occluder, &a.plane), span(&occluder, &b.plane));
-        let is_near = |(lo, hi): (f64, f64)| lo >= -wide_margin && hi <= wide_margin;
+        let is_near = |above: Interval| above.lo >= -wide_margin && above.hi <= wide_margin;
         let (passes_wide, passes) = if is_near(above_a) || is_near(above_b) {
-            let behind = (above_a.1, above_b.1);
-            let blocks =
-                |slack, margin| self.blocks(patch, &occluder, (a, b), behind, (slack, margin));
-            (blocks(0.5 * slack, wide_margin), blocks(slack, margin))
+            let height_m = [above_a.hi, above_b.hi];
+            let blocks = |within| self.blocks(patch, &occluder, [a, b], height_m, within);
+            let wide = Within { slack_m: 0.5 * slack, margin_m: wide_margin };
+            (blocks(wide), blocks(Within { slack_m: slack, margin_m: margin }))
         } else {
             // The same without a look at what covers an end.
-            let height = above_a.1.min(above_b.1);
+            let height = above_a.hi.min(above_b.hi);
             if height <= 0.5 * slack {
                 return unseen;
             }
@@ -228,27 +239,28 @@ impl<'a> Shaft<'a> {
         }
     }
 
-    /// Whether a polygon that may cover an end could block any segment, its box aside.
+    /// Whether a polygon that may cover an end could block any segment, its box aside; `height_m` is how far it reaches in front of
+    /// each end, metres.
     fn blocks(
         &self,
         patch: PatchId,
         occluder: &OccluderPolygon<'_>,
-        (a, b): (&WorldElement, &WorldElement),
-        (above_a, above_b): (f64, f64),
-        (slack, margin): (f64, f64),
+        [a, b]: [&WorldElement; 2],
+        height_m: [f64; 2],
+        Within { slack_m, margin_m }: Within,
     ) -> bool {
-        let behind = (above_a <= slack, above_b <= slack);
-        let (on_a, on_b) = self.covered(patch, occluder, (a, b), margin);
+        let behind = height_m.map(|height_m| height_m <= slack_m);
+        let [on_a, on_b] = self.covered(patch, occluder, [a, b], margin_m);
         if on_a || on_b {
             // What two ends in contact exchange is found within their plane.
-            return self.is_contact() || !(if on_a { behind.1 } else { behind.0 });
+            return self.is_contact() || !(if on_a { behind[1] } else { behind[0] });
         }
-        !behind.0 && !behind.1 && reach(&occluder.plane, a, b) > slack
+        !behind.contains(&true) && reach(&occluder.plane, a, b) > slack_m
     }
 
     /// For each end the largest `spot` of some lamps that shine on it, 1; what surrounds the ends has the areas `around_m2`.
-    fn spots(&self, lamps: &[PatchId], around_m2: (f64, f64)) -> (f64, f64) {
-        let mut most = (0.0_f64, 0.0_f64);
+    fn spots(&self, lamps: &[PatchId], around_m2: [f64; 2]) -> [f64; 2] {
+        let mut most = [0.0; 2];
         for &patch in lamps {
             let both = self.view.patch(patch).twin.is_some();
             let (own, a, b) = self.seen_by(Some(self.view.patch(patch).body));
@@ -261,7 +273,7 @@ impl<'a> Shaft<'a> {
                 let shines = both || lamp.plane.distance(e.centre) > 0.0;
                 if shines { spot(e, around_m2, (&lamp, lamp_m2)) } else { 0.0 }
             };
-            most = (most.0.max(of(a, around_m2.0)), most.1.max(of(b, around_m2.1)));
+            most = larger(most, [of(a, around_m2[0]), of(b, around_m2[1])]);
         }
         most
     }
@@ -270,7 +282,7 @@ impl<'a> Shaft<'a> {
     pub fn sizes_of(
         &self,
         InShaft { blockers, lamps, .. }: &InShaft,
-        around_m2: (f64, f64),
+        around_m2: [f64; 2],
     ) -> BlockerSizes {
         let spots = self.spots(lamps, around_m2);
         if blockers.is_empty() {
@@ -306,10 +318,9 @@ impl<'a> Shaft<'a> {
         };
         let from = |e: &WorldElement| polygon.distance(e.centre).max(f64::MIN_POSITIVE);
         let (from_a, from_b) = (from(a), from(b));
-        let most = |one: (f64, f64), other: (f64, f64)| (one.0.max(other.0), one.1.max(other.1));
-        *leverage = most(*leverage, (from_b / from_a, from_a / from_b));
+        *leverage = larger(*leverage, [from_b / from_a, from_a / from_b]);
         let (by_a, by_b) = ((a.radius / from_a).min(1.0), (b.radius / from_b).min(1.0));
-        *near = most(*near, (by_a * by_a, by_b * by_b));
+        *near = larger(*near, [by_a * by_a, by_b * by_b]);
     }
 
     /// Whether both ends lie in one plane and touch.
@@ -343,15 +354,15 @@ impl<'a> Shaft<'a> {
         &self,
         patch: PatchId,
         polygon: &OccluderPolygon<'_>,
-        (a, b): (&WorldElement, &WorldElement),
+        [a, b]: [&WorldElement; 2],
         within_m: f64,
-    ) -> (bool, bool) {
+    ) -> [bool; 2] {
         let on = |e: &WorldElement, of| {
             lies_in(polygon, &e.plane, within_m).is_some_and(|opposed| {
                 in_plane(self.forest, self.view, patch, of, opposed) != InPlane::Apart
             })
         };
-        (on(a, self.patches.0), on(b, self.patches.1))
+        [on(a, self.patches.0), on(b, self.patches.1)]
     }
 
     /// A blocker where it blocks, and whether that is in the frame of the pair's own body: polygons
@@ -361,10 +372,10 @@ impl<'a> Shaft<'a> {
         let polygon =
             if own { self.view.occluder_in_body(patch) } else { self.view.occluder(patch) };
         let up = |e: &WorldElement| e.plane.normal * (LIFT * self.slack());
-        let by = match self.covered(patch, &polygon, (a, b), COVER * self.slack()) {
-            (true, _) => up(a),
-            (false, true) => up(b),
-            (false, false) => DVec3::ZERO,
+        let by = match self.covered(patch, &polygon, [a, b], COVER * self.slack()) {
+            [true, _] => up(a),
+            [false, true] => up(b),
+            [false, false] => DVec3::ZERO,
         };
         (own, Lifted { polygon, by })
     }

@@ -9,11 +9,12 @@ use glam::{DVec2, DVec3};
 
 use super::document::Document;
 use super::images::{Images, Key};
-use super::material::{Paint, REFLECTANCE_MAX};
+use super::material::Paint;
 use super::{json, note};
 use crate::surface::facet::{Facet, Layer, Look};
 use crate::surface::pieces::{Pieces, blocking, pieces};
 use crate::surface::{Mesh, Tints, resolution};
+use crate::tuning::REFLECTANCE_MAX;
 use relume_core::scene::coverage::Wrap;
 use relume_core::scene::merge::{Merged, merge};
 use relume_core::scene::{Note, Print, SceneError, Severity, Tint, TintId};

@@ -9,14 +9,8 @@ use super::animation::GlowKeys;
 use super::document::Document;
 use super::json;
 use super::note;
+use crate::tuning::{BLEND_CUTOFF, REFLECTANCE_MAX};
 use relume_core::scene::{Material, Note, Severity};
-
-/// The largest reflectance that is taken from a file. With 1 light would never be absorbed and the
-/// balance has no solution; no real paint reaches 0.98.
-pub(super) const REFLECTANCE_MAX: f64 = 0.98;
-
-/// Alpha from which on a blended surface blocks light; below, all light passes.
-const BLEND_CUTOFF: f64 = 0.5;
 
 /// What textures and vertex colours of a primitive are multiplied with, and where they are.
 #[derive(Clone)]

@@ -11,6 +11,7 @@ use super::document::Document;
 use super::look::{Looks, Triangles};
 use super::{json, note};
 use crate::range::out_of_range;
+use crate::tuning::STRAY_WEIGHT;
 use relume_core::scene::limits::is_place;
 use relume_core::scene::{Note, Print, SceneError, Severity, TintId};
 
@@ -74,9 +75,6 @@ pub(super) fn by_joint(
     }
     Ok(if bent > 0 { Err(bent) } else { Ok(parts.into_iter().collect()) })
 }
-
-/// Share of a vertex's weight that other joints may have: what 8-bit weights leave.
-const STRAY_WEIGHT: f64 = 4e-3;
 
 /// The one joint that each vertex hangs on, if it is one.
 fn joints(document: &Document, soup: &Soup<'_>) -> Result<Vec<Option<usize>>, SceneError> {

@@ -5,14 +5,8 @@
 use glam::DVec3;
 
 use super::clock::Keys;
+use crate::tuning::{SAME_SCALE, SWITCH_S};
 use relume_core::scene::Interpolation;
-
-/// How long a scale may take from nothing to full size and still count as a switch, seconds.
-/// Exporters that write a key for each frame turn a switch into a ramp of one frame.
-const SWITCH_S: f64 = 0.1;
-
-/// Relative difference of scales that counts as none: what exporters and rigs leave behind.
-const SAME_SCALE: f64 = 1e-4;
 
 /// What scale keys come to.
 pub(super) struct Sizes {

@@ -13,6 +13,7 @@ use super::skinned::Skinned;
 use super::{environment, json, light, material, node_name, note};
 use crate::ImportOptions;
 use crate::options::Span;
+use crate::tuning::REFLECTANCE_MAX;
 use relume_core::scene::draft::{Draft, DraftNode, DraftSurface};
 use relume_core::scene::{Camera, MaterialId, NodeId, Note, SceneError, Severity, Track};
 
@@ -447,7 +448,7 @@ impl Tree<'_> {
         if self.without_material == 0 {
             self.draft.materials.pop();
         } else {
-            let (count, rho) = (self.without_material, material::REFLECTANCE_MAX);
+            let (count, rho) = (self.without_material, REFLECTANCE_MAX);
             let message = format!(
                 "surfaces without a material: {count}; they get reflectance {rho}: give them one"
             );

@@ -11,6 +11,7 @@ use crate::ImportOptions;
 use crate::folder::{Folder, read_scene};
 use crate::range::{first_out_of_range, out_of_range, said};
 use crate::surface::Tints;
+use crate::tuning::REFLECTANCE_OF_NONE;
 use paint::Paint;
 use relume_core::scene::draft::{Draft, DraftNode};
 use relume_core::scene::limits::is_place;
@@ -22,9 +23,6 @@ mod paint;
 mod ply;
 mod polygon;
 mod stl;
-
-/// Reflectance of what has no material: a middle grey.
-const REFLECTANCE: f64 = 0.5;
 
 /// Corners of all polygons of a file at most: above any scene that can be solved.
 const CORNERS_MAX: usize = 1 << 24;
@@ -148,7 +146,7 @@ fn draft(
     let bare = parts().filter(is_bare).count();
     if bare > 0 {
         let message = format!(
-            "surfaces without a material: {bare}; they get reflectance {REFLECTANCE} on both sides"
+            "surfaces without a material: {bare}; they get reflectance {REFLECTANCE_OF_NONE} on both sides"
         );
         notes.push(info("no-material", "no material", bare, message));
     }
@@ -193,7 +191,7 @@ fn draft(
 fn grey() -> Material {
     Material {
         name: "no material".into(),
-        reflectance: [REFLECTANCE; 3],
+        reflectance: [REFLECTANCE_OF_NONE; 3],
         exitance: [0.0; 3],
         glow: None,
         double_sided: true,

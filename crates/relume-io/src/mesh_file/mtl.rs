@@ -9,16 +9,14 @@ use glam::DVec2;
 use image::{Rgba, RgbaImage};
 
 use super::paint::{Paint, Sheet};
-use super::{REFLECTANCE, warning};
+use super::warning;
 use crate::folder::Folder;
 use crate::regular::unless_fits;
 use crate::surface::image_file::{IMAGE_MAX, texels};
+use crate::tuning::{BLEND_CUTOFF, REFLECTANCE_OF_NONE};
 use relume_core::scene::coverage::Wrap;
 use relume_core::scene::pyramid::Pyramid;
 use relume_core::scene::{Material, Note, SceneError};
-
-/// Dissolve from which on a surface blocks light; below, all light passes.
-const CUTOFF: f64 = 0.5;
 
 /// The text without lines that have a keyword and no value, as exporters write what they do not know.
 pub(super) fn with_values(text: &str) -> String {
@@ -36,7 +34,7 @@ pub(super) fn with_values(text: &str) -> String {
 pub(super) fn factor(material: &tobj::Material) -> [f64; 3] {
     match is_image_alone(material) {
         true => [1.0; 3],
-        false => finite(material.diffuse.unwrap_or([REFLECTANCE; 3])),
+        false => finite(material.diffuse.unwrap_or([REFLECTANCE_OF_NONE; 3])),
     }
 }
 
@@ -173,7 +171,8 @@ impl<'a> Textures<'a> {
         notes: &mut Vec<Note>,
     ) -> Result<Option<Paint>, SceneError> {
         let dissolve = material.dissolve.filter(|d| d.is_finite()).unwrap_or(1.0);
-        let least = (CUTOFF * 255.0 / dissolve.max(f64::MIN_POSITIVE)).ceil().clamp(0.0, 256.0);
+        let least =
+            (BLEND_CUTOFF * 255.0 / dissolve.max(f64::MIN_POSITIVE)).ceil().clamp(0.0, 256.0);
         let least = if material.dissolve_texture.is_some() { least as u16 } else { 0 };
         let (colour, mask) = (&material.diffuse_texture, &material.dissolve_texture);
         let mut sheet = |texture: Option<Texture>| match texture {

@@ -13,9 +13,10 @@ use glam::{DVec2, DVec3};
 use tobj::{LoadError, LoadOptions};
 
 use super::mtl::Textures;
-use super::paint::{REFLECTANCE_MAX, apart, linear};
+use super::paint::{apart, linear};
 use super::{CORNERS_MAX, Contents, Format, Object, Part, damaged, mtl, polygon, warning};
 use crate::folder::Folder;
+use crate::tuning::{REFLECTANCE_MAX, REFLECTANCE_OF_NONE};
 use relume_core::scene::{Material, Note, SceneError};
 
 /// Bytes of the largest MTL file that is read.
@@ -44,7 +45,7 @@ pub(super) fn read(bytes: &[u8], stem: &str, folder: &Folder) -> Result<Contents
         let paint = textures.paint(material, &translated, &mut contents.notes)?;
         if paint.as_ref().is_none_or(|paint| paint.base.is_none()) && mtl::is_image_alone(material)
         {
-            translated.reflectance = [super::REFLECTANCE; 3];
+            translated.reflectance = [REFLECTANCE_OF_NONE; 3];
         }
         contents.materials.push(translated);
         contents.paints.push(paint);
@@ -137,7 +138,7 @@ fn used_or_defined(
         let message = format!(
             "no file defines these materials, which are grey (reflectance {}): {}; put the .mtl file beside it, or change them with \
              --reflect and --emit",
-            super::REFLECTANCE,
+            REFLECTANCE_OF_NONE,
             undefined.join(", ")
         );
         notes.push(warning("material-undefined", stem, undefined.len(), message));
@@ -161,11 +162,11 @@ fn grey_if_all_black(contents: &mut Contents, defined: usize, stem: &str) {
     let count = materials.len();
     let message = format!(
         "all materials are black (Kd 0 0 0), and are taken as reflecting {}; give them their Kd",
-        super::REFLECTANCE
+        REFLECTANCE_OF_NONE
     );
     contents.notes.push(warning("black", stem, count, message));
     for material in materials {
-        material.reflectance = [super::REFLECTANCE; 3];
+        material.reflectance = [REFLECTANCE_OF_NONE; 3];
     }
 }
 

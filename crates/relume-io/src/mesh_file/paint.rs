@@ -9,6 +9,7 @@ use glam::{DVec2, DVec3};
 use crate::surface::facet::{Layer, Look};
 use crate::surface::pieces::{blocking, pieces};
 use crate::surface::{Mesh, Tints, resolution};
+use crate::tuning::REFLECTANCE_MAX;
 use relume_core::scene::coverage::Wrap;
 use relume_core::scene::draft::DraftSurface;
 use relume_core::scene::merge::merge;
@@ -16,9 +17,6 @@ use relume_core::scene::pyramid::Pyramid;
 use relume_core::scene::{MaterialId, Tint};
 
 use super::Part;
-
-/// The largest reflectance that is taken from a file; see the materials of glTF.
-pub(super) const REFLECTANCE_MAX: f64 = 0.98;
 
 /// Images of a material.
 #[derive(Clone, Default)]

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use super::parts::Field;
+use crate::tuning::{ALIKE, ALIKE_DEVIATIONS, COARSE_STEPS, MEAN_PARTS, SEEN};
 use relume_core::scene::coverage::{Cover, Wrap, for_each_third};
 use relume_core::scene::print::{Print, PrintedTriangle, Sheet};
 use relume_core::scene::pyramid::{Pyramid, Sums};
@@ -48,19 +49,6 @@ pub(crate) struct Facet {
     /// The mean of the squares of the brightness of the emission.
     pub(crate) emission_squared: f64,
 }
-
-/// Parts along the sides of a triangle on which image and vertex colours both vary.
-const THIRDS: usize = 8;
-
-/// Differences of colours that count as none, and relative ones of emissions.
-const ALIKE: f64 = 1.0 / 32.0;
-
-/// Differences are none, too, up to so many standard deviations of the image within the triangles: the halves of a
-/// square on an even ramp differ by 1.41.
-const WITHIN: f64 = 2.0;
-
-/// Differences that a picture shows.
-const SEEN: f64 = 1.0 / 128.0;
 
 impl Layer {
     fn cover(&self) -> Cover<'_> {
@@ -166,8 +154,8 @@ impl Look {
             |a: [f64; 3], b: [f64; 3], least: f64| (0..3).all(|c| (a[c] - b[c]).abs() <= least);
         let brightest = one.emission_max().max(other.emission_max());
         let within = one.emission_spread.max(other.emission_spread);
-        let emission = (ALIKE * brightest).max(WITHIN * within);
-        let spread = ALIKE.max(WITHIN * one.spread.max(other.spread));
+        let emission = (ALIKE * brightest).max(ALIKE_DEVIATIONS * within);
+        let spread = ALIKE.max(ALIKE_DEVIATIONS * one.spread.max(other.spread));
         let partly = |f: &Facet| (f.covered * (1.0 - f.covered)).max(0.0).sqrt();
         near(one.colour, other.colour, spread)
             && near(one.emission, other.emission, emission)
@@ -180,16 +168,16 @@ fn products(layer: &Layer, places: [DVec2; 3], vertex: [[f64; 4]; 3]) -> Sums {
     let cover = layer.cover();
     let at = |w: [f64; 3]| places[0] * w[0] + places[1] * w[1] + places[2] * w[2];
     let mut sums = [0.0; 5];
-    for_each_third(THIRDS, |middle| {
+    for_each_third(MEAN_PARTS, |middle| {
         // A part has the shape of the whole, or is that turned round: both have the same middle and area.
         let about = |k: usize| {
             let own = places[k] - at([1.0 / 3.0; 3]);
-            at(middle) + own / THIRDS as f64
+            at(middle) + own / MEAN_PARTS as f64
         };
         let part = times(cover.mean([about(0), about(1), about(2)]), mix(vertex, middle));
         (0..5).for_each(|c| sums[c] += part[c]);
     });
-    sums.map(|s| s / (THIRDS * THIRDS) as f64)
+    sums.map(|s| s / (MEAN_PARTS * MEAN_PARTS) as f64)
 }
 
 fn mix(vertex: [[f64; 4]; 3], weights: [f64; 3]) -> [f64; 3] {
@@ -263,12 +251,9 @@ pub(crate) struct Divided<'a> {
     pub(crate) by_alpha: bool,
 }
 
-/// See [`Cover::resolution`]: for the search of cuts.
-const COARSE: f64 = 64.0;
-
 impl Field for Divided<'_> {
     fn integral(&self, corners: &[DVec2]) -> (f64, f64) {
-        let cover = Cover { resolution: COARSE, ..self.layer.cover() };
+        let cover = Cover { resolution: COARSE_STEPS, ..self.layer.cover() };
         let (area, sums) = cover.integral(corners);
         let bright = (sums[0] + sums[1] + sums[2]) / 3.0;
         (area, if self.by_alpha { sums[3] } else { bright })

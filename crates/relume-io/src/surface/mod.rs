@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
+use crate::tuning::{MEAN_STEPS, MEAN_STEPS_SHARED};
 use relume_core::scene::{Tint, TintId};
 
 mod chart;
@@ -21,14 +22,9 @@ pub(crate) struct Mesh<'a> {
     pub(crate) triangles: &'a [[u32; 3]],
 }
 
-/// Steps across a triangle for its means ([`relume_core::scene::coverage::Cover::resolution`]), at most and at least, and how many all
-/// triangles of a mesh share.
-const STEPS: (f64, f64) = (32.0, 4096.0);
-const STEPS_SHARED: f64 = 4e6;
-
 /// The steps across each of so many triangles.
 pub(crate) fn resolution(triangles: usize) -> f64 {
-    (STEPS_SHARED / triangles.max(1) as f64).clamp(STEPS.0, STEPS.1)
+    (MEAN_STEPS_SHARED / triangles.max(1) as f64).clamp(MEAN_STEPS.0, MEAN_STEPS.1)
 }
 
 /// Tints of polygons, each once.

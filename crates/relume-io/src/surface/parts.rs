@@ -2,25 +2,12 @@
 //!
 //! A part is cut along a line of constant texture coordinate, at a border of texels, where that tells most: where the
 //! squares of the means of the parts, weighed with their areas, grow most. The best cut of all goes first, as long as
-//! it gains [`GAIN`] of the squares of all that the image shows. Must not know what the image is of.
+//! it gains [`CUT_GAIN`](crate::tuning::CUT_GAIN) of the squares of all that the image shows. Must not know what the image is of.
 
 use glam::DVec2;
 
+use crate::tuning::{CUT_PARTS_MAX, CUT_PLACES, CUT_ROUNDS, CUT_SHARE_MIN};
 use relume_core::geometry::part_in_front;
-
-/// Least share of the squares of all texels that a cut has to gain: no more than a hundred cuts can, over all
-/// polygons for which that sum is one.
-pub(crate) const GAIN: f64 = 0.01;
-
-/// Parts of a polygon at most.
-const PARTS_MAX: usize = 32;
-
-/// Parts cover at least this share of their polygon.
-const SHARE_MIN: f64 = 1.0 / 1024.0;
-
-/// Places that are looked at along an axis at once, and how often between the best two.
-const SLABS: usize = 8;
-const ROUNDS: usize = 5;
 
 /// A part: its texture coordinates, their area and what the image sums to over it, both in texels.
 pub(crate) struct Part {
@@ -47,10 +34,10 @@ struct Cut {
 /// The parts of a convex polygon of texture coordinates, of cuts that gain at least `least`; one where none does.
 pub(crate) fn parts(field: &dyn Field, corners: Vec<DVec2>, least: f64) -> Vec<Part> {
     let whole = Part::of(field, corners);
-    let smallest = whole.area * SHARE_MIN;
+    let smallest = whole.area * CUT_SHARE_MIN;
     let first = best_cut(field, &whole, smallest);
     let mut parts = vec![(whole, first)];
-    while parts.len() < PARTS_MAX {
+    while parts.len() < CUT_PARTS_MAX {
         let gain = |k: usize| parts[k].1.as_ref().map_or(0.0, |cut| cut.gain);
         let next = (0..parts.len()).fold(0, |best, k| if gain(k) > gain(best) { k } else { best });
         if gain(next) < least || gain(next) <= 0.0 {
@@ -97,8 +84,8 @@ impl Search<'_> {
         let (low, high) = along().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
         let (mut from, mut to) = ((low.floor(), (0.0, 0.0)), high.ceil());
         let mut best = None;
-        for _ in 0..ROUNDS {
-            let step = ((to - from.0) / SLABS as f64).ceil().max(1.0);
+        for _ in 0..CUT_ROUNDS {
+            let step = ((to - from.0) / CUT_PLACES as f64).ceil().max(1.0);
             let places = self.places(from, to, step, texels);
             let gain = |k: usize| self.gain(places[k].1);
             let k = (1..places.len()).reduce(|a, b| if gain(b) > gain(a) { b } else { a })?;

@@ -11,7 +11,8 @@ use rayon::prelude::*;
 use super::Mesh;
 use super::chart::Chart;
 use super::facet::{Divided, Facet, Layer, Look};
-use super::parts::{Field, GAIN, Part, parts};
+use super::parts::{Field, Part, parts};
+use crate::tuning::CUT_GAIN;
 use relume_core::scene::Print;
 use relume_core::scene::flatten::area_vector;
 use relume_core::scene::merge::merge_alike;
@@ -86,9 +87,9 @@ fn divide(look: &Look, by_alpha: bool, all: Vec<(Piece, Option<Chart>)>) -> Vec<
     let mut out = Vec::new();
     for (piece, chart) in all {
         let (square, told) = squares(&piece.facet);
-        let is_even = (square - told) * piece.area < GAIN * total;
+        let is_even = (square - told) * piece.area < CUT_GAIN * total;
         match chart.filter(|_| !is_even) {
-            Some(chart) => out.extend(cut(look, &field, piece, &chart, GAIN * total)),
+            Some(chart) => out.extend(cut(look, &field, piece, &chart, CUT_GAIN * total)),
             None => out.push(piece),
         }
     }

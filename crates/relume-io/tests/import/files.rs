@@ -14,10 +14,10 @@ fn corners(scene: &Scene) -> Vec<[f64; 3]> {
 fn is_the_cube(scene: &Scene) {
     assert_eq!(scene.patches.len(), 6);
     assert!((scene.area_m2() - 6.0).abs() < 1e-12);
-    let (min, max) = scene.bounds(0.0).unwrap();
-    assert_eq!((min.to_array(), max.to_array()), ([0.0; 3], [1.0; 3]));
+    let bounds = scene.bounds(0.0).unwrap();
+    assert_eq!((bounds.lo.to_array(), bounds.hi.to_array()), ([0.0; 3], [1.0; 3]));
     for p in &scene.patches {
-        assert!(p.frame.normal.dot(p.frame.origin - (min + max) / 2.0) > 0.0);
+        assert!(p.frame.normal.dot(p.frame.origin - bounds.centre()) > 0.0);
     }
 }
 

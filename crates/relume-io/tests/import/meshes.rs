@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::gltf::{cube_indices, cube_positions};
 use super::{read, with_code};
+use relume_core::geometry::Aabb;
 use relume_core::scene::{Scene, SceneError};
 use relume_io::{ImportOptions, import};
 
@@ -20,11 +21,10 @@ fn scene_of(name: &str, content: &[u8]) -> Result<Scene, SceneError> {
 /// The unit cube, its fronts outside.
 fn is_the_cube(scene: &Scene) {
     assert_eq!((scene.bodies.len(), scene.patches.len()), (1, 12), "double-sided");
-    let (min, max) = scene.bounds(0.0).unwrap();
-    assert_eq!((min, max), (DVec3::ZERO, DVec3::ONE));
-    let outward = |p: &relume_core::scene::Patch| {
-        p.frame.normal.dot(p.frame.origin - (min + max) / 2.0) > 0.0
-    };
+    let bounds = scene.bounds(0.0).unwrap();
+    assert_eq!(bounds, Aabb { lo: DVec3::ZERO, hi: DVec3::ONE });
+    let outward =
+        |p: &relume_core::scene::Patch| p.frame.normal.dot(p.frame.origin - bounds.centre()) > 0.0;
     assert_eq!(scene.patches.iter().filter(|p| outward(p)).count(), 6);
     assert_eq!(scene.materials[0].reflectance, [0.5; 3]);
     assert_eq!(with_code(&scene.notes, "units").len(), 1);

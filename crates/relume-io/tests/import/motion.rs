@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use relume_core::geometry::Aabb;
 use relume_core::scene::outside::{Outside, Sky};
 use relume_core::scene::{BodyId, Scene, Severity};
 use relume_core::session::{Options, Session, compare};
@@ -75,7 +76,7 @@ fn scales_are_constant_or_switch() {
     };
     let constant = with("LINEAR", &[0.0, 1.0], &[2., 3., 1., 2., 3., 1.]).unwrap();
     assert!(!constant.moves(BodyId(0)));
-    assert_eq!(constant.bounds(0.0).unwrap().1, DVec3::new(2.0, 3.0, 1.0));
+    assert_eq!(constant.bounds(0.0).unwrap().hi, DVec3::new(2.0, 3.0, 1.0));
     let blinks = with("STEP", &[0.0, 1.0, 2.0], &[1., 1., 1., 0., 0., 0., 1., 1., 1.]).unwrap();
     assert_eq!([0.5, 1.5, 2.5].map(|t| blinks.pose(BodyId(0), t).is_some()), [true, false, true]);
     // What grows otherwise is held at its first size, and moves on.
@@ -88,7 +89,8 @@ fn scales_are_constant_or_switch() {
     g.json["animations"][0]["channels"][1]["sampler"] = json!(1);
     g.json["animations"][0]["samplers"].as_array_mut().unwrap().push(sampler);
     let grows = scene_of(&g).unwrap();
-    assert_eq!(grows.bounds(1.0).unwrap(), (DVec3::X * 4.0, DVec3::new(6.0, 2.0, 2.0)));
+    let wanted = Aabb { lo: DVec3::X * 4.0, hi: DVec3::new(6.0, 2.0, 2.0) };
+    assert_eq!(grows.bounds(1.0).unwrap(), wanted);
     let held = with_code(&grows.notes, "held-size");
     assert!(
         held.len() == 1
@@ -98,7 +100,7 @@ fn scales_are_constant_or_switch() {
     // What grows out of nothing is there from halfway on.
     let born = with("LINEAR", &[0.0, 1.0], &[0., 0., 0., 2., 2., 2.]).unwrap();
     assert_eq!([0.4, 0.6].map(|t| born.pose(BodyId(0), t).is_some()), [false, true]);
-    assert_eq!(born.bounds(1.0).unwrap().1, DVec3::splat(2.0));
+    assert_eq!(born.bounds(1.0).unwrap().hi, DVec3::splat(2.0));
     let short = with("LINEAR", &[0.0, 1.0], &[1., 1., 1.]).unwrap_err().to_string();
     assert!(short.contains("`crate`") && short.contains("2 key times need 2 values"), "{short}");
 }
@@ -118,7 +120,7 @@ fn growth_matters_only_where_a_mesh_hangs_below() {
     let grows = scene_of(&g).unwrap();
     let held = with_code(&grows.notes, "held-size");
     assert_eq!((held.len(), held[0].subject.as_str()), (1, "bone"));
-    assert_eq!(grows.bounds(1.0).unwrap().1, DVec3::new(8.0, 1.0, 1.0));
+    assert_eq!(grows.bounds(1.0).unwrap().hi, DVec3::new(8.0, 1.0, 1.0));
 }
 
 #[test]
@@ -272,7 +274,7 @@ fn pointers_to_a_nodes_placement_move_it_as_plain_channels_do() {
     pointer(&mut g, "/nodes/0/rotation", "VEC4", "LINEAR", &[0., 0., 0., 1., 0., 0., 1., 0.]);
     pointer(&mut g, "/nodes/0/scale", "VEC3", "STEP", &[3., 3., 3., 0., 0., 0.]);
     let scene = scene_of(&g).unwrap();
-    assert_eq!(scene.bounds(0.0).unwrap().1, DVec3::splat(3.0));
+    assert_eq!(scene.bounds(0.0).unwrap().hi, DVec3::splat(3.0));
     let pose = scene.pose(BodyId(0), 0.5).unwrap();
     assert_eq!(pose.translation, DVec3::X);
     assert!((pose.rotation * DVec3::X).distance(DVec3::Y) < 1e-12);
@@ -292,7 +294,7 @@ fn morphing() -> Gltf {
 
 #[test]
 fn morph_weights_that_do_not_change_shape_the_mesh() {
-    let height = |g: &Gltf| scene_of(g).unwrap().bounds(0.0).unwrap().0.y;
+    let height = |g: &Gltf| scene_of(g).unwrap().bounds(0.0).unwrap().lo.y;
     let mut g = morphing();
     assert_eq!(height(&g), 0.0);
     g.json["meshes"][0]["weights"] = json!([1.0, 0.5]);
@@ -302,7 +304,7 @@ fn morph_weights_that_do_not_change_shape_the_mesh() {
     // Another node with the same mesh keeps the mesh's own.
     g.node(json!({"name": "other", "mesh": 0}));
     let scene = scene_of(&g).unwrap();
-    assert_eq!(scene.bounds(0.0).unwrap().0.y, 6.0);
+    assert_eq!(scene.bounds(0.0).unwrap().lo.y, 6.0);
     let mut keyed = morphing();
     keyed.json["nodes"][0]["weights"] = json!([0.0, 2.0]);
     pointer(&mut keyed, "/nodes/0/weights", "SCALAR", "LINEAR", &[0.0, 1.0, 0.0, 1.0]);
@@ -514,7 +516,7 @@ fn instances_are_objects_of_their_own() {
     g.json["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
     let scene = scene_of(&g).unwrap();
     assert_eq!((scene.bodies.len(), scene.patches.len()), (3, 18));
-    let (low, high) = scene.bounds(0.0).unwrap();
+    let Aabb { lo: low, hi: high } = scene.bounds(0.0).unwrap();
     assert!(low.distance(DVec3::new(0.0, 0.0, 1.0)) < 1e-6, "{low}");
     assert!(high.distance(DVec3::new(5.0, 9.0, 3.0)) < 1e-6, "{high}");
     // What moves carries its instances.
@@ -559,8 +561,9 @@ fn a_skin_of_rigid_joints_moves_with_them() {
     assert_eq!((scene.bodies.len(), scene.patches.len()), (1, 6));
     assert_eq!(scene.surfaces[0].name, "robot");
     for t in [0.0, 0.5] {
-        let (low, high) = scene.bounds(t).unwrap();
-        assert_eq!((low, high), (DVec3::new(2.0 * t, 0., 5.), DVec3::new(2.0 * t + 1.0, 1., 6.)));
+        let wanted =
+            Aabb { lo: DVec3::new(2.0 * t, 0., 5.), hi: DVec3::new(2.0 * t + 1.0, 1., 6.) };
+        assert_eq!(scene.bounds(t).unwrap(), wanted);
     }
     assert_eq!(with_code(&scene.notes, "skin").len(), 0);
     let scene = scene_of(&skinned(false)).unwrap();
@@ -568,7 +571,7 @@ fn a_skin_of_rigid_joints_moves_with_them() {
     let names: Vec<&str> = scene.surfaces.iter().map(|s| s.name.as_str()).collect();
     assert_eq!(names, ["robot/one", "robot/two"]);
     let ends = |t| scene.bounds(t).unwrap();
-    assert_eq!(ends(1.0), (DVec3::ZERO, DVec3::new(3.0, 1.0, 6.0)));
+    assert_eq!(ends(1.0), Aabb { lo: DVec3::ZERO, hi: DVec3::new(3.0, 1.0, 6.0) });
 }
 
 /// A skin one of whose vertices hangs on two joints, below an armature that moves.
@@ -652,7 +655,7 @@ fn morph_targets_that_move_are_rebuilt_at_each_frame_if_asked_for() {
     for k in 0..5 {
         let time_s = f64::from(k) / 4.0;
         assert_eq!(present(&scene, time_s), 1);
-        assert!((scene.bounds(time_s).unwrap().0.y - 10.0 * (1.0 + time_s)).abs() < 1e-6);
+        assert!((scene.bounds(time_s).unwrap().lo.y - 10.0 * (1.0 + time_s)).abs() < 1e-6);
     }
     // Frames that follow each other equal cold builds, bit for bit, there and back again.
     let sky = Some(Sky::Uniform([1.0; 3]));
@@ -693,7 +696,7 @@ fn a_skin_without_its_joints_is_named_and_read_as_it_was_before() {
     let notes = with_code(&scene.notes, "skin");
     assert_eq!(notes[0].subject, "robot");
     assert!(notes[0].message.contains("not in the scene"), "{}", notes[0].message);
-    assert_eq!(scene.bounds(0.0).unwrap().0, DVec3::splat(70.0));
+    assert_eq!(scene.bounds(0.0).unwrap().lo, DVec3::splat(70.0));
 }
 
 #[test]

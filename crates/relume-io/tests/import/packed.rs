@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::gltf::Gltf;
 use super::{data, read, scene_of};
+use relume_core::geometry::Aabb;
 use relume_core::scene::{BodyId, Scene, SceneError};
 use relume_io::{ImportOptions, import};
 
@@ -29,8 +30,7 @@ fn middle_and_rim(scene: &Scene, time_s: f64) -> [DVec3; 2] {
     let corners = scene.patches.iter().flat_map(|p| p.corners_in_body());
     let x = |c: &DVec3| pose(0.0).point(*c).x;
     let rim = corners.max_by(|a, b| x(a).total_cmp(&x(b))).unwrap();
-    let (min, max) = scene.bounds(time_s).unwrap();
-    let middle = (min + max) / 2.0;
+    let middle = scene.bounds(time_s).unwrap().centre();
     [middle, pose(time_s).point(rim) - middle]
 }
 
@@ -41,7 +41,7 @@ fn the_ring_is_where_it_was_and_turns_as_it_did() {
         let area = if file == "ring-draco-valence.glb" { 39.1 } else { 35.9 };
         assert!((scene.area_m2() - area).abs() < 0.1, "{file}: {} m2", scene.area_m2());
         assert_eq!(scene.motion.duration_s, 1.0, "{file}");
-        let (min, max) = scene.bounds(0.0).unwrap();
+        let Aabb { lo: min, hi: max } = scene.bounds(0.0).unwrap();
         assert!((min.x + 2.5).abs() < 1e-3 && (max.x - 2.5).abs() < 1e-3, "{file}: {min} to {max}");
         let h = std::f64::consts::FRAC_1_SQRT_2;
         for (time_s, turned) in [(0.0, DVec3::X), (0.5, DVec3::new(h, 0.0, -h)), (1.0, -DVec3::Z)] {

@@ -42,7 +42,7 @@ impl Smooth {
         let scene = &snapshot.scene;
         let mut smooth = Smooth { corners: vec![Vec::new(); scene.patches.len()] };
         let large_m2 = LARGE * scene.area_m2();
-        let step = scene.bounds(snapshot.time_s).map_or(1.0, |(low, high)| low.distance(high));
+        let step = scene.bounds(snapshot.time_s).map_or(1.0, |bounds| bounds.diagonal());
         let step = (step * SAME).max(f64::MIN_POSITIVE);
         let near = |body: &BodyId| !scene.is_distant(*body);
         for body in (0..scene.bodies.len() as u32).map(BodyId).filter(near) {

@@ -18,8 +18,7 @@ pub(super) fn groups_of(scene: &Scene, forest: &Forest, layout: &Layout) -> Grou
     let spans = vec![0..0; len];
     let mut out = Groups { numbers, spans, ..Groups::default() };
     let area_max = AREA_SHARE * scene.made_area_m2();
-    let across_max =
-        scene.made_bounds().map_or(0.0, |(low, high)| ACROSS_SHARE * low.distance(high));
+    let across_max = scene.made_bounds().map_or(0.0, |bounds| ACROSS_SHARE * bounds.diagonal());
     let mut stack = vec![Forest::ROOT];
     while let Some(id) = stack.pop() {
         let rigid = forest.cluster_body(id).is_some() || forest.is_of_stage(id);

@@ -331,7 +331,7 @@ impl Forest {
         let along_lines = cuts.apply(corners, cut);
         let cut = cut + u32::from(along_lines.is_some());
         let parts = along_lines.or_else(|| (corners.len() > 4).then(|| split_convex(corners)));
-        let Some((one, two)) = parts else {
+        let Some([one, two]) = parts else {
             return self.plant_facet(cuts, corners, at);
         };
         self.set(at, Kind::Polygon, cuts.patch);
@@ -426,7 +426,7 @@ impl Cuts {
 
 impl PatchCuts<'_> {
     /// Both parts of a polygon that is to be cut, after so many cuts before.
-    fn apply(&self, corners: &[DVec2], cut: u32) -> Option<(Vec<DVec2>, Vec<DVec2>)> {
+    fn apply(&self, corners: &[DVec2], cut: u32) -> Option<[Vec<DVec2>; 2]> {
         let area = polygon_area(corners);
         if area >= self.least_m2 {
             return cut_along(corners, self.lines, CUT_SHARE, self.slack_m);
@@ -434,9 +434,9 @@ impl PatchCuts<'_> {
         if cut >= SMALL_CUT_TIMES {
             return None;
         }
-        let is_part = |part: &[DVec2]| polygon_area(part) >= SMALL_CUT_PART * area;
+        let is_part = |part: &Vec<DVec2>| polygon_area(part) >= SMALL_CUT_PART * area;
         cut_along(corners, self.lines, SMALL_CUT_SHARE, self.slack_m)
-            .filter(|(one, two)| is_part(one) && is_part(two))
+            .filter(|parts| parts.iter().all(is_part))
     }
 }
 

@@ -158,7 +158,7 @@ fn shapes(corners: &[DVec2]) -> Vec<Shape> {
         match corners.len() {
             0..3 => {}
             3 | 4 => out.push(Shape::new(&corners)),
-            _ => stack.extend(<[_; 2]>::from(split_convex(&corners))),
+            _ => stack.extend(split_convex(&corners)),
         }
     }
     out

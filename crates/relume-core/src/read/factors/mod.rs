@@ -14,6 +14,7 @@ mod sum;
 pub use grouping::Grouping;
 pub use parts::PartFactors;
 
+use crate::read::tuning::CLOSED_WITHIN;
 use fragments::{Fragments, Spread};
 use sum::{Buffers, Fixed, Sign, mirrored, plus};
 
@@ -37,9 +38,6 @@ pub struct Open {
     /// Its sum.
     pub row_sum: f64,
 }
-
-/// Row sums up to this far from 1 are taken for errors of the links.
-const CLOSED_WITHIN: f64 = 0.1;
 
 /// Largest distance of a row sum from 1 that [`Closure::Reciprocal`] leaves.
 const BALANCED_WITHIN: f64 = 1e-13;

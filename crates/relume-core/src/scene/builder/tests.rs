@@ -4,7 +4,7 @@ use glam::{DMat4, DQuat, DVec3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::geometry::Pose;
+use crate::geometry::{Aabb, Pose};
 use crate::scene::{BodyId, Interpolation, PatchId};
 
 fn slide(to: DVec3) -> Track {
@@ -98,7 +98,7 @@ fn scales_are_baked_and_mirrors_keep_the_front() {
     b.cuboid(below, "box", m, DVec3::ZERO, DVec3::ONE);
     let scene = b.build().unwrap();
     // The box spans x 1..2 and z 0..1 below (after the turn), y 1..2; scaled: x 0..-1, y 2..4, z 0..3.
-    let (min, max) = scene.bounds(0.0).unwrap();
+    let Aabb { lo: min, hi: max } = scene.bounds(0.0).unwrap();
     assert!(min.distance(DVec3::new(-1.0, 2.0, 0.0)) < 1e-14, "{min}");
     assert!(max.distance(DVec3::new(0.0, 4.0, 3.0)) < 1e-14, "{max}");
     for i in 0..6 {
@@ -140,7 +140,7 @@ fn a_track_that_never_changes_is_no_motion() {
     b.animate_presence(n, vec![(0.0, true)]);
     let scene = b.build().unwrap();
     assert!(!scene.moves(BodyId(0)));
-    assert_eq!(scene.bounds(0.0), Some((DVec3::Y, DVec3::new(1.0, 2.0, 1.0))));
+    assert_eq!(scene.bounds(0.0), Some(Aabb { lo: DVec3::Y, hi: DVec3::new(1.0, 2.0, 1.0) }));
 }
 
 #[test]

@@ -11,28 +11,16 @@ use glam::{DVec2, DVec3};
 use super::world::{World, spread};
 use super::{listed, note};
 use crate::geometry::{Aabb, Pose};
+use crate::scene::tuning::{
+    LAMP_POLYGONS, LAMP_RAYS, LIGHT_INSTANTS, LIGHT_RAYS, LIGHT_TRIALS, RIGHT_BEFORE, SHADE,
+    SUN_RAYS,
+};
 use crate::scene::{LightKind, NodeId, Note, PatchId, Scene, Severity, SurfaceId};
-
-/// Rays from a point, a spot or a directional light.
-const RAYS: u32 = 256;
-/// Rays of a directional light: enough to find a window of a twentieth of the scene's width.
-const RAYS_OF_SUN: u32 = 1024;
-/// Polygons of an object that emits, and rays from each.
-const POLYGONS: usize = 16;
-const RAYS_OF_POLYGON: u32 = 24;
-/// Polygons that rays are tried against in all; with that spent, the rest of the lights is not tried.
-const TRIALS: usize = 400_000_000;
-/// Instants of the animation at which a light that lights nothing at its start is tried again.
-const INSTANTS: u32 = 8;
-/// A polygon lies right before a lamp if it is nearer than this share of the lamp's width, and parallel.
-const RIGHT_BEFORE: f64 = 0.05;
-/// What is closed around a light is its shade, and not a room, below this share of the scene's diagonal.
-const SHADE: f64 = 0.25;
 
 /// Adds the lights that light nothing at any time of the animation.
 pub(super) fn blind(scene: &Scene, notes: &mut Vec<Note>) {
     let sources = sources(scene);
-    let mut left = TRIALS;
+    let mut left = LIGHT_TRIALS;
     let start = World::of(scene, 0.0);
     let mut blind: Vec<(&Source, Stopped)> = Vec::new();
     for source in &sources {
@@ -44,7 +32,7 @@ pub(super) fn blind(scene: &Scene, notes: &mut Vec<Note>) {
     let instants = if scene.bodies.iter().any(|b| scene.motion.moves(b.node))
         || scene.lights.iter().any(|l| scene.motion.moves(l.node))
     {
-        INSTANTS
+        LIGHT_INSTANTS
     } else {
         0
     };
@@ -181,9 +169,9 @@ impl World<'_> {
                 self.rays_of_light(*kind, pose).find_map(|ray| try_ray(&ray))
             }
             SourceKind::Lamp(patches, _) => {
-                let step = patches.len().div_ceil(POLYGONS).max(1);
+                let step = patches.len().div_ceil(LAMP_POLYGONS).max(1);
                 let some: Vec<PatchId> = patches.iter().copied().step_by(step).collect();
-                (0..RAYS_OF_POLYGON)
+                (0..LAMP_RAYS)
                     .flat_map(|k| some.iter().map(move |&p| (k, p)))
                     .filter_map(|(k, patch)| self.ray_of_patch(patch, k))
                     .find_map(|ray| try_ray(&ray))
@@ -207,7 +195,7 @@ impl World<'_> {
         match kind {
             LightKind::Directional => {
                 let (centre, radius) = (self.bounds.centre(), self.bounds.diagonal() * 0.5);
-                Box::new((0..RAYS_OF_SUN).map(move |k| {
+                Box::new((0..SUN_RAYS).map(move |k| {
                     let [share, turn] = spread(k);
                     let (s, c) = libm::sincos(turn);
                     let off = (across[0] * c + across[1] * s) * (share.sqrt() * radius);
@@ -219,7 +207,7 @@ impl World<'_> {
                     LightKind::Spot { outer, .. } => libm::cos(outer),
                     _ => -1.0,
                 };
-                Box::new((0..RAYS).map(move |k| {
+                Box::new((0..LIGHT_RAYS).map(move |k| {
                     let [share, turn] = spread(k);
                     from(pose.translation, along(1.0 - share * (1.0 - lowest), turn))
                 }))

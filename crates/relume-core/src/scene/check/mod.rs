@@ -7,20 +7,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Material, MaterialId, Note, Patch, Scene, Severity};
+use crate::scene::tuning::{DIAGONAL_M, EXITANCE_HIGH, REFLECTANCE_HIGH, SUN_HIGH};
 
 mod blind;
 mod outward;
 mod shape;
 mod world;
-
-/// Reflectances from here on are reported: real paints stay below.
-const REFLECTANCE_HIGH: f64 = 0.95;
-/// Diagonals outside this range, in metres, are likely a mistaken unit.
-const DIAGONAL_M: (f64, f64) = (1e-2, 1e3);
-/// Exitance from here on is likely a mistaken unit, W/m2: a glowing filament has about this.
-const EXITANCE_HIGH: f64 = 1e6;
-/// The same for directional lights, W/m2: ten suns.
-const SUN_HIGH: f64 = 1.4e4;
 
 /// Finds what is likely wrong, the most serious first.
 ///
@@ -108,8 +100,8 @@ fn reflectance(scene: &Scene, notes: &mut Vec<Note>) {
 }
 
 fn units(scene: &Scene, notes: &mut Vec<Note>) {
-    if let Some((min, max)) = scene.bounds(0.0) {
-        let diagonal = min.distance(max);
+    if let Some(bounds) = scene.bounds(0.0) {
+        let diagonal = bounds.diagonal();
         if !(DIAGONAL_M.0..=DIAGONAL_M.1).contains(&diagonal) {
             let message = format!(
                 "the scene is {diagonal:.3e} m across; glTF is in metres, so check the unit scale of the export"

@@ -13,32 +13,11 @@ use glam::{DVec2, DVec3};
 use super::world::{Face, World, spread, within};
 use super::{listed, note};
 use crate::geometry::Aabb;
+use crate::scene::tuning::{
+    BACKS_MAX, BEFORE_MAX, JOINED_SHARE, JOINS, ON_BOTH_SIDES, ONE_SIDE, OPEN_MAX_DEG,
+    SAME_WAY_MAX, SEEN_MIN, SIDE_POINTS, WALL_MIN, WALL_RAYS, WALL_TRIALS,
+};
 use crate::scene::{LightKind, Note, Patch, Scene, Severity};
-
-/// Smallest wall, as a share of the scene's diagonal.
-const SMALLEST: f64 = 0.02;
-/// What is nearer than this share of a wall's size (the root of its area) joins it.
-const JOINS: f64 = 0.02;
-/// What lies on both sides of a wall by more than this share of the longer part lies on neither.
-const ON_BOTH_SIDES: f64 = 0.2;
-/// Points of each side of a wall.
-const POINTS: u32 = 8;
-/// Share of a side that has to join something.
-const JOINED: f64 = 0.6;
-/// Share of a wall's sides along which neighbours may look the same way round as the wall: furniture that stands there.
-const SAME_WAY_MAX: f64 = 0.1;
-/// Cosine of the angle within which sides of a wall are one, and widest angle without a side that is joined, degrees: an open
-/// top.
-const ONE_SIDE: f64 = 0.96;
-const OPEN_MAX_DEG: f64 = 200.0;
-/// Rays from each side of a wall.
-const RAYS: u32 = 192;
-/// Share of the rays from the back that meet fronts at least; backs met, and what the front's rays meet, beside these at most.
-const SEEN_MIN: f64 = 0.08;
-const BACKS_MAX: f64 = 0.6;
-const BEFORE_MAX: f64 = 0.25;
-/// Polygons that rays and sides are tried against in all.
-const TRIALS: usize = 100_000_000;
 
 /// Adds walls that face outwards, but for objects of which that is said.
 pub(super) fn outward(scene: &Scene, notes: &mut Vec<Note>) {
@@ -47,7 +26,7 @@ pub(super) fn outward(scene: &Scene, notes: &mut Vec<Note>) {
     let world = World::of(scene, 0.0);
     let boxes: Vec<Aabb> = world.faces.iter().map(|face| Aabb::of(corners(&world, face))).collect();
     let flat = flat(&world);
-    let mut left = TRIALS;
+    let mut left = WALL_TRIALS;
     for wall in walls(&world).into_iter().filter(|wall| !said.contains(wall.name)) {
         let Some(neighbours) = wall.faces_outwards(&world, (&boxes, &flat), &mut left) else {
             continue;
@@ -96,7 +75,7 @@ fn walls<'a>(world: &'a World<'a>) -> Vec<Wall<'a>> {
     for face in &world.faces {
         objects.entry(object(world, face)).or_default().push(face);
     }
-    let smallest = SMALLEST * world.bounds.diagonal();
+    let smallest = WALL_MIN * world.bounds.diagonal();
     let wall = |(name, faces): (&'a str, Vec<&'a Face>)| {
         let (first, corner) = (faces[0], corners(world, faces[0])[0]);
         let area_m2: f64 = faces.iter().map(|f| patch(world, f).area_m2()).sum();
@@ -126,6 +105,67 @@ fn flat<'a>(world: &'a World<'a>) -> BTreeSet<&'a str> {
     normals.into_iter().filter(|(_, (_, is_flat))| *is_flat).map(|(name, _)| name).collect()
 }
 
+/// What a point of a side of a wall meets.
+struct Met<'a> {
+    joint: Joint,
+    /// Name of the object met.
+    object: &'a str,
+    /// Whether the face goes on in front of the wall.
+    goes_on: bool,
+}
+
+/// What the sides of a wall join.
+#[derive(Default)]
+struct Joints<'a> {
+    found: Joined<'a>,
+    /// Directions of the sides, with their lengths: all, joined, and joined by what lies behind, metres.
+    sides: Vec<(DVec3, [f64; 3])>,
+    /// Lengths along single-sided and double-sided neighbours, and along neighbours that look the same way round, metres.
+    single_m: f64,
+    double_m: f64,
+    same_m: f64,
+    /// Length of all sides, metres.
+    all_m: f64,
+}
+
+impl<'a> Joints<'a> {
+    /// Place of the side in a direction, a new one if there is none.
+    fn place_of(&mut self, out: DVec3) -> usize {
+        let place = self.sides.iter().position(|(other, _)| other.dot(out) > ONE_SIDE);
+        place.unwrap_or_else(|| {
+            self.sides.push((out, [0.0; 3]));
+            self.sides.len() - 1
+        })
+    }
+
+    /// Adds a piece of a side with what it meets.
+    fn add(&mut self, place: usize, length_m: f64, met: Option<Met<'a>>) {
+        let of_side = &mut self.sides[place].1;
+        of_side[0] += length_m;
+        self.all_m += length_m;
+        let Some(Met { joint, object, goes_on }) = met else { return };
+        if goes_on {
+            self.found.goes_on.insert(object);
+        }
+        match joint {
+            Joint::OnBothSides => {
+                self.found.on_both_sides.insert(object);
+            }
+            Joint::SameWay => {
+                self.same_m += length_m;
+                return;
+            }
+            Joint::Double => self.double_m += length_m,
+            Joint::Against => self.single_m += length_m,
+        }
+        of_side[1] += length_m;
+        if joint != Joint::OnBothSides {
+            of_side[2] += length_m;
+            self.found.names.insert(object);
+        }
+    }
+}
+
 impl<'a> Wall<'a> {
     /// What it faces away from, if it faces out of what is behind it.
     fn faces_outwards(
@@ -136,7 +176,7 @@ impl<'a> Wall<'a> {
     ) -> Option<BTreeSet<&'a str>> {
         *left = left.checked_sub(world.faces.len())?;
         let joined = self.joined(world, boxes)?;
-        *left = left.checked_sub(2 * RAYS as usize * world.faces.len())?;
+        *left = left.checked_sub(2 * WALL_RAYS as usize * world.faces.len())?;
         let lit = self.lit(world);
         let is_lit_behind = match joined.single_sided {
             // Where nothing shines there is a sky.
@@ -179,60 +219,35 @@ impl<'a> Wall<'a> {
             .filter(|(face, b)| b.meets(&around) && !self.is_of(face))
             .map(|(face, _)| (face, corners(world, face)))
             .collect();
-        let mut found = Joined::default();
-        // Lengths of each side: all, joined, and joined by what lies behind.
-        let mut lengths: Vec<(DVec3, [f64; 3])> = Vec::new();
-        let (mut single_m, mut double_m, mut same_m, mut all_m) = (0.0, 0.0, 0.0, 0.0);
+        let mut joints = Joints::default();
         for side in self.sides(world) {
             let along = side.ends[1] - side.ends[0];
-            let place = lengths.iter().position(|(out, _)| out.dot(side.out) > ONE_SIDE);
-            let place = place.unwrap_or_else(|| {
-                lengths.push((side.out, [0.0; 3]));
-                lengths.len() - 1
-            });
-            let length_m = along.length() / f64::from(POINTS);
-            for k in 0..POINTS {
-                let at = side.ends[0] + along * ((f64::from(k) + 0.5) / f64::from(POINTS));
-                let joints = near
+            let place = joints.place_of(side.out);
+            let length_m = along.length() / f64::from(SIDE_POINTS);
+            for k in 0..SIDE_POINTS {
+                let at = side.ends[0] + along * ((f64::from(k) + 0.5) / f64::from(SIDE_POINTS));
+                let of_point = near
                     .iter()
                     .filter(|(face, c)| distance(world, face, c, at) <= self.reach_m)
                     .filter_map(|(face, c)| Some((self.joint(face, c, at, side.out)?, *face)));
-                let strongest = joints.max_by_key(|(joint, _)| *joint);
-                let of_side = &mut lengths[place].1;
-                of_side[0] += length_m;
-                all_m += length_m;
-                let Some((joint, face)) = strongest else { continue };
-                let reaches = |c: &DVec3| (*c - at).dot(self.normal) > self.reach_m;
-                if corners(world, face).iter().any(reaches) {
-                    found.goes_on.insert(object(world, face));
-                }
-                match joint {
-                    Joint::OnBothSides => {
-                        found.on_both_sides.insert(object(world, face));
-                    }
-                    Joint::SameWay => {
-                        same_m += length_m;
-                        continue;
-                    }
-                    Joint::Double => double_m += length_m,
-                    Joint::Against => single_m += length_m,
-                }
-                of_side[1] += length_m;
-                if joint != Joint::OnBothSides {
-                    of_side[2] += length_m;
-                    found.names.insert(object(world, face));
-                }
+                let strongest = of_point.max_by_key(|(joint, _)| *joint).map(|(joint, face)| {
+                    let reaches = |c: &DVec3| (*c - at).dot(self.normal) > self.reach_m;
+                    let goes_on = corners(world, face).iter().any(reaches);
+                    Met { joint, object: object(world, face), goes_on }
+                });
+                joints.add(place, length_m, strongest);
             }
         }
-        let is_mostly = |of: &[f64; 3], k: usize| of[k] >= JOINED * of[0];
+        let is_mostly = |of: &[f64; 3], k: usize| of[k] >= JOINED_SHARE * of[0];
+        let sides = &joints.sides;
         let joined: Vec<DVec3> =
-            lengths.iter().filter(|(_, of)| is_mostly(of, 1)).map(|(out, _)| *out).collect();
-        let behind = lengths.iter().filter(|(_, of)| is_mostly(of, 2)).count();
-        found.single_sided = single_m > double_m;
+            sides.iter().filter(|(_, of)| is_mostly(of, 1)).map(|(out, _)| *out).collect();
+        let behind = sides.iter().filter(|(_, of)| is_mostly(of, 2)).count();
         let is_room = joined.len() >= 3
             && behind >= 2
-            && same_m <= SAME_WAY_MAX * all_m
+            && joints.same_m <= SAME_WAY_MAX * joints.all_m
             && self.widest_gap_deg(&joined) <= OPEN_MAX_DEG;
+        let found = Joined { single_sided: joints.single_m > joints.double_m, ..joints.found };
         is_room.then_some(found)
     }
 
@@ -303,7 +318,7 @@ impl<'a> Wall<'a> {
     /// its front next to nothing: what goes on on both sides aside, where single-sided neighbours tell which of them is inside.
     fn looks_out(&self, world: &World, flat: &BTreeSet<&str>, joined: &Joined) -> bool {
         let [mut fronts, mut backs, mut before] = [0_u32; 3];
-        for k in 0..RAYS {
+        for k in 0..WALL_RAYS {
             let face = self.faces[k as usize % self.faces.len()];
             let own = [Some(face.patch), None];
             let (from, up) = self.ray(world, face, k);
@@ -322,7 +337,7 @@ impl<'a> Wall<'a> {
             before += u32::from(met(up).is_some_and(|(name, _)| counts(name)));
         }
         let [fronts, backs, before] = [fronts, backs, before].map(f64::from);
-        fronts >= SEEN_MIN * f64::from(RAYS)
+        fronts >= SEEN_MIN * f64::from(WALL_RAYS)
             && backs <= BACKS_MAX * fronts
             && before <= BEFORE_MAX * fronts
     }

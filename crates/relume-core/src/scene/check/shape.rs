@@ -289,8 +289,8 @@ const ONE_PLANE: f64 = 1e-6;
 
 /// Polygons that face the same way in one plane and overlap, but for those with the same corners.
 fn overlaps(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
-    let Some((min, max)) = scene.bounds(0.0) else { return };
-    let tolerance = ONE_PLANE * min.distance(max);
+    let Some(bounds) = scene.bounds(0.0) else { return };
+    let tolerance = ONE_PLANE * bounds.diagonal();
     let mut planes: BTreeMap<[i64; 4], Vec<usize>> = BTreeMap::new();
     let mut normals = Vec::new();
     for (number, polygon) in topology.polygons.iter().enumerate() {
@@ -298,7 +298,8 @@ fn overlaps(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
         let normal = scene.pose(p.body, 0.0).map_or(DVec3::ZERO, |b| b.direction(p.frame.normal));
         normals.push(normal);
         let Some(&corner) = polygon.corners.first() else { continue };
-        let offset = (topology.points[corner as usize] - min).dot(normal) / (10.0 * tolerance);
+        let offset =
+            (topology.points[corner as usize] - bounds.lo).dot(normal) / (10.0 * tolerance);
         let [x, y, z] = (normal * 1e4).to_array().map(|c| c.round() as i64);
         planes.entry([x, y, z, offset.round() as i64]).or_default().push(number);
     }

@@ -8,20 +8,15 @@ use glam::{DQuat, DVec3};
 use super::dome::{self, Cell};
 use super::sun::from_zenith;
 use super::{Outside, OutsideNow, SunKey};
+use crate::geometry::Aabb;
 use crate::scene::flatten::flatten;
 use crate::scene::limits::COORDINATE_MAX_M;
 use crate::scene::names::Names;
+use crate::scene::tuning::{EXTENT_INSTANTS, OUTSIDE_FAR};
 use crate::scene::{
     Body, BodyId, Glow, Interpolation, Material, MaterialId, Node, NodeId, Patch, RotationTrack,
     Scene, SceneError, Surface, SurfaceId, Track,
 };
-
-/// Distance of what is outside, in extents of the scene: directions differ by half a thousandth from one end of it to
-/// the other.
-const FAR: f64 = 2048.0;
-
-/// Instants of the animation at which the scene's extent is looked at.
-const INSTANTS: u32 = 32;
 
 impl Scene {
     /// The same scene lit from outside. A day lengthens the animation where it takes longer.
@@ -30,12 +25,15 @@ impl Scene {
     /// What [`Outside::check`] finds, and a scene too large to be outside of.
     pub fn with_outside(mut self, outside: Outside) -> Result<Scene, SceneError> {
         outside.check()?;
-        let (low, high) = self.extent();
-        let (centre, far_m) = (0.5 * (low + high), FAR * (high - low).length());
+        let Aabb { lo: low, hi: high } = self.extent();
+        let (centre, far_m) = (0.5 * (low + high), OUTSIDE_FAR * (high - low).length());
         if (far_m + centre.length()) * 2.0 > COORDINATE_MAX_M {
             return Err(SceneError::Geometry {
                 subject: format!("scene `{}`", self.name),
-                what: format!("with an extent of {:e} m there is no place outside it", far_m / FAR),
+                what: format!(
+                    "with an extent of {:e} m there is no place outside it",
+                    far_m / OUTSIDE_FAR
+                ),
                 remedy: "scale it to metres".into(),
             });
         }
@@ -51,16 +49,16 @@ impl Scene {
         Ok(self)
     }
 
-    /// Smallest and largest coordinates over the animation.
-    fn extent(&self) -> (DVec3, DVec3) {
+    /// Bounds over the animation.
+    fn extent(&self) -> Aabb {
         let [from, to] = self.motion.span_s();
-        let time = |k: u32| from + (to - from) * f64::from(k) / f64::from(INSTANTS);
+        let time = |k: u32| from + (to - from) * f64::from(k) / f64::from(EXTENT_INSTANTS);
         // Where nothing moves one instant is as good as many.
-        let instants = if to > from { INSTANTS } else { 0 };
+        let instants = if to > from { EXTENT_INSTANTS } else { 0 };
         let bounds = (0..=instants).filter_map(|k| self.bounds(time(k)));
-        let all = bounds.reduce(|one, two| (one.0.min(two.0), one.1.max(two.1)));
+        let all = bounds.reduce(Aabb::union);
         // Nothing is there at any of these instants: any place will do.
-        all.unwrap_or((DVec3::ZERO, DVec3::ONE))
+        all.unwrap_or(Aabb { lo: DVec3::ZERO, hi: DVec3::ONE })
     }
 }
 

@@ -10,6 +10,9 @@ use rayon::prelude::*;
 
 use super::super::tuning::{SKY_SHARE, SKY_SHARE_ALL_ROUND};
 use super::sky::SkyNow;
+use crate::scene::tuning::{
+    SKY_DEPTH_MAX, SKY_DEPTH_MIN, SKY_FACETS_MAX, SKY_SAMPLES, SKY_SAMPLES_OF_PICTURES,
+};
 
 /// A part of a side of the cube [-1, 1]^3, seen from its middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,28 +41,13 @@ pub(super) struct Facet {
     depth: u32,
 }
 
-/// Facets of a sky at most.
-const FACETS_MAX: usize = 1024;
-
-/// Samples along a side of a cell, of skies by formula.
-const SAMPLES: u32 = 8;
-
-/// The same of pictures, at least and at most: as many as there are pixels, so that the sun is not overlooked.
-const SAMPLES_OF_PICTURES: (u32, u32) = (64, 1024);
-
-/// Divisions of a cell at least: what stands before a large one is much to clip.
-const DEPTH_MIN: u32 = 1;
-
-/// Divisions of a cell at most, of skies by formula and of pictures.
-const DEPTH_MAX: (u32, u32) = (5, 8);
-
 /// Facets of a sky that is given at one instant or more; without those that are always dark.
 ///
 /// The cell that errs most is divided until the errors of all are below half of `fineness`, relative to the sky's light.
 pub(super) fn facets(skies: &[SkyNow], all_round: bool, fineness: f64) -> Vec<Facet> {
     let pictured = matches!(skies.first(), Some(SkyNow::Picture(_)));
     let share = if all_round { SKY_SHARE_ALL_ROUND } else { SKY_SHARE };
-    let depth_max = if pictured { DEPTH_MAX.1 } else { DEPTH_MAX.0 };
+    let depth_max = if pictured { SKY_DEPTH_MAX.1 } else { SKY_DEPTH_MAX.0 };
     let look = |cell: &Cell| skies.iter().map(|s| Mean::of(s, cell)).collect::<Vec<_>>();
     let roots = roots(all_round);
     let looks: Vec<Vec<Mean>> = roots.par_iter().map(look).collect();
@@ -79,9 +67,9 @@ pub(super) fn facets(skies: &[SkyNow], all_round: bool, fineness: f64) -> Vec<Fa
         let parts: Vec<Facet> = parts.map(|c| facet(c, look(&c), depth + 1)).collect();
         out.splice(at..=at, parts);
     };
-    while out.len() + 3 <= FACETS_MAX {
+    while out.len() + 3 <= SKY_FACETS_MAX {
         let sums = (0..skies.len()).map(|k| out.iter().map(|f| f.errors[k]).sum::<f64>());
-        if let Some(coarse) = out.iter().position(|f| f.depth < DEPTH_MIN) {
+        if let Some(coarse) = out.iter().position(|f| f.depth < SKY_DEPTH_MIN) {
             divide(&mut out, coarse);
             continue;
         }
@@ -186,10 +174,10 @@ impl Cell {
 
     /// Samples of a sky.
     fn samples(&self, sky: &SkyNow) -> Box<dyn Iterator<Item = (DVec3, f64)> + '_> {
-        let SkyNow::Picture(picture) = sky else { return Box::new(self.grid(SAMPLES)) };
+        let SkyNow::Picture(picture) = sky else { return Box::new(self.grid(SKY_SAMPLES)) };
         // Eight units of 45 degrees are all columns.
         let pixels = 0.125 * f64::from(picture.size().0) * (self.high.x - self.low.x);
-        let (least, most) = SAMPLES_OF_PICTURES;
+        let (least, most) = SKY_SAMPLES_OF_PICTURES;
         Box::new(self.scatter((pixels.ceil() as u32).clamp(least, most)))
     }
 }

@@ -20,6 +20,7 @@ pub use sky::Sky;
 pub use sun::{SUN_DIAMETER_DEG, Sun, SunPlace};
 
 use super::SceneError;
+use crate::scene::tuning::SUN_KEY_S;
 use sky::SkyNow;
 
 /// Light from outside a scene.
@@ -160,13 +161,10 @@ impl Outside {
     /// Times of the clip at which light that changes is stated, seconds: between them it changes evenly.
     fn key_times_s(&self) -> Vec<f64> {
         let Some(day) = self.day else { return vec![0.0] };
-        let spans = ((day.to_s - day.from_s).abs() / KEY_S).ceil().clamp(1.0, 300.0) as u32;
+        let spans = ((day.to_s - day.from_s).abs() / SUN_KEY_S).ceil().clamp(1.0, 300.0) as u32;
         (0..=spans).map(|k| day.over_s * f64::from(k) / f64::from(spans)).collect()
     }
 }
-
-/// Between two keys of a day the sun goes on for this long, seconds.
-const KEY_S: f64 = 600.0;
 
 impl OutsideNow {
     /// Azimuth and elevation of the sun, degrees, if there is one.

@@ -8,6 +8,7 @@ use solar_positioning::{Location, RefractionCorrection, SolarPositions, time::Ju
 use super::perez::{SOLAR_CONSTANT, air_mass};
 use super::sky::zenith_angle;
 use crate::scene::SceneError;
+use crate::scene::tuning::SUN_CORNERS;
 
 /// The sun's disc as a light.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,14 +98,14 @@ impl Sun {
     /// polygon of the disc's area.
     pub(super) fn corners(&self) -> Vec<DVec3> {
         let radius = libm::tan(0.5 * self.diameter_deg.to_radians());
-        let step = 2.0 * std::f64::consts::PI / f64::from(CORNERS);
+        let step = 2.0 * std::f64::consts::PI / f64::from(SUN_CORNERS);
         // n / 2 r^2 sin(2 pi / n) = pi radius^2.
         let r = radius * (step / libm::sin(step)).sqrt();
         let corner = |k: u32| {
             let angle = step * (f64::from(k) + 0.5);
             DVec3::new(r * libm::cos(angle), 1.0, r * libm::sin(angle))
         };
-        (0..CORNERS).map(corner).collect()
+        (0..SUN_CORNERS).map(corner).collect()
     }
 
     /// Solid angle of the disc weighed with the cosine from its middle, sr: irradiance over radiance.
@@ -112,9 +113,6 @@ impl Sun {
         std::f64::consts::PI * libm::sin(0.5 * self.diameter_deg.to_radians()).powi(2)
     }
 }
-
-/// Corners of the polygon that stands for the disc. Of 8 a penumbra is off by up to 0.6 % of the sun's light.
-const CORNERS: u32 = 16;
 
 /// The shortest rotation from +Y to a direction.
 pub(super) fn from_zenith(to: DVec3) -> DQuat {

@@ -136,13 +136,13 @@ impl RowScaling {
     fn wanted(&self, surfaces: &impl Surfaces) -> Vec<f32> {
         let mut wanted = vec![0.0; surfaces.len()];
         for facet in surfaces.facets() {
-            let mut rows: Vec<(u32, f64, f64)> = Vec::new();
+            let mut rows: Vec<LeafRow> = Vec::new();
             for_each_leaf(surfaces, facet.0, &mut |leaf| {
                 let row = f64::from(self.rows[leaf as usize].mean.max(0.0));
-                rows.push((leaf, surfaces.area_m2(leaf), row));
+                rows.push(LeafRow { leaf, area_m2: surfaces.area_m2(leaf), row });
             });
             let raised = raised(&rows);
-            for (leaf, _, row) in rows {
+            for LeafRow { leaf, row, .. } in rows {
                 wanted[leaf as usize] = (raised * row).min(1.0) as f32;
             }
         }
@@ -214,11 +214,19 @@ impl Radiosity {
     }
 }
 
-/// By how much rows are to be multiplied for their sum over areas to stay while none is above 1: 1, at most `RAISED_MOST`; of leaves,
-/// their areas (m2) and rows.
-fn raised(rows: &[(u32, f64, f64)]) -> f64 {
+/// Row of a leaf.
+struct LeafRow {
+    leaf: u32,
+    area_m2: f64,
+    /// Sum of form factors, 1.
+    row: f64,
+}
+
+/// By how much rows are to be multiplied for their sum over areas to stay while none is above 1: 1, at most `RAISED_MOST`.
+fn raised(rows: &[LeafRow]) -> f64 {
     let off = |raised: f64| -> f64 {
-        rows.iter().map(|&(_, area, row)| area * ((raised * row).min(1.0) - row)).sum()
+        let more = |of: &LeafRow| of.area_m2 * ((raised * of.row).min(1.0) - of.row);
+        rows.iter().map(more).sum()
     };
     let (mut low, mut high) = (1.0, f64::from(RAISED_MOST));
     if off(low) >= 0.0 {

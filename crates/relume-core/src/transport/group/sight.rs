@@ -7,8 +7,8 @@ use crate::transport::kernel::Simd;
 use crate::transport::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use glam::DVec3;
 
-use super::super::tuning::FACET_RAYS;
-use super::{GROUP_SEGMENTS, Points, Spread, Towards, factor, point_of, scrambled};
+use super::super::tuning::{FACET_RAYS, GROUP_SEGMENTS};
+use super::{Points, Spread, Towards, factor, point_of, scrambled};
 
 /// Query for the occluders between two ends of which one is a group.
 pub struct GroupSight<'a> {

@@ -16,8 +16,8 @@ use crate::solver::settle::{Below, IrradianceChange, Settled};
 use crate::solver::surfaces::{FacetMaterial, Surfaces, for_each_below};
 use crate::solver::trend::{Start, Trend};
 use crate::solver::tuning::{
-    COARSE_MADE_MAX, FURTHER_MAX, GAIN_MAX, GAIN_SURE, LOST_MAX, MADE_MAX, MADE_OF_ALL_MAX, PENDING_SHARE,
-    SCALED_RESIDUAL, SKIPPED_MAX, SWEEPS_MAX, UNBALANCED_MAX, UNKNOWN_MAX, WHITE,
+    COARSE_MADE_MAX, FURTHER_MAX, GAIN_MAX, GAIN_SURE, LOST_MAX, MADE_MAX, MADE_OF_ALL_MAX,
+    PENDING_SHARE, SCALED_RESIDUAL, SKIPPED_MAX, SWEEPS_MAX, UNBALANCED_MAX, UNKNOWN_MAX, WHITE,
 };
 use crate::solver::work::{Dirty, Work};
 use crate::transport;
@@ -723,12 +723,8 @@ mod tests {
             assert!((scaling.rows[leaf].mean - 1.0).abs() < 1e-3, "{:?}", scaling.rows);
         }
         let mut b = Radiosity::new(&plates);
-        let bounds = Bounds {
-            residual: 1e-7,
-            from_nothing: 1e-7,
-            mean_w_m2: 2e2,
-            rows_are_close: true,
-        };
+        let bounds =
+            Bounds { residual: 1e-7, from_nothing: 1e-7, mean_w_m2: 2e2, rows_are_close: true };
         b.solve_bounded(&plates, &links, Dirty::All, bounds);
         assert!(!b.scaling.is_none() && b.has_settled());
         for id in 0..4 {

@@ -483,7 +483,7 @@ impl SpaceJudge<'_> {
             }
             by_points = Some(e);
         }
-        let exact = x.along_outlines(place_a, place_b);
+        let exact = x.along_outlines(self.simd, place_a, place_b);
         let overstated = (x.area_m2 / exact.area_m2.max(f64::MIN_POSITIVE)).max(1.0);
         Ok(Exchanged { x: exact, overstated, by_points })
     }

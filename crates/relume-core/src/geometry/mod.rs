@@ -5,12 +5,14 @@
 mod bounds;
 mod convex;
 mod cut;
+mod hull;
 mod pose;
 mod region;
 
 pub use bounds::{Aabb, ShaftOfBoxes, shaft_meets_box};
 pub use convex::{ConvexPolygon, Plane, polygon_area, split_convex};
 pub use cut::{Segment, cut_along, segment_within};
+pub use hull::is_outside_hull;
 pub use pose::Pose;
 pub use region::{Moments, common, difference, part_in_front, within_outlines};
 

@@ -5,6 +5,7 @@
 mod bounds;
 mod convex;
 mod cut;
+mod hull;
 mod pose;
 mod region;
 mod tuning;
@@ -12,6 +13,7 @@ mod tuning;
 pub use bounds::{Aabb, Interval, ShaftOfBoxes, shaft_meets_box};
 pub use convex::{ConvexPolygon, Plane, polygon_area, split_convex};
 pub use cut::{Segment, cut_along, segment_within};
+pub use hull::is_outside_hull;
 pub use pose::Pose;
 pub use region::{Moments, common, difference, part_in_front, within_outlines};
 

@@ -374,7 +374,17 @@ impl SpaceJudge<'_> {
         let key = pair_key(self.forest.key(a), self.forest.key(b));
         let places = (&places.own.0, &places.own.1);
         let (shaft, candidates) = (&shaft, &narrowed[start..]);
-        self.decide(&Elements { ids: (a, b), places, key, met, shaft, candidates, found }, known)
+        let mut pair = Elements { ids: (a, b), places, key, met, shaft, candidates, found };
+        let x = match pair.in_contact() {
+            true => contact_exchange(places.0, places.1, shaft.contact_m2(&pair.found.blockers)),
+            false => exchange_by_points(self.simd, places.0, places.1, met),
+        };
+        // A steep pair that counts as partly hidden is refined as if points could not tell how much, so what is only beside it is told
+        // from what is between.
+        if x.is_steep && shaft.is_beside(&pair.found.blockers) {
+            pair.found.blockers.clear();
+        }
+        self.decide(&pair, x, known)
     }
 
     /// Whether what two touching elements exchange counts for nothing, as it leaves neither: where there is light. Links of patches
@@ -404,9 +414,9 @@ impl SpaceJudge<'_> {
         body_of(self.forest, self.view, id)
     }
 
-    /// Judges a pair of elements that face each other, at or below the coarse level.
-    fn decide(&self, pair: &Elements<'_>, known: Option<&Carried>) -> Judgement {
-        let exchanged = match self.exchanged(pair) {
+    /// Judges a pair of elements that face each other, at or below the coarse level; `x` is what they exchange by points.
+    fn decide(&self, pair: &Elements<'_>, x: Exchange, known: Option<&Carried>) -> Judgement {
+        let exchanged = match self.exchanged(pair, x) {
             Ok(exchanged) => exchanged,
             Err(decided) => return decided,
         };
@@ -452,16 +462,11 @@ impl SpaceJudge<'_> {
         [end(pair.ids.0, place_a.area), end(pair.ids.1, place_b.area)]
     }
 
-    /// What a pair exchanges without occlusion; as an error the verdict, where that alone decides.
-    fn exchanged(&self, pair: &Elements<'_>) -> Result<Exchanged, Judgement> {
+    /// What a pair exchanges without occlusion, `x` by points; as an error the verdict, where that alone decides.
+    fn exchanged(&self, pair: &Elements<'_>, x: Exchange) -> Result<Exchanged, Judgement> {
         let (place_a, place_b) = pair.places;
-        let blockers = &pair.found.blockers;
-        let x = match pair.in_contact() {
-            true => contact_exchange(place_a, place_b, pair.shaft.contact_m2(blockers)),
-            false => exchange_by_points(self.simd, place_a, place_b, pair.met),
-        };
         if pair.in_contact() && x.area_m2 <= 0.0 {
-            let is_covered = !blockers.is_empty();
+            let is_covered = !pair.found.blockers.is_empty();
             let reason = if is_covered { CullReason::Covered } else { CullReason::FacingAway };
             return Err(culled(reason));
         }
@@ -483,7 +488,7 @@ impl SpaceJudge<'_> {
             }
             by_points = Some(e);
         }
-        let exact = x.along_outlines(place_a, place_b);
+        let exact = x.along_outlines(self.simd, place_a, place_b);
         let overstated = (x.area_m2 / exact.area_m2.max(f64::MIN_POSITIVE)).max(1.0);
         Ok(Exchanged { x: exact, overstated, by_points })
     }

@@ -93,7 +93,7 @@ pub fn contact_exchange(a: &WorldElement, b: &WorldElement, overlap_m2: f64) -> 
 /// decades of distance and size). Symmetric: both directions of a pair use this one number.
 pub fn exchange(simd: Simd, a: &WorldElement, b: &WorldElement, meeting: Meeting) -> Exchange {
     let x = exchange_by_points(simd, a, b, meeting);
-    if x.is_steep { x.along_outlines(a, b) } else { x }
+    if x.is_steep { x.along_outlines(simd, a, b) } else { x }
 }
 
 /// Exchange area of two elements that meet as `meeting` says, m2, from points alone.
@@ -337,7 +337,7 @@ impl Exchange {
     /// With the exchange area as an integral along the outlines of both elements, whatever their distance and shape.
     ///
     /// Error: 1e-4 of the exchange area, or 1e-7 of the smaller element's area.
-    pub fn along_outlines(self, a: &WorldElement, b: &WorldElement) -> Exchange {
+    pub fn along_outlines(self, simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
         let [of_a, of_b] = facing_parts(a, b);
         if of_a.corners().len() < 3 || of_b.corners().len() < 3 {
             return self;
@@ -345,7 +345,8 @@ impl Exchange {
         // No more than either has room for.
         let most = of_a.area().min(of_b.area());
         let error_max = OUTLINE_ERROR * self.area_m2.max(1e-3 * most);
-        let area_m2 = exchange_along_outlines(of_a.corners(), of_b.corners(), error_max).min(most);
+        let area_m2 = exchange_along_outlines(simd, of_a.corners(), of_b.corners(), error_max);
+        let area_m2 = area_m2.min(most);
         Exchange { area_m2, ..self }
     }
 }
@@ -368,7 +369,7 @@ pub fn exchange_of_polygons((a, of_a): (&[DVec3], DVec3), (b, of_b): (&[DVec3], 
         return 0.0;
     }
     let most = one.area().min(two.area());
-    exchange_along_outlines(one.corners(), two.corners(), 1e-4 * most).min(most)
+    exchange_along_outlines(Simd::detect(), one.corners(), two.corners(), 1e-4 * most).min(most)
 }
 
 /// Integral of the form factor over an end of a pair.

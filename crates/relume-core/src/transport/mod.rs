@@ -12,6 +12,7 @@ mod crowd;
 mod exchange;
 mod group;
 mod kernel;
+mod logarithm;
 mod point;
 mod prepared_view;
 mod segments;

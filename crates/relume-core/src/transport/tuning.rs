@@ -91,6 +91,14 @@ pub(super) const BEND_FAR: f64 = 0.03;
 /// - Smaller: noise of sampling
 pub const CLIPPED_MAX: usize = 12;
 
+/// Share of the smaller end's extent by which a polygon may reach into the hull of a steep pair and not count as a blocker.
+///
+/// - Unit: 1
+/// - Tried: 0, 1e-3
+/// - Larger: that share of either end may be hidden unseen
+/// - Smaller: with 0 what only rounding of single precision lets reach in counts
+pub(super) const GRAZED: f64 = 1e-3;
+
 /// Area of a blocker that is in a group, over that of the connected patches that it belongs to, at least: a face of a cube.
 ///
 /// - Unit: 1

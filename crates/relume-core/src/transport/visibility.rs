@@ -2,7 +2,9 @@
 //! clipping ([`clipping`]).
 
 use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, WorldView};
-use crate::geometry::{Aabb, Interval, Plane, Pose, ShaftOfBoxes, shaft_meets_box};
+use crate::geometry::{
+    Aabb, Interval, Plane, Pose, ShaftOfBoxes, is_outside_hull, shaft_meets_box,
+};
 use crate::scene::{BodyId, InPlane, PatchId};
 
 use super::clip::keep_in_front;
@@ -14,7 +16,7 @@ use super::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use super::share::Visibility;
 use super::side::Side;
 use super::spot::spot;
-use super::tuning::BODY_SHARE;
+use super::tuning::{BODY_SHARE, GRAZED};
 use glam::{DVec2, DVec3};
 
 /// Candidate occluders of a pair: nodes of the forest's fixed part (clusters and patch roots) that may stand between its ends.
@@ -460,6 +462,19 @@ impl<'a> Shaft<'a> {
         let shafts = self.shafts();
         let blocks = |patch: &PatchId| self.standing(&shafts, *patch) == Standing::Between;
         blockers.iter().copied().filter(blocks).collect()
+    }
+
+    /// Whether none of some blockers of two elements reaches into the convex hull of the two, which holds all segments between
+    /// them: boxes hold more.
+    pub fn is_beside(&self, blockers: &[PatchId]) -> bool {
+        let (slack, mut corners) = (self.slack(), Vec::new());
+        blockers.iter().all(|&patch| {
+            let (_, a, b) = self.seen_by(Some(self.view.patch(patch).body));
+            corners.clear();
+            corners.extend(self.lifted(patch).1.corners());
+            let ends = (&a.corners[..a.len], &b.corners[..b.len]);
+            is_outside_hull(ends, &corners, slack, GRAZED)
+        })
     }
 
     /// Number of occluders that blockers make up: solids that hide with their silhouettes count as one for every

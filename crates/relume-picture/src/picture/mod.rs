@@ -15,10 +15,12 @@
 //! | `smooth` | light at the corners of curved bodies, as neighbours have it |
 //! | `assemble` | a snapshot as an ordered list of things to draw |
 //! | `raster` | which thing each sample of each pixel sees |
+//! | `stitch` | points of neighbours on the edges of patches |
 //! | `tone` | radiosity to display values and bytes |
 //! | `exposure` | one exposure for a clip |
 //! | `sketch` | a rough picture of a scene that is not solved: [`Sketch`] |
 //! | `image` | pixels and PNG files |
+//! | `recording` | light at several instants on one triangulation: [`Recorder`] |
 
 mod assemble;
 mod camera;
@@ -32,10 +34,12 @@ mod project;
 mod raster;
 mod render;
 mod shading;
+mod recording;
 mod sketch;
 mod smooth;
 mod tone;
 mod tuning;
+mod stitch;
 
 pub use camera::{View, ViewError, Viewpoint};
 pub use exposure::{Exposure, Metered};
@@ -45,4 +49,5 @@ pub use overview::Overview;
 pub use render::{Settings, render};
 pub use shading::Shading;
 pub use sketch::Sketch;
+pub use recording::{PatchLight, Recorder, Recording};
 pub use tone::Tone;

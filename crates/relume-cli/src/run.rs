@@ -706,11 +706,20 @@ fn brightest_frame(scene: &Scene, fps: f64) -> Option<u32> {
         let now = emitted(frame);
         if now > best.1 { (Some(frame), now) } else { best }
     };
-    (0..count).fold((None, 0.0), brighter).0
+    brightest_of(scene, fps, 0..count)
+}
+
+/// The first of some frames in which most is emitted; `None` if nothing is in any.
+pub(crate) fn brightest_of(
+    scene: &Scene,
+    fps: f64,
+    frames: impl Iterator<Item = u32>,
+) -> Option<u32> {
+    frames.fold((None, 0.0), brighter).0
 }
 
 /// The stops of a scale, rounded to a thousandth so that what the report says is what was used.
-fn stops(scale: f64) -> f64 {
+pub(crate) fn stops(scale: f64) -> f64 {
     let stops = scale.log2();
     if stops.is_finite() { (stops * 1000.0).round() / 1000.0 } else { 0.0 }
 }

@@ -13,8 +13,8 @@ use crate::viewing::ViewFlags;
 mod values;
 
 pub(crate) use values::{
-    By, ClosureFlag, ExactUpdate, ExposureFlag, FactorFormat, MemorySize, OracleFlag, Shading,
-    Size, UpdateChoice, UpdateFlag,
+    By, ClosureFlag, ExactUpdate, ExposureFlag, FactorFormat, FrameFormat, MemorySize, OracleFlag,
+    Shading, Size, UpdateChoice, UpdateFlag,
 };
 use values::{parse_every, parse_fps, parse_threads, parse_tolerance};
 
@@ -320,6 +320,15 @@ pub(crate) struct RenderArgs {
     /// light, and grey light between surfaces from some thousand points.
     #[arg(long, conflicts_with_all = ["resume", "events", "report", "mesh", "reconstruct", "shading"])]
     pub(crate) preview: bool,
+    /// What frames are: `png`, or `exr` for numbers and compositing (--exposure has no say there).
+    #[arg(
+        long,
+        value_enum,
+        value_name = "FORMAT",
+        default_value = "png",
+        conflicts_with = "preview"
+    )]
+    pub(crate) format: FrameFormat,
     #[command(flatten)]
     pub(crate) solve: SolveFlags,
     #[command(flatten)]
@@ -339,15 +348,6 @@ pub(crate) struct SolveArgs {
     pub(crate) solve: SolveFlags,
 }
 
-/// `relume probe`
-#[derive(Debug, Args)]
-pub(crate) struct ProbeArgs {
-    /// The scene, a .glb, .gltf or .vs3 file.
-    #[arg(value_name = "SCENE")]
-    pub(crate) scene: PathBuf,
-    /// The sensors: text lines `x y z nx ny nz`, or CSV.
-    #[arg(value_name = "SENSORS")]
-    pub(crate) sensors: PathBuf,
 /// `relume export`
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
@@ -377,6 +377,15 @@ pub(crate) struct ExportArgs {
     pub(crate) reconstruct: bool,
 }
 
+/// `relume probe`
+#[derive(Debug, Args)]
+pub(crate) struct ProbeArgs {
+    /// The scene, a .glb, .gltf or .vs3 file.
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+    /// The sensors: text lines `x y z nx ny nz`, or CSV.
+    #[arg(value_name = "SENSORS")]
+    pub(crate) sensors: PathBuf,
     /// File for the table; it appears when all frames are done [default: stdout].
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,

@@ -367,3 +367,58 @@ fn what_cannot_be_written_is_said_before_anything_is_solved() {
     run("lit.vtp", &["--exposure", "1"]).fails(2, &["leave out --exposure"]);
     run("lit.glb", &["--keys", "0"]).fails(2, &["--keys"]);
 }
+
+/// Read by a library that is not what wrote it: pixels are what the surfaces reflect of what arrives there.
+#[test]
+fn exr_frames_hold_radiance_with_what_it_is_made_of() {
+    let (dir, scene) = room();
+    let out = dir.path().join("out");
+    let flags = ["--frames", "6", "--tolerance", "0.2", "--size", "64x48", "-q", "--format", "exr"];
+    let render = ["render", text(&scene), "-o", text(&out)];
+    relume(&[&render[..], &flags].concat()).succeeds();
+    let path = out.join("frame-0006.exr");
+    let first = fs::read(&path).unwrap();
+    // Finished, so there is nothing to do.
+    relume(&[&render[..], &flags, &["--resume"]].concat()).succeeds();
+    assert!(fs::read(&path).unwrap() == first);
+    relume(&[&render[..], &flags, &["--mesh"]].concat()).fails(2, &["leave out --mesh"]);
+    let image = image::open(&path).unwrap().into_rgba32f();
+    assert_eq!(image.dimensions(), (64, 48));
+    // The whole picture is the room, and the lamp is the brightest.
+    assert!(image.pixels().all(|p| p[3] == 1.0 && p[0] > 0.0));
+    let layer = read_exr(&first);
+    let at = |name: &str, k: usize| layer(name)[k];
+    let mut checked = 0;
+    for (k, pixel) in image.pixels().enumerate() {
+        assert_eq!(at("R", k), pixel[0]);
+        let n = ["normal.X", "normal.Y", "normal.Z"].map(|name| at(name, k));
+        assert!((n.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < 1e-5, "{n:?}");
+        assert!(at("depth.Z", k) > 0.1 && at("depth.Z", k) < 100.0 && at("body.id", k) >= 1.0);
+        // Where a pixel sees one surface, and that is no lamp.
+        let [r, g, b] = ["R", "G", "B"].map(|c| at(&format!("reflectance.{c}"), k));
+        let is_floor = [r, g, b].iter().zip(FLOOR).all(|(r, f)| (r - f as f32).abs() < 1e-6);
+        if is_floor {
+            checked += 1;
+            for c in ["R", "G", "B"] {
+                let (rho, h) =
+                    (at(&format!("reflectance.{c}"), k), at(&format!("irradiance.{c}"), k));
+                let l = rho * h / std::f32::consts::PI;
+                assert!((at(c, k) - l).abs() < 1e-4 * l, "{} is not {l}", at(c, k));
+            }
+            assert!(n[1] > 0.999);
+        }
+    }
+    assert!(checked > 100, "{checked}");
+}
+
+/// The channels of an OpenEXR file by name.
+fn read_exr(bytes: &[u8]) -> impl Fn(&str) -> Vec<f32> {
+    use exr::prelude::{ReadChannels, ReadLayers};
+    let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels();
+    let image = reader.all_layers().all_attributes().from_buffered(std::io::Cursor::new(bytes));
+    let layer = image.unwrap().layer_data.remove(0);
+    move |name| {
+        let found = layer.channel_data.list.iter().find(|channel| channel.name == *name);
+        found.unwrap().sample_data.values_as_f32().collect()
+    }
+}

@@ -247,3 +247,65 @@ impl Meshes<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::{DQuat, DVec3};
+    use relume_core::scene::SceneBuilder;
+
+    use super::*;
+
+    /// Two squares at five instants: the light on the first stays as it is, the second reflects nothing but glows more and more, or
+    /// does not.
+    fn lit(glows: bool) -> Lit {
+        let mut b = SceneBuilder::new("two");
+        let (grey, black) =
+            (b.material("grey", [0.5; 3], [0.0; 3]), b.material("black", [0.0; 3], [1.0; 3]));
+        let node = b.node("all", None, DVec3::ZERO, DQuat::IDENTITY);
+        let square = |z: f64| {
+            [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| DVec3::new(x, y, z))
+        };
+        b.polygon(node, "one", grey, &square(0.0));
+        b.polygon(node, "other", black, &square(1.0));
+        let scene = Arc::new(b.build().unwrap());
+        let times_s: Vec<f64> = (0..5).map(f64::from).collect();
+        let part = |surface: u32, of: &dyn Fn(f64) -> (f32, f64)| LitPart {
+            surface: scene.patches[surface as usize].surface,
+            points: square(f64::from(surface)).map(|p| p.as_vec3().to_array()).to_vec(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            irradiance: times_s.iter().map(|&t| vec![[of(t).0; 3]; 4]).collect(),
+            exitance: times_s.iter().map(|&t| [of(t).1; 3]).collect(),
+            reflectance: scene.reflectance(&scene.patches[surface as usize]),
+        };
+        let parts =
+            vec![part(0, &|_| (1.0, 0.0)), part(1, &|t| (t as f32, if glows { t } else { 1.0 }))];
+        Lit { scene, times_s, parts, exposure: 0.25 }
+    }
+
+    #[test]
+    fn surfaces_whose_light_stays_as_it_is_have_no_targets() {
+        let whole = |x: f64| x;
+        let targets = |lit: &Lit| {
+            let file = lit_glb(lit, &whole, json!({})).unwrap();
+            let text = String::from_utf8_lossy(&file).into_owned();
+            (text.matches("\"targets\"").count(), text.matches("\"weights\"").count() > 0)
+        };
+        // What falls on what reflects nothing is not seen.
+        assert_eq!((targets(&lit(false)), morph_bytes(&lit(false))), ((0, false), 0));
+        assert_eq!((targets(&lit(true)), morph_bytes(&lit(true))), ((1, true), 48 * 4 * 4));
+    }
+
+    #[test]
+    fn fewer_instants_keep_the_first_and_the_last() {
+        let thin = lit(true).every(3);
+        assert_eq!(thin.times_s, [0.0, 3.0, 4.0]);
+        assert_eq!(
+            thin.parts[1].exitance.iter().map(|m| m[0]).collect::<Vec<_>>(),
+            [0.0, 3.0, 4.0]
+        );
+        assert_eq!(thin.parts[1].irradiance[1], vec![[3.0; 3]; 4]);
+        assert_eq!(morph_bytes(&thin), 48 * 4 * 2);
+    }
+}

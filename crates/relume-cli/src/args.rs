@@ -13,8 +13,8 @@ use crate::viewing::ViewFlags;
 mod values;
 
 pub(crate) use values::{
-    By, ClosureFlag, ExactUpdate, ExposureFlag, FactorFormat, MemorySize, OracleFlag, Shading,
-    Size, UpdateChoice, UpdateFlag,
+    By, ClosureFlag, ExactUpdate, ExposureFlag, FactorFormat, FrameFormat, MemorySize, OracleFlag,
+    Shading, Size, UpdateChoice, UpdateFlag,
 };
 use values::{parse_every, parse_fps, parse_threads, parse_tolerance};
 
@@ -53,6 +53,17 @@ pub(crate) enum Command {
     Render(RenderArgs),
     /// Solve a scene without pictures.
     Solve(SolveArgs),
+    /// Solve a scene and write it with its light as one file for other programs; the name says which.
+    ///
+    /// `.glb`: a glTF file whose light plays beside the scene's own motion in any viewer (unlit vertex colours that morph).
+    /// `.html`: a page that plays the clip in any browser, without a network: one turns the scene, moves through time, and reads
+    /// irradiance under the pointer. `.usda`: USD with colours and transforms over time, which Blender plays without an add-on.
+    /// `.vtp`: the elements of one frame with irradiance, radiosity, level and names, for ParaView and PyVista; `.pvd`: those of a
+    /// clip, in a folder beside it.
+    #[command(
+        after_help = "Example:  relume export room.glb -o lit.glb --frames 0-18\n          relume export room.glb -o lit.html\n          relume export room.glb -o room.pvd --tolerance 0.05"
+    )]
+    Export(ExportArgs),
     /// Irradiance at points, frame by frame, as a table (CSV).
     ///
     /// SENSORS is text, a line `x y z nx ny nz` for each sensor (metres, in the world; # begins a
@@ -310,6 +321,15 @@ pub(crate) struct RenderArgs {
     /// light, and grey light between surfaces from some thousand points.
     #[arg(long, conflicts_with_all = ["resume", "events", "report", "mesh", "reconstruct", "shading"])]
     pub(crate) preview: bool,
+    /// What frames are: `png`, or `exr` for numbers and compositing (--exposure has no say there).
+    #[arg(
+        long,
+        value_enum,
+        value_name = "FORMAT",
+        default_value = "png",
+        conflicts_with = "preview"
+    )]
+    pub(crate) format: FrameFormat,
     #[command(flatten)]
     pub(crate) solve: SolveFlags,
     #[command(flatten)]
@@ -327,6 +347,35 @@ pub(crate) struct SolveArgs {
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) solve: SolveFlags,
+}
+
+/// `relume export`
+#[derive(Debug, Args)]
+pub(crate) struct ExportArgs {
+    /// The scene, a .glb or .gltf file (or .obj, .stl, .ply, .vs3).
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: PathBuf,
+    /// The file to write; its ending says of which form.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    /// Solve and store every N-th of the frames only, and the last one; light goes straight from one to the next [default: 1;
+    /// more for a .glb that viewers could not play].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
+    pub(crate) keys: Option<u32>,
+    #[command(flatten)]
+    pub(crate) clip: ClipFlags,
+    #[command(flatten)]
+    pub(crate) update: UpdateChoice,
+    #[command(flatten)]
+    pub(crate) view: ViewFlags,
+    /// Exposure in stops, fixed over the clip: at 0 a radiance of 1 W/m2/sr is full white, +1 is twice
+    /// as bright. `auto` chooses it once, at the first of the frames in which most is emitted, by what the view shows.
+    #[arg(long, value_name = "EV", default_value = "auto", allow_negative_numbers = true)]
+    pub(crate) exposure: ExposureFlag,
+    /// Find the light of every element anew from all links above it: cleaner corners and shadows, at
+    /// several times the cost of a frame.
+    #[arg(long)]
+    pub(crate) reconstruct: bool,
 }
 
 /// `relume probe`

@@ -210,6 +210,12 @@ pub(crate) fn resolve(
     Ok(frames)
 }
 
+/// Every so many of some frames, and the last.
+pub(crate) fn every(frames: &[u32], step: usize) -> Vec<u32> {
+    let last = frames.len() - 1;
+    (0..frames.len()).filter(|k| k.is_multiple_of(step) || *k == last).map(|k| frames[k]).collect()
+}
+
 /// Frames as text, runs joined: `0-4, 7, 9-10`.
 pub(crate) fn describe(frames: &[u32]) -> String {
     let mut runs: Vec<(u32, u32)> = Vec::new();
@@ -241,6 +247,12 @@ mod tests {
         assert_eq!(frames("3,7"), [3, 7]);
         assert_eq!(frames(" 7 , 3 - 5, 4"), [3, 4, 5, 7]);
         assert_eq!(frames("100"), [100]);
+    }
+
+    #[test]
+    fn every_so_many_and_the_last() {
+        assert_eq!(every(&[3, 4, 5, 6], 2), [3, 5, 6]);
+        assert_eq!((every(&[7], 5), every(&[1, 2, 3], 1)), (vec![7], vec![1, 2, 3]));
     }
 
     #[test]

@@ -75,7 +75,8 @@ fn taken(dir: &Path, file: &mut File) -> Failure {
 
 /// Whether a name is of a file that only runs write into their folder, which have its lock.
 fn is_of_a_run(name: &str) -> bool {
-    name == "report.json" || (name.starts_with("frame-") && name.ends_with(".png"))
+    name == "report.json"
+        || (name.starts_with("frame-") && (name.ends_with(".png") || name.ends_with(".exr")))
 }
 
 /// Whether an open file is the one at a path.

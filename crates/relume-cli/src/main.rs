@@ -9,6 +9,7 @@ mod clock;
 mod demo;
 mod edits;
 mod events;
+mod export;
 mod factors;
 mod failure;
 mod figures;
@@ -71,6 +72,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Bench(args) => interrupt::listen().and_then(|()| bench::bench(&args)),
         Command::Factors(args) => interrupt::listen().and_then(|()| factors::factors(&args)),
         Command::Probe(args) => interrupt::listen().and_then(|()| probe::probe(&args)),
+        Command::Export(args) => interrupt::listen().and_then(|()| export::export(&args)),
         Command::Figure(args) => interrupt::listen().and_then(|()| paper::figure(&args)),
         Command::Flat(args) => interrupt::listen().and_then(|()| flat::flat(&args)),
         Command::Solve(args) => interrupt::listen().and_then(|()| run::solve(args)),

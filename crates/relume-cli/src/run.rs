@@ -17,7 +17,8 @@ use relume_picture::picture::{self, Exposure};
 
 use crate::accuracy::Estimates;
 use crate::args::{
-    DemoArgs, ExposureFlag, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags, UpdateFlag,
+    DemoArgs, ExposureFlag, FrameFormat, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags,
+    UpdateFlag,
 };
 use crate::clip::{self, Clip, PICTURE_TOLERANCE, TOLERANCE, fixed};
 use crate::clock::now;
@@ -57,6 +58,7 @@ pub(crate) fn demo(args: DemoArgs) -> Result<(), Failure> {
         dir: Some(dir),
         tolerance: demo.tolerance,
         picture: Some((args.picture.shading.unwrap_or(Shading::Gouraud), args.picture)),
+        format: FrameFormat::Png,
         preview: false,
         solve: args.solve,
     };
@@ -67,6 +69,7 @@ pub(crate) fn demo(args: DemoArgs) -> Result<(), Failure> {
 pub(crate) fn render(args: RenderArgs) -> Result<(), Failure> {
     let job = Job {
         preview: args.preview,
+        format: args.format,
         scene: args.scene,
         dir: Some(args.output),
         tolerance: PICTURE_TOLERANCE,
@@ -83,6 +86,7 @@ pub(crate) fn solve(args: SolveArgs) -> Result<(), Failure> {
         dir: args.output,
         tolerance: TOLERANCE,
         picture: None,
+        format: FrameFormat::Png,
         preview: false,
         solve: args.solve,
     };
@@ -96,6 +100,7 @@ struct Job {
     /// Unless the flags give one.
     tolerance: f64,
     picture: Option<(Shading, PictureFlags)>,
+    format: FrameFormat,
     /// Whether pictures are rough ones, and nothing is solved.
     preview: bool,
     solve: SolveFlags,
@@ -112,7 +117,7 @@ impl Job {
         let (clip, views) = self.open_clip()?;
         if let Some((_, flags)) = &self.picture {
             // Not only after the first frame.
-            ask_for_picture(flags)?;
+            ask_for_picture(flags, self.format)?;
         }
         if let Some(dir) = &self.dir {
             make_directory(dir)?;
@@ -311,15 +316,18 @@ impl Job {
     /// Path of a frame's picture, if this run makes pictures.
     fn picture_path(&self, frame: u32) -> Option<PathBuf> {
         self.picture.as_ref()?;
-        Some(self.dir.as_ref()?.join(format!("frame-{frame:04}.png")))
+        Some(self.dir.as_ref()?.join(format!("frame-{frame:04}.{}", self.format.ending())))
     }
 
     /// Whether a frame's picture is there, undamaged and the one that was finished.
     fn picture_is_whole(&self, frame: u32, digest: Option<&str>) -> bool {
         let whole = |path: PathBuf| {
             scene_file::read(&path).is_ok_and(|bytes| {
-                picture::is_whole_png(&bytes)
-                    && digest.is_none_or(|digest| digest == resume::digest(&bytes))
+                let is_whole = match self.format {
+                    FrameFormat::Png => picture::is_whole_png(&bytes),
+                    FrameFormat::Exr => picture::is_whole_exr(&bytes),
+                };
+                is_whole && digest.is_none_or(|digest| digest == resume::digest(&bytes))
             })
         };
         self.picture_path(frame).is_none_or(whole)
@@ -339,7 +347,11 @@ impl Job {
         let (Some(dir), Some(_)) = (&self.dir, &self.picture) else { return };
         let Ok(entries) = fs::read_dir(dir) else { return };
         let number = |name: &str| -> Option<u32> {
-            name.strip_prefix("frame-")?.strip_suffix(".png")?.parse().ok()
+            name.strip_prefix("frame-")?
+                .strip_suffix(self.format.ending())?
+                .strip_suffix('.')?
+                .parse()
+                .ok()
         };
         let mut old: Vec<u32> = entries
             .flatten()
@@ -583,10 +595,13 @@ impl Run<'_> {
         let Some((view, options, flags)) = self.view(frame)? else { return Ok(None) };
         let exposure = options.exposure_ev.map_or(Exposure::Automatic, fixed);
         let settings = clip::picture_settings(flags, options.shading, exposure);
-        ask_for_picture(flags)?;
-        let image = picture::render(&snapshot, &view, &settings);
+        ask_for_picture(flags, self.job.format)?;
+        let bytes = match self.job.format {
+            FrameFormat::Png => picture::render(&snapshot, &view, &settings).to_png(),
+            FrameFormat::Exr => picture::layers(&snapshot, &view, &settings).to_exr(),
+        };
         drop(snapshot);
-        let bytes = image.to_png().map_err(Failure::new)?;
+        let bytes = bytes.map_err(Failure::new)?;
         // No longer than it takes: while this is held, nothing can end the run.
         let _guard = interrupt::writing();
         write_atomically(path, &bytes).map_err(|error| {
@@ -669,11 +684,21 @@ const ALMOST_DARK: &str = "warning: the view sees almost no light: look from els
 
 /// Bytes a pixel while a picture is drawn: in tiles and whole.
 const PIXEL_BYTES: u64 = 6;
+/// The same of layers: in tiles, whole, as channels and packed.
+const LAYERS_BYTES: u64 = 280;
 
-/// An error if there is no room for a picture.
-fn ask_for_picture(flags: &PictureFlags) -> Result<(), Failure> {
+/// An error if there is no room for a picture, or no way to draw it.
+fn ask_for_picture(flags: &PictureFlags, format: FrameFormat) -> Result<(), Failure> {
+    if flags.mesh && format == FrameFormat::Exr {
+        return Err(Failure::usage("outlines are no light: they cannot be drawn into numbers")
+            .help("leave out --mesh, or use --format png"));
+    }
     let pixels = u64::from(flags.size.width) * u64::from(flags.size.height);
-    memory::ask(pixels * PIXEL_BYTES, format_args!("a picture of {}", flags.size))
+    let bytes = match format {
+        FrameFormat::Png => PIXEL_BYTES,
+        FrameFormat::Exr => LAYERS_BYTES,
+    };
+    memory::ask(pixels * bytes, format_args!("a picture of {}", flags.size))
 }
 
 /// The first of the frames of the animation in which most is emitted; `None` if nothing ever is.
@@ -681,6 +706,15 @@ fn ask_for_picture(flags: &PictureFlags) -> Result<(), Failure> {
 /// Cost: one pose for each emitting body, material and frame.
 fn brightest_frame(scene: &Scene, fps: f64) -> Option<u32> {
     let count = frames::frame_count(scene.motion.duration_s, fps).ok()?;
+    brightest_of(scene, fps, 0..count)
+}
+
+/// The first of some frames in which most is emitted; `None` if nothing is in any.
+pub(crate) fn brightest_of(
+    scene: &Scene,
+    fps: f64,
+    frames: impl Iterator<Item = u32>,
+) -> Option<u32> {
     // The area that would emit as much if it were all white.
     let mut lamps: BTreeMap<(BodyId, MaterialId), [f64; 3]> = BTreeMap::new();
     for patch in scene.patches.iter().filter(|p| scene.patch_emits(p)) {
@@ -706,11 +740,11 @@ fn brightest_frame(scene: &Scene, fps: f64) -> Option<u32> {
         let now = emitted(frame);
         if now > best.1 { (Some(frame), now) } else { best }
     };
-    (0..count).fold((None, 0.0), brighter).0
+    frames.fold((None, 0.0), brighter).0
 }
 
 /// The stops of a scale, rounded to a thousandth so that what the report says is what was used.
-fn stops(scale: f64) -> f64 {
+pub(crate) fn stops(scale: f64) -> f64 {
     let stops = scale.log2();
     if stops.is_finite() { (stops * 1000.0).round() / 1000.0 } else { 0.0 }
 }

@@ -51,3 +51,19 @@ pub(crate) const UNBALANCED_MAX: f64 = 0.1;
 /// - Larger: wrong numbers are not noticed
 /// - Smaller: white rooms at coarse tolerances warn, whose numbers are within them
 pub(crate) const UNBALANCED_SAID: f64 = 0.01;
+
+/// Most targets of a mesh in a .glb that plays: each takes a uniform of the vertex shader, of which WebGL2 guarantees 256.
+///
+/// - Unit: 1
+/// - Tried: 250 play in software, with 4,096 uniforms (three.js, Babylon.js)
+/// - Larger: some viewers draw nothing
+/// - Smaller: light goes straight over more of the frames
+pub(crate) const TARGETS_MAX: usize = 200;
+
+/// Most memory that a viewer may take for the colours of a .glb that plays.
+///
+/// - Unit: bytes
+/// - Tried: 293 and 610 MB, which play on a desk after 3 and 5 s
+/// - Larger: phones do not show the file
+/// - Smaller: light goes straight over more of the frames
+pub(crate) const MORPH_BYTES_MAX: u64 = 256 << 20;

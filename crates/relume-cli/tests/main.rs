@@ -3,6 +3,7 @@
 mod bench;
 mod command_line;
 mod common;
+mod export;
 mod factors;
 mod files;
 mod first_minutes;

@@ -4,4 +4,5 @@ mod automatic_views;
 mod common;
 mod gallery;
 mod pictures;
+mod recording;
 mod sky;

@@ -123,6 +123,25 @@ pub(crate) enum Shading {
     Gouraud,
 }
 
+/// `render --format`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FrameFormat {
+    /// Colours as screens show them, 8 bits.
+    Png,
+    /// OpenEXR: radiance in W/m2/sr, linear, 32 bits; layers irradiance, reflectance, normal, depth and body.
+    Exr,
+}
+
+impl FrameFormat {
+    /// Ending of the files' names.
+    pub(crate) fn ending(self) -> &'static str {
+        match self {
+            FrameFormat::Png => "png",
+            FrameFormat::Exr => "exr",
+        }
+    }
+}
+
 /// `--exposure`
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum ExposureFlag {

@@ -36,6 +36,10 @@ pub struct Snapshot {
 /// A leaf of the element forest: a convex piece of a patch with constant radiosity.
 #[derive(Clone, Copy, Debug)]
 pub struct Leaf {
+    /// Which of the facets of its patch it is a part of, from 0: triangles and quadrilaterals are one.
+    pub facet: u32,
+    /// Where it is in its facet: a one bit, then two bits for each time that it was quartered. The same in every solution.
+    pub path: u32,
     /// Corners in the patch's frame, counter-clockwise, metres; a triangle repeats its last corner.
     pub corners: [DVec2; 4],
     /// Irradiance H, W/m2, linear RGB.
@@ -47,9 +51,19 @@ pub struct Leaf {
 }
 
 impl Leaf {
+    /// How often its facet was quartered for it.
+    pub fn level(&self) -> u32 {
+        self.path.max(1).ilog2() / 2
+    }
+
+    /// Centroid in the patch's frame, metres.
+    pub fn centroid(&self) -> DVec2 {
+        crate::element::Shape { corners: self.corners, len: 4 }.centroid()
+    }
+
     /// Irradiance at a point of the patch's frame: linear over the leaf, never negative; W/m2.
     pub fn irradiance_at(&self, p: DVec2) -> [f32; 3] {
-        let d = p - crate::element::Shape { corners: self.corners, len: 4 }.centroid();
+        let d = p - self.centroid();
         let [x, y] = [d.x as f32, d.y as f32];
         let [gu, gv] = self.irradiance_gradient;
         std::array::from_fn(|c| (self.irradiance[c] + gu[c] * x + gv[c] * y).max(0.0))
@@ -105,7 +119,7 @@ pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Sna
     let SpaceState { scene, forest, .. } = &solved.space;
     let surfaces = solved.space.surfaces();
     let bends = Bends { solved, links, radiosity };
-    let of_facet = |facet: ElementId, out: &mut Vec<Leaf>| {
+    let of_facet = |number: u32, facet: ElementId, out: &mut Vec<Leaf>| {
         let material = surfaces.material(facet.0);
         let mut bent = bends.of_leaves(facet.0).into_iter();
         radiosity.irradiances(&surfaces, facet.0, &mut |id, h| {
@@ -115,6 +129,8 @@ pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Sna
             let h = h.plus(&bent.next().expect("the same leaves"));
             let irradiance = h.mean.map(|x| x.max(0.0));
             out.push(Leaf {
+                facet: number,
+                path: forest.key(ElementId(id)).path,
                 corners: forest.shape(ElementId(id)).corners,
                 irradiance,
                 irradiance_gradient: h.gradient,
@@ -127,6 +143,7 @@ pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Sna
     let of_patch = |k: usize| {
         let mut out = Vec::new();
         let mut stack = vec![forest.patch_root(PatchId(k as u32))];
+        let mut facets = 0;
         let body = scene.patches[k].body;
         if !solved.space.view.is_present(body) || scene.is_distant(body) {
             stack.clear();
@@ -134,7 +151,10 @@ pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Sna
         while let Some(id) = stack.pop() {
             match forest.kind(id) {
                 Kind::Polygon => stack.extend(forest.children(id).rev().map(ElementId)),
-                _ => of_facet(id, &mut out),
+                _ => {
+                    of_facet(facets, id, &mut out);
+                    facets += 1;
+                }
             }
         }
         out

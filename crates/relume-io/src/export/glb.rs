@@ -24,10 +24,10 @@ const CAMERA_NEAR_M: f64 = 0.01;
 /// Far plane written for orthographic cameras, metres.
 const CAMERA_FAR_M: f64 = 1000.0;
 
-const FLOAT: u32 = 5126;
-const UNSIGNED_INT: u32 = 5125;
-const ARRAY_BUFFER: u32 = 34962;
-const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+pub(super) const FLOAT: u32 = 5126;
+pub(super) const UNSIGNED_INT: u32 = 5125;
+pub(super) const ARRAY_BUFFER: u32 = 34962;
+pub(super) const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
 /// Why a scene could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -69,9 +69,13 @@ pub fn glb(scene: &Scene) -> Result<Vec<u8>, ExportError> {
     writer.meshes();
     writer.cameras();
     writer.lights();
-    writer.animation();
-    let (json, binary) = writer.finish();
-    container(&scene.name, json, binary)
+    writer.changing_emission();
+    writer.motion();
+    writer.materials = scene.materials.iter().map(material).collect();
+    if writer.materials.iter().any(|m| m.get("extensions").is_some()) {
+        writer.used.push("KHR_materials_emissive_strength");
+    }
+    writer.finish()
 }
 
 /// The file around the two chunks, each padded to four bytes.
@@ -99,23 +103,29 @@ fn container(name: &str, json: Value, mut binary: Vec<u8>) -> Result<Vec<u8>, Ex
 }
 
 /// The JSON document and the buffer as they grow.
-struct Writer<'a> {
+pub(super) struct Writer<'a> {
     scene: &'a Scene,
     binary: Vec<u8>,
     views: Vec<Value>,
     accessors: Vec<Value>,
-    meshes: Vec<Value>,
-    nodes: Vec<Map<String, Value>>,
+    pub(super) meshes: Vec<Value>,
+    pub(super) nodes: Vec<Map<String, Value>>,
     children: Vec<Vec<usize>>,
     roots: Vec<usize>,
+    pub(super) materials: Vec<Value>,
     cameras: Vec<Value>,
     lights: Vec<Value>,
-    animation: Option<Value>,
+    channels: Vec<Value>,
+    samplers: Vec<Value>,
+    /// Extensions in use.
+    pub(super) used: Vec<&'static str>,
+    /// What is said of the scene beside what the format has words for.
+    pub(super) extras: Option<Value>,
 }
 
 impl<'a> Writer<'a> {
     /// Starts with the node tree of the scene, index for index.
-    fn new(scene: &'a Scene) -> Writer<'a> {
+    pub(super) fn new(scene: &'a Scene) -> Writer<'a> {
         let mut writer = Writer {
             scene,
             binary: Vec::new(),
@@ -126,8 +136,12 @@ impl<'a> Writer<'a> {
             children: Vec::new(),
             roots: Vec::new(),
             cameras: Vec::new(),
+            materials: Vec::new(),
             lights: Vec::new(),
-            animation: None,
+            channels: Vec::new(),
+            samplers: Vec::new(),
+            used: Vec::new(),
+            extras: None,
         };
         for node in &scene.motion.nodes {
             let index = writer.add_node(node.parent.map(|p| p.0 as usize), &node.name);
@@ -137,7 +151,7 @@ impl<'a> Writer<'a> {
         writer
     }
 
-    fn add_node(&mut self, parent: Option<usize>, name: &str) -> usize {
+    pub(super) fn add_node(&mut self, parent: Option<usize>, name: &str) -> usize {
         let index = self.nodes.len();
         self.nodes.push(Map::from_iter([("name".to_owned(), json!(name))]));
         self.children.push(Vec::new());
@@ -197,7 +211,7 @@ impl<'a> Writer<'a> {
     ///
     /// The object's own node; where there is none of its name (a scene put together by hand), a
     /// new one at the origin of the body's frame.
-    fn object_node(&mut self, body: BodyId, object: &str) -> (usize, Pose) {
+    pub(super) fn object_node(&mut self, body: BodyId, object: &str) -> (usize, Pose) {
         let motion = &self.scene.motion;
         let body_node = self.scene.bodies[body.0 as usize].node;
         let carrier = motion.anchor(body_node);
@@ -239,7 +253,7 @@ impl<'a> Writer<'a> {
         })
     }
 
-    fn view(
+    pub(super) fn view(
         &mut self,
         bytes: impl IntoIterator<Item = u8>,
         target: impl Into<Option<u32>>,
@@ -255,12 +269,17 @@ impl<'a> Writer<'a> {
         self.views.len() - 1
     }
 
-    fn accessor(&mut self, accessor: Value) -> usize {
+    pub(super) fn accessor(&mut self, accessor: Value) -> usize {
         self.accessors.push(accessor);
         self.accessors.len() - 1
     }
 
-    fn vec3_accessor(&mut self, values: &[[f32; 3]], target: Option<u32>, bounds: bool) -> usize {
+    pub(super) fn vec3_accessor(
+        &mut self,
+        values: &[[f32; 3]],
+        target: Option<u32>,
+        bounds: bool,
+    ) -> usize {
         let bytes = values.iter().flatten().flat_map(|x| x.to_le_bytes());
         let view = self.view(bytes, target);
         let mut accessor = json!({
@@ -276,7 +295,7 @@ impl<'a> Writer<'a> {
         self.accessor(accessor)
     }
 
-    fn cameras(&mut self) {
+    pub(super) fn cameras(&mut self) {
         for camera in &self.scene.cameras {
             let mut value = match camera.projection {
                 Projection::Perspective { yfov, aspect } => {
@@ -309,14 +328,24 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// All tracks as one animation.
-    fn animation(&mut self) {
-        let (mut samplers, mut channels) = (Vec::new(), Vec::new());
-        let mut of = |target: Value, input, output, interpolation: &str| {
-            channels.push(json!({ "sampler": samplers.len(), "target": target }));
-            samplers
-                .push(json!({ "input": input, "output": output, "interpolation": interpolation }));
-        };
+    /// One more channel of the animation, with a sampler of its own.
+    fn channel(&mut self, target: Value, [input, output]: [usize; 2], interpolation: &str) {
+        let sampler = self.sampler([input, output], interpolation);
+        self.channel_of(target, sampler);
+    }
+
+    pub(super) fn sampler(&mut self, [input, output]: [usize; 2], interpolation: &str) -> usize {
+        self.samplers
+            .push(json!({ "input": input, "output": output, "interpolation": interpolation }));
+        self.samplers.len() - 1
+    }
+
+    pub(super) fn channel_of(&mut self, target: Value, sampler: usize) {
+        self.channels.push(json!({ "sampler": sampler, "target": target }));
+    }
+
+    /// Tracks of emissions.
+    fn changing_emission(&mut self) {
         for (pointer, track, is_colour) in self.glows() {
             let input = self.times(&track.times_s);
             let values: Vec<[f32; 3]> =
@@ -327,17 +356,20 @@ impl<'a> Writer<'a> {
             };
             let extensions = json!({ "KHR_animation_pointer": { "pointer": pointer } });
             let target = json!({ "path": "pointer", "extensions": extensions });
-            of(target, input, output, name(track.interpolation));
+            self.channel(target, [input, output], name(track.interpolation));
         }
-        let mut channel = |node: usize, path: &str, input, output, interpolation: &str| {
-            of(json!({ "node": node, "path": path }), input, output, interpolation);
-        };
-        for (index, node) in self.scene.motion.nodes.iter().enumerate() {
+    }
+
+    /// Tracks of nodes.
+    pub(super) fn motion(&mut self) {
+        let scene = self.scene;
+        for (index, node) in scene.motion.nodes.iter().enumerate() {
+            let target = |path: &str| json!({ "node": index, "path": path });
             if let Some(track) = &node.translation_track {
                 let input = self.times(&track.times_s);
                 let values: Vec<_> = track.values.iter().map(|v| v.as_vec3().to_array()).collect();
                 let output = self.vec3_accessor(&values, None, false);
-                channel(index, "translation", input, output, name(track.interpolation));
+                self.channel(target("translation"), [input, output], name(track.interpolation));
             }
             if let Some(track) = &node.rotation_track {
                 let input = self.times(&track.times_s);
@@ -347,7 +379,7 @@ impl<'a> Writer<'a> {
                     "bufferView": view, "componentType": FLOAT, "count": track.values.len(),
                     "type": "VEC4"
                 }));
-                channel(index, "rotation", input, output, name(track.interpolation));
+                self.channel(target("rotation"), [input, output], name(track.interpolation));
             }
             if !node.presence.is_empty() {
                 let times: Vec<f64> = node.presence.iter().map(|key| key.0).collect();
@@ -355,13 +387,8 @@ impl<'a> Writer<'a> {
                 let values: Vec<[f32; 3]> =
                     node.presence.iter().map(|key| [f32::from(u8::from(key.1)); 3]).collect();
                 let output = self.vec3_accessor(&values, None, false);
-                channel(index, "scale", input, output, name(Interpolation::Step));
+                self.channel(target("scale"), [input, output], name(Interpolation::Step));
             }
-        }
-        if !channels.is_empty() {
-            let name = self.scene.motion.animation.as_deref().unwrap_or("animation");
-            self.animation =
-                Some(json!({ "name": name, "channels": channels, "samplers": samplers }));
         }
     }
 
@@ -393,7 +420,7 @@ impl<'a> Writer<'a> {
         }))
     }
 
-    fn times(&mut self, times_s: &[f64]) -> usize {
+    pub(super) fn times(&mut self, times_s: &[f64]) -> usize {
         let times: Vec<f32> = times_s.iter().map(|t| *t as f32).collect();
         let view = self.view(times.iter().flat_map(|t| t.to_le_bytes()), None);
         self.accessor(json!({
@@ -402,18 +429,15 @@ impl<'a> Writer<'a> {
         }))
     }
 
-    fn finish(mut self) -> (Value, Vec<u8>) {
+    /// The bytes of the file.
+    pub(super) fn finish(mut self) -> Result<Vec<u8>, ExportError> {
         for (node, children) in self.nodes.iter_mut().zip(&self.children) {
             if !children.is_empty() {
                 node.insert("children".into(), json!(children));
             }
         }
-        let materials: Vec<Value> = self.scene.materials.iter().map(material).collect();
-        let mut used = Vec::new();
-        if materials.iter().any(|m| m.get("extensions").is_some()) {
-            used.push("KHR_materials_emissive_strength");
-        }
-        if !self.glows().is_empty() {
+        let mut used = self.used;
+        if self.channels.iter().any(|channel| channel["target"]["path"] == "pointer") {
             used.push("KHR_animation_pointer");
         }
         let mut document = Map::new();
@@ -426,6 +450,9 @@ impl<'a> Writer<'a> {
         if !self.roots.is_empty() {
             scene["nodes"] = json!(self.roots);
         }
+        if let Some(extras) = self.extras {
+            scene["extras"] = extras;
+        }
         document.insert("scenes".into(), json!([scene]));
         if !self.lights.is_empty() {
             used.push("KHR_lights_punctual");
@@ -437,6 +464,7 @@ impl<'a> Writer<'a> {
         if !self.binary.is_empty() {
             document.insert("buffers".into(), json!([{ "byteLength": self.binary.len() }]));
         }
+        let is_still = self.channels.is_empty();
         // glTF has no empty arrays.
         let mut list = |key: &str, values: Vec<Value>| {
             if !values.is_empty() {
@@ -445,13 +473,17 @@ impl<'a> Writer<'a> {
         };
         list("nodes", self.nodes.into_iter().map(Value::Object).collect());
         list("meshes", self.meshes);
-        list("materials", materials);
+        list("materials", self.materials);
         list("cameras", self.cameras);
-        list("animations", self.animation.into_iter().collect());
+        let of_motion = self.scene.motion.animation.as_deref().unwrap_or("animation");
+        let animation = json!({
+            "name": of_motion, "channels": self.channels, "samplers": self.samplers
+        });
+        list("animations", if is_still { Vec::new() } else { vec![animation] });
         list("accessors", self.accessors);
         list("bufferViews", self.views);
         list("extensionsUsed", used.into_iter().map(Value::from).collect());
-        (Value::Object(document), self.binary)
+        container(&self.scene.name, Value::Object(document), self.binary)
     }
 }
 

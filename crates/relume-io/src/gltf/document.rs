@@ -5,9 +5,10 @@
 use std::cell::OnceCell;
 use std::path::Path;
 
+use super::json;
 use super::streams::Streams;
-use super::{base64, json};
 use crate::ImportOptions;
+use crate::base64;
 use crate::folder::{Folder, read_scene};
 use crate::regular::unless_fits;
 use relume_core::scene::SceneError;

@@ -7,7 +7,6 @@ use std::path::Path;
 
 mod accessor;
 mod animation;
-mod base64;
 mod clock;
 mod component;
 mod counts;

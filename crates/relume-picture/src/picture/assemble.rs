@@ -5,6 +5,7 @@
 //! decides between equally near things: of surfaces in one plane the smaller is seen, as in the solution. It
 //! must not depend on threads.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
@@ -50,6 +51,13 @@ pub(crate) struct Linear {
     range: [[f64; 2]; 3],
 }
 
+/// What is drawn of the light on surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Quantity {
+    Radiosity,
+    Irradiance,
+}
+
 /// Everything that faces the camera, ready to be rasterised.
 #[derive(Debug, Default)]
 pub(crate) struct Drawing {
@@ -59,6 +67,8 @@ pub(crate) struct Drawing {
     /// Which patch each primitive belongs to.
     pub(crate) patches: Vec<PatchId>,
     planes: Vec<SeenPlane>,
+    /// Which plane each primitive lies in.
+    plane_of: Vec<u32>,
     /// Patches with images.
     shown: BTreeMap<PatchId, Shown>,
 }
@@ -72,13 +82,25 @@ impl Drawing {
         shading: Shading,
         outlines: bool,
     ) -> Drawing {
+        Drawing::of(Quantity::Radiosity, snapshot, (projector, grid), shading, outlines)
+    }
+
+    /// The same of a quantity; in [`Drawing::seen`] and [`Drawing::radiosity`] it takes the place of radiosity. The order of things
+    /// is the same for all quantities.
+    pub(crate) fn of(
+        quantity: Quantity,
+        snapshot: &Snapshot,
+        (projector, grid): (&Projector, &Grid),
+        shading: Shading,
+        outlines: bool,
+    ) -> Drawing {
         let near = NEAR * farthest(snapshot, projector.eye());
         let count = snapshot.scene.patches.len() as u32;
         let smooth = match shading {
             Shading::Flat => Smooth::default(),
             Shading::Gouraud => Smooth::new(snapshot),
         };
-        let shading = (shading, &smooth);
+        let shading = (shading, &smooth, quantity);
         let of_patches: Vec<Option<PatchDrawing>> = (0..count)
             .into_par_iter()
             .map(|i| {
@@ -106,6 +128,7 @@ impl Drawing {
                 drawing.primitives.push(primitive);
                 drawing.fills.push(fill);
                 drawing.patches.push(id);
+                drawing.plane_of.push(plane);
             }
         }
         drawing
@@ -118,6 +141,19 @@ impl Drawing {
             (Fill::Outline(_), _) | (_, None) => radiosity,
             (_, Some(shown)) => shown.radiosity(pixel, radiosity),
         }
+    }
+
+    /// Diffuse reflectance that is seen of a primitive at a position in pixels, linear RGB, where its patch reflects as `mean` on the
+    /// whole.
+    pub(crate) fn reflectance(&self, primitive: usize, pixel: DVec2, mean: [f64; 3]) -> [f64; 3] {
+        let shown = self.shown.get(&self.patches[primitive]);
+        shown.map_or(mean, |shown| shown.reflectance_at(pixel))
+    }
+
+    /// Depth along the view of what is seen of a primitive at a position in pixels, metres.
+    pub(crate) fn depth(&self, primitive: usize, pixel: DVec2) -> f64 {
+        let plane = &self.planes[self.plane_of[primitive] as usize];
+        plane.project(plane.unproject(pixel)).w
     }
 
     /// Radiosity of a primitive at a position in pixels, W/m2.
@@ -160,7 +196,7 @@ impl PatchDrawing {
         projector: &Projector,
         grid: &Grid,
         near: f64,
-        (shading, smooth): (Shading, &Smooth),
+        (shading, smooth, quantity): (Shading, &Smooth, Quantity),
         outlines: bool,
     ) -> Option<PatchDrawing> {
         let patch = &snapshot.scene.patches[id.0 as usize];
@@ -174,12 +210,21 @@ impl PatchDrawing {
         }
         let (u, v) = (pose.direction(patch.frame.u), pose.direction(patch.frame.v));
         let plane = SeenPlane::new(projector, origin, u, v)?;
-        let leaves = snapshot.leaves_of(id);
+        let leaves: Cow<'_, [Leaf]> = match quantity {
+            Quantity::Radiosity => snapshot.leaves_of(id).into(),
+            Quantity::Irradiance => {
+                let arriving = |leaf: &Leaf| Leaf { radiosity: leaf.irradiance, ..*leaf };
+                snapshot.leaves_of(id).iter().map(arriving).collect()
+            }
+        };
         let mut pen = Pen { plane: &plane, grid, near, corners: Vec::new() };
         let triangles = match shading {
             Shading::Flat => Vec::new(),
             Shading::Gouraud => {
                 let at_corners = smooth.of(id).map(|irradiance| {
+                    if quantity == Quantity::Irradiance {
+                        return irradiance.to_vec();
+                    }
                     let now = &snapshot.world;
                     let (exitance, reflectance) = (
                         now.exitance(&snapshot.scene, patch),
@@ -189,7 +234,7 @@ impl PatchDrawing {
                         |h: &[f64; 3]| [0, 1, 2].map(|c| exitance[c] + reflectance[c] * h[c]);
                     irradiance.iter().map(radiosity).collect::<Vec<_>>()
                 });
-                gouraud::triangulate(&patch.corners, leaves, at_corners.as_deref())
+                gouraud::triangulate(&patch.corners, &leaves, at_corners.as_deref())
             }
         };
         let mut pieces: Vec<(Primitive, Fill)> = if triangles.is_empty() {

@@ -29,6 +29,17 @@ pub(crate) struct Triangle {
     pub(crate) radiosity: [[f32; 3]; 3],
 }
 
+/// Triangles over points of one patch, with a value at each point.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Net {
+    /// Points in the patch's frame, metres.
+    pub(super) points: Vec<DVec2>,
+    /// Values at the points.
+    pub(super) values: Vec<Rgb>,
+    /// Numbers of points, counter-clockwise.
+    pub(super) triangles: Vec<[u32; 3]>,
+}
+
 /// Triangles that cover the convex polygon `corners`, which `leaves` tile; metres.
 ///
 /// `at_corners` is what the corners are to have, W/m2, where neighbours have their say: what is between changes along. Empty where
@@ -40,53 +51,62 @@ pub(crate) fn triangulate(
     leaves: &[Leaf],
     at_corners: Option<&[Rgb]>,
 ) -> Vec<Triangle> {
+    let radiosities: Vec<Rgb> = leaves.iter().map(|leaf| leaf.radiosity.map(f64::from)).collect();
+    let Net { points, values, triangles } = net(corners, leaves, &radiosities, at_corners);
+    let of = |index: [u32; 3]| Triangle {
+        corners: index.map(|i| points[i as usize]),
+        radiosity: index.map(|i| values[i as usize].map(|v| v as f32)),
+    };
+    triangles.into_iter().map(of).collect()
+}
+
+/// The same of any values of the leaves, with every point once. Points and triangles depend on `corners`, the leaves' shapes and
+/// whether there are `at_corners`, and on no value.
+pub(super) fn net(
+    corners: &[DVec2],
+    leaves: &[Leaf],
+    of_leaves: &[Rgb],
+    at_corners: Option<&[Rgb]>,
+) -> Net {
     let (low, high) =
         corners.iter().fold((corners[0], corners[0]), |(l, h), &c| (l.min(c), h.max(c)));
     let extent = (high - low).max_element();
     if !extent.is_normal() {
-        return Vec::new();
+        return Net::default();
     }
-    if let ([leaf], Some(at_corners)) = (leaves, at_corners) {
-        return fan(corners, leaf, at_corners);
+    if let ([of_leaf], Some(at_corners)) = (of_leaves, at_corners) {
+        return fan(corners, *of_leaf, at_corners);
     }
     if leaves.len() < 2 {
-        return Vec::new();
+        return Net::default();
     }
     let mut points: Vec<DVec2> = leaves.iter().map(|leaf| centroid(&leaf.corners)).collect();
     let boundary = boundary_points(corners, leaves, extent);
     points.extend(boundary.iter().map(|b| b.point));
     let sites = points.iter().enumerate().map(|(index, &p)| Site::new((p - low) / extent, index));
     let Ok(mesh) = DelaunayTriangulation::<Site>::bulk_load(sites.collect()) else {
-        return Vec::new();
+        return Net::default();
     };
-    let mut values = values(&mesh, &points, leaves, &boundary);
+    let mut values = values(&mesh, &points, of_leaves, &boundary);
     if let Some(at_corners) = at_corners {
         bend(corners, at_corners, &points, &mut values);
     }
-    let mut triangles = Vec::with_capacity(mesh.num_inner_faces());
-    for face in mesh.inner_faces() {
-        let index = face.vertices().map(|v| v.data().index as usize);
-        triangles.push(Triangle {
-            corners: index.map(|i| points[i]),
-            radiosity: index.map(|i| values[i].map(|v| v as f32)),
-        });
-    }
-    triangles
+    let triangles = mesh.inner_faces().map(|face| face.vertices().map(|v| v.data().index));
+    Net { triangles: triangles.collect(), points, values }
 }
 
 /// Triangles from the middle of a patch of one leaf to its corners; of a triangle itself.
-fn fan(corners: &[DVec2], leaf: &Leaf, at_corners: &[Rgb]) -> Vec<Triangle> {
-    let at =
-        |k: usize| (corners[k % corners.len()], at_corners[k % corners.len()].map(|b| b as f32));
-    let of = |of: [(DVec2, [f32; 3]); 3]| Triangle {
-        corners: of.map(|(corner, _)| corner),
-        radiosity: of.map(|(_, radiosity)| radiosity),
-    };
-    if corners.len() == 3 {
-        return vec![of([at(0), at(1), at(2)])];
+fn fan(corners: &[DVec2], of_leaf: Rgb, at_corners: &[Rgb]) -> Net {
+    let n = corners.len() as u32;
+    let mut net = Net { points: corners.to_vec(), values: at_corners.to_vec(), triangles: vec![] };
+    if n == 3 {
+        net.triangles.push([0, 1, 2]);
+        return net;
     }
-    let middle = (corners.iter().sum::<DVec2>() / corners.len() as f64, leaf.radiosity);
-    (0..corners.len()).map(|k| of([middle, at(k), at(k + 1)])).collect()
+    net.points.push(corners.iter().sum::<DVec2>() / f64::from(n));
+    net.values.push(of_leaf);
+    net.triangles.extend((0..n).map(|k| [n, k, (k + 1) % n]));
+    net
 }
 
 /// Moves values at points of a convex polygon so that its corners have the values given: by what the corners lack, weighed
@@ -199,14 +219,15 @@ fn boundary_points(corners: &[DVec2], leaves: &[Leaf], extent: f64) -> Vec<Bound
     points
 }
 
-/// Radiosity at all sample points: the leaves' own, then the boundary's, extrapolated.
+/// Values at all sample points: the leaves' own, then the boundary's, extrapolated.
 fn values(
     mesh: &DelaunayTriangulation<Site>,
     points: &[DVec2],
-    leaves: &[Leaf],
+    of_leaves: &[Rgb],
     boundary: &[BoundaryPoint],
 ) -> Vec<Rgb> {
-    let mut values: Vec<Rgb> = leaves.iter().map(|leaf| leaf.radiosity.map(f64::from)).collect();
+    let leaves = of_leaves;
+    let mut values = of_leaves.to_vec();
     let mut slopes = vec![Slope::default(); leaves.len()];
     for vertex in mesh.vertices() {
         let i = vertex.data().index as usize;
@@ -274,6 +295,8 @@ mod tests {
         let at = |dx, dy| DVec2::new(x + dx, y + dy);
         let value = b(at(w / 2.0, h / 2.0));
         Leaf {
+            facet: 0,
+            path: 1,
             corners: [at(0.0, 0.0), at(w, 0.0), at(w, h), at(0.0, h)],
             irradiance: [0.0; 3],
             irradiance_gradient: [[0.0; 3]; 2],
@@ -336,6 +359,8 @@ mod tests {
         let [a, b, c] = corners;
         let (ab, bc, ca) = (a.lerp(b, 0.5), b.lerp(c, 0.5), c.lerp(a, 0.5));
         let leaf = |a, b, c, value| Leaf {
+            facet: 0,
+            path: 1,
             corners: [a, b, c, c],
             irradiance: [0.0; 3],
             irradiance_gradient: [[0.0; 3]; 2],

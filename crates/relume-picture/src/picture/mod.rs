@@ -15,9 +15,12 @@
 //! | `smooth` | light at the corners of curved bodies, as neighbours have it |
 //! | `assemble` | a snapshot as an ordered list of things to draw |
 //! | `raster` | which thing each sample of each pixel sees |
+//! | `stitch` | points of neighbours on the edges of patches |
 //! | `tone` | radiosity to display values and bytes |
+//! | `layers` | what is seen as numbers, and OpenEXR files: [`Layers`] |
 //! | `exposure` | one exposure for a clip |
 //! | `sketch` | a rough picture of a scene that is not solved: [`Sketch`] |
+//! | `recording` | light at several instants on one triangulation: [`Recorder`] |
 //! | `image` | pixels and PNG files |
 
 mod assemble;
@@ -25,23 +28,28 @@ mod camera;
 mod exposure;
 mod gouraud;
 mod image;
+mod layers;
 mod outline;
 mod overview;
 mod printed;
 mod project;
 mod raster;
+mod recording;
 mod render;
 mod shading;
 mod sketch;
 mod smooth;
+mod stitch;
 mod tone;
 mod tuning;
 
 pub use camera::{View, ViewError, Viewpoint};
 pub use exposure::{Exposure, Metered};
 pub use image::{Image, WriteError, is_whole_png};
+pub use layers::{Layers, Seen, is_whole_exr, layers};
 pub use outline::Outlines;
 pub use overview::Overview;
+pub use recording::{PatchLight, Recorder, Recording};
 pub use render::{Settings, render};
 pub use shading::Shading;
 pub use sketch::Sketch;

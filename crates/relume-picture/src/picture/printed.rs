@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
-use relume_core::scene::{Frame, PatchId, Print};
+use relume_core::scene::{Frame, PatchId, Print, Printed};
 use relume_core::session::Snapshot;
 
 use super::project::SeenPlane;
@@ -46,14 +46,24 @@ impl Shown {
         })
     }
 
-    /// What is seen at a pixel, W/m2, where the patch as it was solved has this radiosity.
-    pub(super) fn radiosity(&self, pixel: DVec2, solved: [f32; 3]) -> [f32; 3] {
+    /// Diffuse reflectance at a pixel, linear RGB.
+    pub(super) fn reflectance_at(&self, pixel: DVec2) -> [f64; 3] {
+        self.at(pixel).reflectance.map(|rho| rho.min(1.0))
+    }
+
+    /// The images where a pixel sees them.
+    fn at(&self, pixel: DVec2) -> Printed {
         let at = self.plane.unproject(pixel);
         let side = |step: DVec2| -> DVec3 {
             let d = self.plane.unproject(pixel + step) - at;
             self.frame.u * d.x + self.frame.v * d.y
         };
-        let seen = self.print.at(self.frame.point(at), [side(DVec2::X), side(DVec2::Y)]);
+        self.print.at(self.frame.point(at), [side(DVec2::X), side(DVec2::Y)])
+    }
+
+    /// What is seen at a pixel, W/m2, where the patch as it was solved has this radiosity.
+    pub(super) fn radiosity(&self, pixel: DVec2, solved: [f32; 3]) -> [f32; 3] {
+        let seen = self.at(pixel);
         [0, 1, 2].map(|c| {
             let reflected = (f64::from(solved[c]) - self.exitance[c]).max(0.0);
             let share = match self.reflectance[c] > BLACK {

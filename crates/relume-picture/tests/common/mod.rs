@@ -203,19 +203,19 @@ pub(crate) fn snapshot(
     let mut leaf_offsets = vec![0];
     for patch in &scene.patches {
         let pose = world.pose(patch.body).expect("present");
-        let mut stack: Vec<([DVec2; 4], u32)> = match patch.corners[..] {
-            [a, b, c, d] => vec![([a, b, c, d], 0)],
-            [a, b, c] => vec![([a, b, c, c], 0)],
+        let mut stack: Vec<([DVec2; 4], u32, u32)> = match patch.corners[..] {
+            [a, b, c, d] => vec![([a, b, c, d], 0, 1)],
+            [a, b, c] => vec![([a, b, c, c], 0, 1)],
             _ => panic!("triangles and quadrilaterals only"),
         };
-        while let Some((c, level)) = stack.pop() {
+        while let Some((c, level, path)) = stack.pop() {
             let middle = (c[0] + c[1] + c[2] + c[3]) / 4.0;
             let centre = pose.point(patch.frame.point(middle));
             if c[2] != c[3] && refine(centre, c[0].distance(c[2]), level) {
                 for i in 0..4 {
                     let (next, previous) = (c[(i + 1) % 4], c[(i + 3) % 4]);
                     let quarter = [c[i], c[i].midpoint(next), middle, previous.midpoint(c[i])];
-                    stack.push((quarter, level + 1));
+                    stack.push((quarter, level + 1, 4 * path + i as u32));
                 }
                 continue;
             }
@@ -223,6 +223,8 @@ pub(crate) fn snapshot(
             let material = &scene.materials[patch.material.0 as usize];
             let radiosity = radiosity(centre, normal, material);
             leaves.push(Leaf {
+                facet: 0,
+                path,
                 corners: c,
                 irradiance: [0.0; 3],
                 irradiance_gradient: [[0.0; 3]; 2],

@@ -249,9 +249,12 @@ fn lit(recording: Recording, exposure: f64) -> Lit {
 fn page_view(clip: &Clip, views: &Viewing, lit: &Lit) -> Result<PageView, Failure> {
     let time_s = lit.times_s[0];
     let view = views.at_time(&clip.scene, time_s)?;
-    let (low, high) = clip.scene.bounds(time_s).unwrap_or_default();
+    let (middle, size_m) = clip
+        .scene
+        .bounds(time_s)
+        .map_or((DVec3::ZERO, 0.0), |bounds| (bounds.centre(), bounds.diagonal()));
     let Pose { rotation, translation: eye } = view.world_from_camera;
-    let ahead = (low.midpoint(high) - eye).dot(-rotation.z_axis).max(0.1 * low.distance(high));
+    let ahead = (middle - eye).dot(-rotation.z_axis).max(0.1 * size_m);
     let target = eye - ahead * rotation.z_axis;
     let up = if rotation.y_axis.y > UPRIGHT { DVec3::Y } else { rotation.y_axis };
     let (eye, yfov) = match view.projection {

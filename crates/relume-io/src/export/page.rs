@@ -47,12 +47,12 @@ pub fn page(lit: &Lit, view: PageView, exposure_ev: f64) -> io::Result<String> {
     for part in &lit.parts {
         parts.push(describe(lit, part, &mut data));
     }
-    let (low, high) = lit.scene.bounds(lit.times_s[0]).unwrap_or_default();
+    let size_m = lit.scene.bounds(lit.times_s[0]).map_or(0.0, |bounds| bounds.diagonal());
     let bodies: Vec<Value> =
         (0..lit.scene.bodies.len()).map(|k| body(lit, BodyId(k as u32))).collect();
     let scene = json!({
         "name": lit.scene.name, "times": lit.times_s, "exposure_ev": exposure_ev, "steps": STEPS,
-        "size": low.distance(high).max(f64::MIN_POSITIVE), "bodies": bodies, "parts": parts,
+        "size": size_m.max(f64::MIN_POSITIVE), "bodies": bodies, "parts": parts,
         "view": {
             "eye": view.eye.to_array(), "target": view.target.to_array(), "up": view.up.to_array(), "yfov": view.yfov
         }

@@ -33,7 +33,7 @@ pub(super) struct Between {
 
 /// Puts into the pieces the points that they lack; for each piece what was appended to its points, in their order.
 pub(super) fn stitch(scene: &Scene, time_s: f64, pieces: &mut [Piece]) -> Vec<Vec<Between>> {
-    let extent = scene.bounds(time_s).map_or(1.0, |(low, high)| low.distance(high));
+    let extent = scene.bounds(time_s).map_or(1.0, |bounds| bounds.diagonal());
     let mut grid = Grid { same: SAME * extent, cell: extent / CELLS, cells: BTreeMap::new() };
     if !extent.is_normal() {
         return vec![Vec::new(); pieces.len()];

@@ -94,10 +94,7 @@ pub fn irradiance_by_particles(
         let mut sums = vec![[0.0; 3]; sites.len()];
         let shift = random.bits() as u32 % BATCH;
         for k in 0..BATCH {
-            let mut cell = |k: u32| {
-                [(k % 8, random.unit()), (k / 8, random.unit())]
-                    .map(|(cell, within)| (f64::from(cell) + within) / 8.0)
-            };
+            let mut cell = |k: u32| in_cell(k, &mut random);
             let (from, way) = (cell(k), cell((k * 29 + shift) % BATCH));
             tracer.particle(sites, from, way, &mut random, &mut sums);
         }
@@ -128,10 +125,7 @@ pub fn arriving(world: &World, batches: u32, seed: u64) -> Vec<Estimate> {
         let mut sums = vec![[0.0; 3]; count];
         let shift = random.bits() as u32 % BATCH;
         for k in 0..BATCH {
-            let mut cell = |k: u32| {
-                [(k % 8, random.unit()), (k / 8, random.unit())]
-                    .map(|(cell, within)| (f64::from(cell) + within) / 8.0)
-            };
+            let mut cell = |k: u32| in_cell(k, &mut random);
             let (from, way) = (cell(k), cell((k * 29 + shift) % BATCH));
             let mut arrive = |polygon: usize, flux: &[f64; 3]| {
                 (0..3).for_each(|c| sums[polygon][c] += flux[c] / f64::from(BATCH));
@@ -170,6 +164,12 @@ pub fn arriving(world: &World, batches: u32, seed: u64) -> Vec<Estimate> {
         }
     };
     sums.iter().zip(&squares).map(estimate).collect()
+}
+
+/// A point in a cell of the unit square in 8 x 8.
+fn in_cell(k: u32, random: &mut Random) -> [f64; 2] {
+    [(k % 8, random.unit()), (k / 8, random.unit())]
+        .map(|(cell, within)| (f64::from(cell) + within) / 8.0)
 }
 
 /// Parts of batches that are followed beside each other.
@@ -214,10 +214,7 @@ impl<'a> Tracer<'a> {
         let shifts = [random.bits(), random.bits()].map(|b| b as u32 % BATCH);
         let lift = site.normal * (LIFT * self.world.size_m());
         for k in 0..BATCH {
-            let mut cell = |k: u32| {
-                [(k % 8, random.unit()), (k / 8, random.unit())]
-                    .map(|(cell, within)| (f64::from(cell) + within) / 8.0)
-            };
+            let mut cell = |k: u32| in_cell(k, random);
             let (way, lamp, place) =
                 (cell(k), cell((k + shifts[0]) % BATCH), cell((k * 29 + shifts[1]) % BATCH));
             let at = site.origin + site.u * place[0] + site.v * place[1] + lift;

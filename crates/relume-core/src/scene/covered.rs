@@ -53,6 +53,8 @@ pub struct Covered {
     pub parts: Vec<(Vec<DVec2>, [DVec2; 2])>,
     /// What of it lies within bodies: what that exchanges with what lies within the same body, no light does. Of one body disjoint.
     pub inside: Vec<Inside>,
+    /// Whether one thing covers it but for a thousandth, or all of it: then nothing is said of parts.
+    pub is_wholly: bool,
     /// Patches that touch it, and inner sides of what stands on it: what they exchange leaves neither. Ascending.
     pub contacts: Vec<PatchId>,
 }
@@ -62,7 +64,7 @@ impl Scene {
     /// another shows in its place ([`Sheet::lies_to`]), and where a body of polygons that look outwards, or are two-sided, stands on
     /// it or sticks in it: one that is closed but for a border in the patch's plane or behind it, so that boxes without a bottom
     /// count, all wound alike, and without lamps in it. Bodies that never move cover each other, a body that moves only itself.
-    /// Exact to a millionth of the largest coordinate. Of patches that are covered by more than 0.999 by one thing nothing is said.
+    /// Exact to a millionth of the largest coordinate. Of patches that are covered by more than 0.999 by one thing only that is said.
     /// Those that `is_displaced` names are not where the file has them: they cover themselves alone, as if they moved.
     pub fn covered(&self, solids: &Solids, is_displaced: &dyn Fn(BodyId) -> bool) -> Vec<Covered> {
         let mut out = vec![Covered::default(); self.patches.len()];
@@ -404,6 +406,7 @@ fn add(
     fresh.retain(|p| wide(p));
     let fresh_m2: f64 = fresh.iter().map(|p| Moments::of(p).area).sum();
     if fresh.is_empty() || fresh_m2 > WHOLLY * whole_m2 {
+        covered.is_wholly |= !fresh.is_empty();
         return !fresh.is_empty();
     }
     for (part, bounds) in &covered.parts {

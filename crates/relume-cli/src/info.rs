@@ -88,8 +88,8 @@ fn overview(out: &mut String, scene: &Scene) -> fmt::Result {
         Some((min, max)) => writeln!(
             out,
             "bounds     {} to {} m at the start",
-            triple(min.to_array()),
-            triple(max.to_array())
+            triple((scene.origin + min).to_array()),
+            triple((scene.origin + max).to_array())
         ),
         None => writeln!(out, "bounds     nothing is present at the start"),
     }

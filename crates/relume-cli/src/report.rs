@@ -177,9 +177,10 @@ impl SceneSummary {
             bodies: scene.bodies.len(),
             patches: scene.patches.len(),
             area_m2: scene.area_m2(),
-            bounds: scene
-                .bounds(0.0)
-                .map(|(min, max)| Bounds { min: min.to_array(), max: max.to_array() }),
+            bounds: scene.bounds(0.0).map(|bounds| {
+                let (min, max) = (scene.origin + bounds.0, scene.origin + bounds.1);
+                Bounds { min: min.to_array(), max: max.to_array() }
+            }),
             content,
         }
     }

@@ -16,6 +16,7 @@ use super::limits::{
     COORDINATE_MAX_M, EMISSION_MAX, EMISSION_MIN, EXTENT_MIN_M, SPECK, emission, is_place,
 };
 use super::names::Names;
+use super::origin;
 use super::rigid::{Rigid, check_track, without_scales};
 use super::{
     Body, BodyId, Frame, Glow, Interpolation, Material, MaterialId, Motion, NodeId, Note, Patch,
@@ -39,6 +40,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
     unique_names(&mut draft, &mut notes);
     let edits = std::mem::take(&mut draft.edits);
     edit::apply(&mut draft, &edits)?;
+    let origin = origin::bring_near(&mut draft, &mut notes);
     check_materials(&draft.materials)?;
     check_glows(&draft)?;
     check_lights(&draft)?;
@@ -73,6 +75,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
         lights: draft.lights,
         cameras: draft.cameras,
         motion,
+        origin,
         outside: None,
         outside_m: 0.0,
         environment: draft.environment,

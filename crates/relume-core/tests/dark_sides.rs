@@ -171,3 +171,20 @@ fn a_lamp_on_a_double_sided_crate_that_looks_away_leaves_it_dark() {
     let found = absorbed(&scene, &[0.0]);
     assert!(found[0].abs() < 1e-6, "{found:?}");
 }
+
+#[test]
+fn a_lamp_let_into_a_double_sided_ceiling_shines_down_and_one_below_it_does_not_shine_out() {
+    for (y, least, most) in [(2.5, 0.25, 0.9), (2.4, 0.99, 1.01)] {
+        let scene = thin_room(false, |b| {
+            let glow = b.material("glow", [0.3; 3], [10.0; 3]);
+            let node = still(b, "lamp");
+            b.cuboid(node, "lamp", glow, v(1.0, y, 1.0), v(1.2, y + 0.1, 1.2));
+        });
+        let found = absorbed(&scene, &[0.0])[0];
+        // Let in, the lower face shines into the room, 1/4 of all; the others onto its roof and away.
+        assert!((least..most).contains(&found), "{y} {found}");
+        let (session, _) = solved(scene.without_dark_sides(), &[0.0]);
+        let floor = Sensor { at: v(1.1, 1e-4, 1.1), normal: DVec3::Y };
+        assert!(session.frame().unwrap().irradiances_at(&[floor])[0][0] > 0.01);
+    }
+}

@@ -22,7 +22,7 @@ pub(super) const SKY_SHARE_ALL_ROUND: f64 = 0.25;
 /// Distance of a scene's middle from the origin, over the scene's size, from which it is moved there when it is read.
 ///
 /// - Unit: 1
-/// - Tried: 8; a room of 5 m keeps its light to 1e-4 up to a hundred times its size, and loses 1e-3 at a thousand times
+/// - Tried: 8; left where it is, a room of 5 m is as at the origin at 600 times its size, and has lost 0.37 of its light at 600,000
 /// - Larger: what is a share of the largest coordinate (one plane, one point) grows beside the scene
 /// - Smaller: scenes are moved that need not be
 pub(super) const FAR: f64 = 8.0;

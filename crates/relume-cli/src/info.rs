@@ -88,8 +88,8 @@ fn overview(out: &mut String, scene: &Scene) -> fmt::Result {
         Some(bounds) => writeln!(
             out,
             "bounds     {} to {} m at the start",
-            triple(bounds.lo.to_array()),
-            triple(bounds.hi.to_array())
+            triple((scene.origin + bounds.lo).to_array()),
+            triple((scene.origin + bounds.hi).to_array())
         ),
         None => writeln!(out, "bounds     nothing is present at the start"),
     }

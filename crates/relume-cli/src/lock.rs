@@ -43,7 +43,7 @@ impl Lock {
             let number = std::process::id().to_string();
             let written = file.set_len(0).and_then(|()| file.write_all(number.as_bytes()));
             written.map_err(|error| Failure::write(&path, &error))?;
-            remove_remains(dir, &is_of_a_run);
+            remove_remains(dir, &is_named_by_runs);
             return Ok(Lock { _file: file, path });
         }
     }
@@ -73,8 +73,12 @@ fn taken(dir: &Path, file: &mut File) -> Failure {
         .help("wait for it to end, or choose another directory with -o")
 }
 
-/// Whether a name is of a file that only runs write into their folder, which have its lock.
-fn is_of_a_run(name: &str) -> bool {
+/// Whether a path is that of a file that only runs write into their folder, which have its lock.
+pub(crate) fn is_of_a_run(path: &Path) -> bool {
+    path.file_name().and_then(|name| name.to_str()).is_some_and(is_named_by_runs)
+}
+
+fn is_named_by_runs(name: &str) -> bool {
     name == "report.json"
         || (name.starts_with("frame-") && (name.ends_with(".png") || name.ends_with(".exr")))
 }

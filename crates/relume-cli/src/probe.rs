@@ -89,7 +89,7 @@ impl Rider<'_> {
 
 fn riders<'a>(scene: &Scene, path: &Path, sensors: &'a Sensors) -> Result<Vec<Rider<'a>>, Failure> {
     let rider = |entry: &'a Entry| {
-        let world = Sensor { at: entry.at, normal: entry.normal };
+        let world = Sensor { at: entry.at - scene.origin, normal: entry.normal };
         let Some(name) = &entry.body else { return Ok(Rider { entry, body: None, local: world }) };
         let Some(index) = scene.bodies.iter().position(|b| b.name == *name) else {
             let what = format!("there is no body `{name}` in the scene");
@@ -201,7 +201,10 @@ fn frames(
         estimates.of(solved(session), frame, Some(&sensors));
         for ((rider, sensor), e) in here.iter().zip(found) {
             let mut row = vec![frame.to_string(), rider.entry.name.clone()];
-            let place = sensor.at.to_array().into_iter().chain(sensor.normal.to_array());
+            let place = (clip.scene.origin + sensor.at)
+                .to_array()
+                .into_iter()
+                .chain(sensor.normal.to_array());
             row.extend(place.map(short));
             row.extend(e.map(|e| (e as f32).to_string()));
             table.write_record(&row).map_err(Failure::new)?;

@@ -177,9 +177,10 @@ impl SceneSummary {
             bodies: scene.bodies.len(),
             patches: scene.patches.len(),
             area_m2: scene.area_m2(),
-            bounds: scene
-                .bounds(0.0)
-                .map(|bounds| Bounds { min: bounds.lo.to_array(), max: bounds.hi.to_array() }),
+            bounds: scene.bounds(0.0).map(|bounds| {
+                let (min, max) = (scene.origin + bounds.lo, scene.origin + bounds.hi);
+                Bounds { min: min.to_array(), max: max.to_array() }
+            }),
             content,
         }
     }

@@ -28,7 +28,7 @@ use crate::failure::Failure;
 use crate::frames;
 use crate::interrupt;
 use crate::light;
-use crate::lock::Lock;
+use crate::lock::{self, Lock};
 use crate::memory;
 use crate::output::{self, count, counted};
 use crate::preview::{self, Meanwhile, PATIENCE};
@@ -122,7 +122,7 @@ impl Job {
         if let Some(dir) = &self.dir {
             make_directory(dir)?;
         }
-        let _lock = self.dir.as_deref().map(Lock::take).transpose()?;
+        let _locks = self.locks()?;
         if let (true, Some(dir), Some(views), Some((_, flags))) =
             (self.preview, &self.dir, &views, &self.picture)
         {
@@ -253,6 +253,20 @@ impl Job {
         let picture =
             Meanwhile::new(of, (view, preview::settings(flags)), (path.clone(), patience), say);
         Ok(Some((picture, path)))
+    }
+
+    /// The locks of the folders that are this run's alone while it goes: that of the pictures, and one in which a report by the name
+    /// that runs give theirs is written.
+    fn locks(&self) -> Result<Vec<Lock>, Failure> {
+        let beside = self.solve.report.as_deref().filter(|path| lock::is_of_a_run(path));
+        let beside = beside.map(|path| match path.parent() {
+            Some(dir) if dir != Path::new("") => dir,
+            _ => Path::new("."),
+        });
+        let of = |dir: Option<&Path>| dir.and_then(|dir| fs::canonicalize(dir).ok());
+        // A folder that is not there is said when the report is written.
+        let beside = beside.filter(|dir| dir.is_dir() && of(Some(dir)) != of(self.dir.as_deref()));
+        self.dir.as_deref().into_iter().chain(beside).map(Lock::take).collect()
     }
 
     /// Where the report goes.

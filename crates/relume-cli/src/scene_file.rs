@@ -72,6 +72,7 @@ pub(crate) fn load(
         max_memory_bytes,
         rebuild,
         edits,
+        near_origin: true,
     };
     let scene = import(path, &options).map_err(failure)?;
     memory::at(format_args!("preparing {}", path.display()));

@@ -117,10 +117,10 @@ impl Viewing {
     pub(crate) fn new(scene: &Scene, flags: &ViewFlags) -> Result<Viewing, Failure> {
         let bounds = scene.bounds(0.0).unwrap_or(Aabb { lo: DVec3::ZERO, hi: DVec3::ZERO });
         let middle = bounds.centre();
-        let look_at = flags.look_at.map_or(middle, |triple| triple.0);
+        let look_at = flags.look_at.map_or(middle, |triple| triple.0 - scene.origin);
         let up = flags.up.map_or(DVec3::Y, |triple| triple.0);
         let viewpoint = match (flags.eye, flags.overview) {
-            (Some(Triple(eye)), _) => Viewpoint::Fixed(from(eye, look_at, up)?),
+            (Some(Triple(eye)), _) => Viewpoint::Fixed(from(eye - scene.origin, look_at, up)?),
             (None, true) => Viewpoint::Fixed(View::automatic(scene)),
             (None, false) => {
                 Viewpoint::new(scene, flags.camera.as_deref()).map_err(Failure::new)?

@@ -299,3 +299,32 @@ fn twenty_pairs_of_runs() {
     }
     println!("20 pairs: one run refused in each; the one that was started first won {first}");
 }
+
+#[test]
+fn a_report_is_not_put_where_another_run_writes_its_own() {
+    let (dir, scene) = room();
+    let out = dir.path().join("out");
+    fs::create_dir(&out).unwrap();
+    // As a render holds it.
+    let lock = fs::File::create(out.join(".relume.lock")).unwrap();
+    lock.lock().unwrap();
+    let (report, other) = (out.join("report.json"), out.join("numbers.json"));
+    let solve = |report: &Path| {
+        relume(&[
+            "solve",
+            text(&scene),
+            "--frames",
+            "0",
+            "--tolerance",
+            "0.1",
+            "--report",
+            text(report),
+        ])
+    };
+    solve(&report).fails(1, &["is writing to", "out"]);
+    assert!(!report.exists());
+    solve(&other).succeeds();
+    drop(lock);
+    solve(&report).succeeds();
+    assert!(report.exists());
+}

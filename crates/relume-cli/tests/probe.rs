@@ -144,3 +144,54 @@ fn a_sensor_inside_a_body_is_an_error_and_one_that_is_run_over_a_warning() {
     let e: Vec<f64> = rows(&ran.out).iter().map(|r| number(&r[8])).collect();
     assert!(e[0] < 1e-6 && e[1] > 0.1, "{e:?}");
 }
+
+/// A .glb with everything below one node more, at a place.
+fn moved(scene: &Path, to: [f64; 3]) -> Vec<u8> {
+    let bytes = fs::read(scene).unwrap();
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let mut json: serde_json::Value = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
+    let roots = json["scenes"][0]["nodes"].clone();
+    let nodes = json["nodes"].as_array_mut().unwrap();
+    let number = nodes.len();
+    nodes.push(serde_json::json!({ "name": "away", "children": roots, "translation": to }));
+    json["scenes"][0]["nodes"] = serde_json::json!([number]);
+    let mut text = json.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let rest = &bytes[20 + length..];
+    let mut out = bytes[..8].to_vec();
+    out.extend(((20 + text.len() + rest.len()) as u32).to_le_bytes());
+    out.extend((text.len() as u32).to_le_bytes());
+    out.extend(b"JSON");
+    out.extend(text);
+    out.extend(rest);
+    out
+}
+
+#[test]
+fn at_map_coordinates_it_reads_what_it_does_at_the_origin() {
+    let (dir, near) = room();
+    let away = [500_000.0, 128.0, -5_500_000.0];
+    let far = dir.path().join("far.glb");
+    fs::write(&far, moved(&near, away)).unwrap();
+    let read = |scene: &Path, at: [f64; 3]| {
+        let sensors = dir.path().join("sensors.csv");
+        let place = |p: [f64; 3]| format!("{},{},{}", at[0] + p[0], at[1] + p[1], at[2] + p[2]);
+        let (rests, rides) = (place([0.0, 0.5, 0.0]), place([1.5, 2.5, 0.0]));
+        let lines =
+            format!("name,x,y,z,nx,ny,nz,body\nrests,{rests},0,1,0,\nrides,{rides},0,1,0,lamp\n");
+        fs::write(&sensors, lines).unwrap();
+        let arguments = ["probe", text(scene), text(&sensors), "--frames", "0-6x3"];
+        rows(&relume(&arguments).succeeds().out)
+    };
+    let (here, there) = (read(&near, [0.0; 3]), read(&far, away));
+    assert_eq!(here.len(), there.len());
+    for (here, there) in here.iter().zip(&there) {
+        for k in 2..11 {
+            let (here, there) = (number(&here[k]), number(&there[k]));
+            let away = if k < 5 { away[k - 2] } else { 0.0 };
+            assert!((there - away - here).abs() <= 1e-3 * here.abs() + 1e-6, "{here} {there}");
+        }
+    }
+    relume(&["info", text(&far)]).says(&["bounds     (49999"]);
+    relume(&["check", text(&far)]).succeeds();
+}

@@ -3,6 +3,8 @@
 use glam::{DQuat, DVec3};
 use relume_core::scene::{Interpolation, LightKind, Scene, SceneBuilder, Track};
 use relume_core::session::{Options, Oracle, Session, Update};
+
+use crate::common::{at_tolerance, solved, still, v};
 use std::sync::Arc;
 
 fn track(values: &[f64], colour: [f64; 3], interpolation: Interpolation) -> Track {
@@ -221,5 +223,41 @@ fn links_depend_neither_on_the_unit_of_light_nor_on_what_is_absent() {
         assert_eq!(hash, links(plate(1.0 / 1024.0, away_m, 0.0)), "{away_m} m");
         assert_eq!(hash, links(plate(1024.0, away_m, 0.0)), "{away_m} m");
         assert_eq!(hash, links(plate(1.0, away_m, 1e6)), "{away_m} m");
+    }
+}
+
+#[test]
+fn what_lies_wholly_under_another_lamp_emits_nothing_in_the_balance() {
+    let mut b = SceneBuilder::new("two lamps");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let [one, two] = [20.0, 40.0].map(|m| b.material(&format!("glow {m}"), [0.3; 3], [m; 3]));
+    let node = still(&mut b, "room");
+    b.cuboid_inward(node, "room", grey, DVec3::ZERO, v(3.0, 2.5, 3.0));
+    for (name, glow) in [("lamp", one), ("lamp 2", two)] {
+        let node = still(&mut b, name);
+        b.cuboid(node, name, glow, v(1.0, 2.2, 1.0), v(1.4, 2.3, 1.4));
+    }
+    let (_, report) = solved(b.build().unwrap(), at_tolerance(0.05));
+    let energy = report.energy.unwrap();
+    let emitted_w = 3.0 * 20.0 * (2.0 * 0.16 + 4.0 * 0.04);
+    assert!((energy.emitted_w / emitted_w - 1.0).abs() < 1e-6, "{energy:?}");
+    assert!((energy.absorbed_w / emitted_w - 1.0).abs() < 0.01, "{energy:?}");
+    assert!(energy.unbalanced() < 0.01, "{energy:?}");
+}
+
+#[test]
+fn lamps_too_dim_to_compute_with_count_as_none_and_dim_ones_are_solved() {
+    for (exitance, counts) in [(3e-44, false), (1e-29, true)] {
+        let mut b = SceneBuilder::new("dim");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let glow = b.material("glow", [0.3; 3], [exitance; 3]);
+        let node = still(&mut b, "room");
+        b.cuboid_inward(node, "room", grey, DVec3::ZERO, v(3.0, 2.5, 3.0));
+        b.cuboid(node, "lamp", glow, v(1.0, 2.2, 1.0), v(1.4, 2.3, 1.4));
+        let scene = b.build().unwrap();
+        assert_eq!(scene.notes.iter().any(|n| n.code == "too-dim"), !counts);
+        let energy = solved(scene, at_tolerance(0.05)).1.energy.unwrap();
+        assert_eq!(energy.emitted_w > 0.0, counts);
+        assert!(energy.unbalanced() < 0.01, "{exitance:e} {energy:?}");
     }
 }

@@ -23,6 +23,7 @@ mod lights;
 mod limits;
 mod memory;
 mod monte_carlo;
+mod origin;
 mod outside;
 mod parts;
 mod prediction;

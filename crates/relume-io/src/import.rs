@@ -47,7 +47,8 @@ pub fn import(path: impl AsRef<Path>, options: &ImportOptions) -> Result<Scene, 
         };
     }
     let draft = gltf::draft(path, options)?;
-    Scene::from_draft(Draft { edits: options.edits.clone(), ..draft })
+    let edits = options.edits.clone();
+    Scene::from_draft(Draft { edits, near_origin: options.near_origin, ..draft })
 }
 
 fn no_animation(name: &str, format: &str) -> SceneError {

@@ -5,7 +5,7 @@
 
 use std::io::{BufRead, Write};
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use relume_core::geometry::Pose;
@@ -203,6 +203,14 @@ fn turn_back(
     Ok(true)
 }
 
+/// A pose of a body where all places are told from another origin, which lies at `-by`.
+fn moved(scene: &Scene, body: BodyId, pose: &Pose, by: DVec3) -> Pose {
+    // That of a body that rests is from where it is in the file: its corners are told from another origin too.
+    let moves = scene.bodies.get(body.0 as usize).is_some_and(|_| scene.moves(body));
+    let own = if moves { DVec3::ZERO } else { pose.rotation * by };
+    Pose { rotation: pose.rotation, translation: pose.translation + by - own }
+}
+
 impl Entry {
     /// What a log says of a command; nothing of one that puts back.
     fn of(scene: &Scene, command: &Command) -> Option<Entry> {
@@ -214,9 +222,10 @@ impl Entry {
             Command::SetTime(to) => Entry::SetTime { to: *to },
             Command::SetPose(id, to) => Entry::SetPose {
                 body: body(id).unwrap_or_default(),
-                to: to.map(|pose| Placed {
-                    axes: pose.rotation.to_cols_array_2d(),
-                    translation: pose.translation.to_array(),
+                to: to.map(|pose| {
+                    let pose = moved(scene, *id, &pose, scene.origin);
+                    let axes = pose.rotation.to_cols_array_2d();
+                    Placed { axes, translation: pose.translation.to_array() }
                 }),
             },
             Command::SetPresence(id, to) => {
@@ -255,13 +264,15 @@ impl Entry {
         };
         Ok(match self {
             Entry::SetTime { to } => Command::SetTime(*to),
-            Entry::SetPose { body: name, to } => Command::SetPose(
-                body(name)?,
-                to.map(|Placed { axes, translation }| Pose {
-                    rotation: DMat3::from_cols_array_2d(&axes),
-                    translation: translation.into(),
-                }),
-            ),
+            Entry::SetPose { body: name, to } => {
+                let body = body(name)?;
+                let pose = |Placed { axes, translation }| {
+                    let rotation = DMat3::from_cols_array_2d(&axes);
+                    let pose = Pose { rotation, translation: translation.into() };
+                    moved(scene, body, &pose, -scene.origin)
+                };
+                Command::SetPose(body, to.map(pose))
+            }
             Entry::SetPresence { body: name, to } => Command::SetPresence(body(name)?, *to),
             Entry::SetReflectance { material: name, to } => {
                 Command::SetReflectance(material(name)?, *to)

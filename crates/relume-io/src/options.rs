@@ -20,6 +20,10 @@ pub struct ImportOptions {
     pub rebuild: Option<Instants>,
     /// What of the scene is changed before it is built.
     pub edits: Edits,
+    /// Whether a scene that lies far from the origin, by several times its size, is moved there: all of its coordinates, and
+    /// those of sensors and poses, are then from [`Scene::origin`](relume_core::scene::Scene::origin) on. Left where it is, what is
+    /// close by counts as one there, with a warning.
+    pub near_origin: bool,
 }
 
 /// Frames of an animation.

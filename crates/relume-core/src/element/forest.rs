@@ -357,6 +357,11 @@ impl Forest {
         self.covered_of(self.patch(id).expect("an element has a patch"))
     }
 
+    /// Whether one thing covers the whole patch of an element ([`Covered::is_wholly`]).
+    pub fn is_wholly_covered(&self, id: ElementId) -> bool {
+        self.covered(id).is_wholly
+    }
+
     /// Covered parts of a patch.
     #[inline]
     fn covered_of(&self, patch: PatchId) -> &Covered {

@@ -12,8 +12,11 @@ use glam::{DMat3, DVec2, DVec3};
 use super::draft::{Draft, DraftNode, DraftSurface};
 use super::edit;
 use super::flatten::{Flaw, flatten, seen_from_behind};
-use super::limits::{COORDINATE_MAX_M, EMISSION_MAX, EXTENT_MIN_M, SPECK, is_place};
+use super::limits::{
+    COORDINATE_MAX_M, EMISSION_MAX, EMISSION_MIN, EXTENT_MIN_M, SPECK, emission, is_place,
+};
 use super::names::Names;
+use super::origin;
 use super::rigid::{Rigid, check_track, without_scales};
 use super::{
     Body, BodyId, Frame, Glow, Interpolation, Material, MaterialId, Motion, NodeId, Note, Patch,
@@ -37,10 +40,11 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
     unique_names(&mut draft, &mut notes);
     let edits = std::mem::take(&mut draft.edits);
     edit::apply(&mut draft, &edits)?;
+    let origin = origin::bring_near(&mut draft, &mut notes);
     check_materials(&draft.materials)?;
     check_glows(&draft)?;
     check_lights(&draft)?;
-    start_glows(&mut draft);
+    start_glows(&mut draft, &mut notes);
     let Rigid { nodes, residuals, held } = without_scales(&draft)?;
     let duration_s = duration_s(&draft);
     let motion = Motion { duration_s, nodes, animation: draft.animation.clone() };
@@ -71,6 +75,7 @@ pub(super) fn assemble(mut draft: Draft) -> Result<Scene, SceneError> {
         lights: draft.lights,
         cameras: draft.cameras,
         motion,
+        origin,
         outside: None,
         outside_m: 0.0,
         environment: draft.environment,
@@ -433,13 +438,22 @@ fn check_glows(draft: &Draft) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// What is stated without a time is stated of time 0.
-fn start_glows(draft: &mut Draft) {
+/// What is stated without a time is stated of time 0; what is too little to count is none, with a note.
+fn start_glows(draft: &mut Draft, notes: &mut Vec<Note>) {
+    let mut start = |name: &str, of: &mut [f64; 3]| {
+        let counts = emission(*of);
+        if counts == [0.0; 3] && *of != counts {
+            notes.push(dim_note(name));
+        }
+        *of = counts;
+    };
     for material in &mut draft.materials {
         material.exitance = material.exitance_at(0.0);
+        start(&material.name, &mut material.exitance);
     }
     for light in &mut draft.lights {
         light.intensity = light.intensity_at(0.0);
+        start(&light.name, &mut light.intensity);
     }
 }
 
@@ -540,6 +554,19 @@ fn degenerate_note(surface: &str, count: usize) -> Note {
         subject: surface.to_owned(),
         count,
         message: format!("{count} polygons without area were left out"),
+    }
+}
+
+fn dim_note(name: &str) -> Note {
+    let message = format!(
+        "what it emits is below {EMISSION_MIN:e} W/m2 (a light: W/sr) and counts as nothing"
+    );
+    Note {
+        severity: Severity::Warning,
+        code: "too-dim",
+        subject: name.to_owned(),
+        count: 1,
+        message,
     }
 }
 

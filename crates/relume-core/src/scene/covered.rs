@@ -45,6 +45,8 @@ pub struct Covered {
     pub parts: Vec<(Vec<DVec2>, [DVec2; 2])>,
     /// What of it lies within bodies or narrow gaps: what that exchanges with what lies within the same one, no light does. Of one disjoint.
     pub inside: Vec<Inside>,
+    /// Whether one thing covers it but for a thousandth, or all of it: then nothing is said of parts.
+    pub is_wholly: bool,
     /// Patches that touch it, and inner sides of what stands on it: what they exchange leaves neither. Ascending.
     pub contacts: Vec<PatchId>,
 }
@@ -54,7 +56,7 @@ impl Scene {
     /// another shows in its place ([`Sheet::lies_to`]), and where a body of polygons that look outwards, or are two-sided, stands on
     /// it or sticks in it: one that is closed but for a border in the patch's plane or behind it, so that boxes without a bottom
     /// count, all wound alike, and without lamps in it; and what lies in narrow gaps (`scene/gap.rs`). Bodies that never move cover each other, a body that moves only itself.
-    /// Exact to a millionth of the largest coordinate. Of patches that are covered by more than 0.999 by one thing nothing is said.
+    /// Exact to a millionth of the largest coordinate. Of patches that are covered by more than 0.999 by one thing only that is said.
     /// Those that `is_displaced` names are not where the file has them: they cover themselves alone, as if they moved.
     pub fn covered(&self, solids: &Solids, is_displaced: &dyn Fn(BodyId) -> bool) -> Vec<Covered> {
         let mut out = vec![Covered::default(); self.patches.len()];
@@ -159,20 +161,29 @@ impl Lamps {
         self.lights.iter().chain(self.patches.iter().map(|p| &p.1)).any(|lamp| lamp.meets(bounds))
     }
 
-    /// Whether a lamp is or may get among the polygons of a body; touching is not enough. An inner side that emits counts.
+    /// Whether a lamp is or may get among the polygons of a body. An inner side that emits counts; touching is enough where they are
+    /// two-sided and it may look in: a lamp that lies flush in a ceiling.
     fn may_be_in(&self, scene: &Scene, (placed, hull): (&[Placed], &Hull), slack_m: f64) -> bool {
         let own = |id: PatchId, of: &[usize]| of.iter().any(|&k| placed[k].id == id);
+        let is_two_sided = !hull.twins.is_empty();
         let body = scene.patches[placed[hull.polygons[0]].id.0 as usize].body;
         let bounds = way(scene, body, &hull.bounds, scene.motion.span_s());
-        let within = |lamp: &Aabb| {
-            let lamp = lamp.grown(2.0 * slack_m);
+        let within = |lamp: &Aabb, touching: bool| {
+            let [by, before] = if touching { [4.0, 2.0] } else { [2.0, 4.0] };
+            let lamp = lamp.grown(by * slack_m);
             let least = bounds.lo.max(lamp.lo).cmplt(bounds.hi.min(lamp.hi) - 3.0 * slack_m);
-            least.all() && (scene.moves(body) || !hull.is_before(placed, &lamp, 4.0 * slack_m))
+            least.all() && (scene.moves(body) || !hull.is_before(placed, &lamp, before * slack_m))
         };
-        self.lights.iter().any(within)
-            || self.patches.iter().any(|(id, lamp)| {
-                within(lamp) && (!own(*id, &hull.polygons) || own(*id, &hull.twins))
-                    || !hull.twins.is_empty() && own(*id, &hull.polygons)
+        // Of those in the same frame it is known how they lie.
+        let there = |id: PatchId| placed.binary_search_by_key(&id, |p| p.id).ok();
+        let shines_in = |id: PatchId, lamp: &Aabb| match there(id) {
+            Some(k) => within(lamp, false) || hull.is_lit_by(placed, &placed[k], slack_m),
+            None => within(lamp, is_two_sided),
+        };
+        self.lights.iter().any(|light| within(light, is_two_sided))
+            || self.patches.iter().any(|(id, lamp)| match own(*id, &hull.polygons) {
+                true => is_two_sided,
+                false => shines_in(*id, lamp),
             })
     }
 }
@@ -423,6 +434,19 @@ impl Hull {
         self.is_convex && self.polygons.iter().any(|&k| before(&placed[k]))
     }
 
+    /// Whether a lamp lies flush on one of its polygons and may shine through that to where they look away from: two-sided polygons
+    /// hide nothing of one that lies in their place. Of a body that is not convex it is not known which way that is.
+    pub(super) fn is_lit_by(&self, placed: &[Placed], lamp: &Placed, slack_m: f64) -> bool {
+        let is_flush = |wall: &Placed| {
+            let height = |c: DVec3| (c - wall.corners[0]).dot(wall.normal);
+            wall.bounds.grown(ABOVE * slack_m).meets(&lamp.bounds)
+                && lamp.corners.iter().all(|&c| height(c).abs() <= ABOVE * slack_m)
+        };
+        let looks_out = |wall: &Placed| self.is_convex && wall.normal.dot(lamp.normal) > 0.0;
+        let mut walls = self.polygons.iter().map(|&k| &placed[k]);
+        !self.twins.is_empty() && walls.any(|wall| is_flush(wall) && !looks_out(wall))
+    }
+
     /// Whether a patch of the group is one of its own.
     pub(super) fn holds(&self, k: usize) -> bool {
         self.polygons.binary_search(&k).is_ok() || self.twins.binary_search(&k).is_ok()
@@ -443,6 +467,7 @@ fn add(
     fresh.retain(|p| wide(p));
     let fresh_m2: f64 = fresh.iter().map(|p| Moments::of(p).area).sum();
     if fresh.is_empty() || fresh_m2 > COVERED_WHOLLY * whole_m2 {
+        covered.is_wholly |= !fresh.is_empty();
         return !fresh.is_empty();
     }
     for (part, bounds) in &covered.parts {

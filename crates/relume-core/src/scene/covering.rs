@@ -182,24 +182,27 @@ impl Covering {
     ) -> bool {
         let Pair { scene, now, polygons, bodies: [one, _] } = *pair;
         let glows = |id: PatchId| now.glows[id.0 as usize];
-        let within = |what: &Aabb| {
-            let what = what.grown(2.0 * slack_m);
+        let is_two_sided = !hull.twins.is_empty();
+        let within = |what: &Aabb, touching: bool| {
+            let [by, before] = if touching { [4.0, 2.0] } else { [2.0, 4.0] };
+            let what = what.grown(by * slack_m);
             let inner = bounds.hi.min(what.hi) - 3.0 * slack_m;
             bounds.lo.max(what.lo).cmplt(inner).all()
-                && !hull.is_before(polygons, &what, 4.0 * slack_m)
+                && !hull.is_before(polygons, &what, before * slack_m)
         };
-        let is_two_sided = !hull.twins.is_empty();
+        let shines_in =
+            |lamp: &Placed| within(&lamp.bounds, false) || hull.is_lit_by(polygons, lamp, slack_m);
         let own = |(k, polygon): (usize, &Placed)| match hull.holds(k) {
             true => is_two_sided && glows(polygon.id),
-            false => glows(polygon.id) && within(&polygon.bounds),
+            false => glows(polygon.id) && shines_in(polygon),
         };
         polygons.iter().enumerate().any(own)
-            || now.lights.iter().any(within)
+            || now.lights.iter().any(|light| within(light, is_two_sided))
             || present.iter().filter(|third| third.body != one.body).any(|third| {
                 let shines = |(id, patch): (PatchId, &Patch)| {
-                    glows(id) && within(&Placed::new(id, patch, &third.pose).bounds)
+                    glows(id) && shines_in(&Placed::new(id, patch, &third.pose))
                 };
-                within(&third.bounds) && scene.patches_of(third.body).any(shines)
+                within(&third.bounds, is_two_sided) && scene.patches_of(third.body).any(shines)
             })
     }
 }

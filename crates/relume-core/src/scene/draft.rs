@@ -35,6 +35,8 @@ pub struct Draft {
     pub notes: Vec<Note>,
     /// What is to be changed before anything is checked.
     pub edits: Edits,
+    /// Whether a scene that lies far from the origin, by several times its size, is moved there ([`Scene::origin`](super::Scene::origin)).
+    pub near_origin: bool,
 }
 
 /// Changes to a scene before it is built, in this order: nodes are hidden, then materials changed; of

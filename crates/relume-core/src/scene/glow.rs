@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::limits::emission;
 use super::{Interpolation, Light, Material, Track};
 
 /// How an emission changes over time: `scale` times the values of all tracks, channel by channel, and never below 0
@@ -19,7 +20,7 @@ impl Glow {
     pub fn at(&self, time_s: f64) -> [f64; 3] {
         let scale = DVec3::from_array(self.scale);
         let value = self.tracks.iter().fold(scale, |value, track| value * track.at(time_s));
-        value.max(DVec3::ZERO).to_array()
+        emission(value.max(DVec3::ZERO).to_array())
     }
 
     /// The most that each channel may be at any time: a bound, which cubic splines need not reach.

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::builder::SceneBuilder;
 use super::{
-    Body, BodyId, Material, MaterialId, Node, NodeId, Patch, PatchId, Scene, SceneError, Surface,
-    SurfaceId,
+    Body, BodyId, Frame, Material, MaterialId, Node, NodeId, Patch, PatchId, Scene, SceneError,
+    Surface, SurfaceId,
 };
 
 /// A body to be inserted into a scene: meshes with materials of that scene.
@@ -110,7 +110,7 @@ impl Scene {
         ids.find(|&id| self.bodies[id.0 as usize].name == name && self.has_body(id))
     }
 
-    /// The same scene with one body more, at the origin of the world, and the id of that body.
+    /// The same scene with one body more, at the origin of the world (of the file: [`Scene::origin`]), and the id of that body.
     ///
     /// # Errors
     /// What [`SceneBuilder::build`] would say of the body.
@@ -150,6 +150,7 @@ impl Scene {
             body: id,
             surface: SurfaceId(first_surface + patch.surface.0),
             twin: patch.twin.map(|twin| PatchId(first + twin.0)),
+            frame: Frame { origin: patch.frame.origin - self.origin, ..patch.frame },
             ..patch
         }));
         scene.edited.insert(id, corners(&scene.patches[first as usize..]));

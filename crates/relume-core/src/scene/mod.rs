@@ -37,6 +37,7 @@ pub mod limits;
 pub mod merge;
 mod motion;
 pub mod names;
+mod origin;
 pub mod outside;
 pub mod print;
 pub mod pyramid;
@@ -118,6 +119,9 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// The node tree and its animation.
     pub motion: Motion,
+    /// Where the origin of all its coordinates lies in those of its file, metres: 0 unless it was read near the origin
+    /// ([`draft::Draft::near_origin`]) and lies far from it.
+    pub origin: DVec3,
     /// The light from outside that distant bodies stand for ([`Scene::with_outside`]).
     pub outside: Option<Arc<outside::Outside>>,
     /// How far away these bodies are, metres; 0 where there are none.

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::inside::solid_angle;
 use super::topology::{Polygon, Side, components, grouped, matched, sides_of};
 use super::weld::Weld;
-use super::{BodyId, PatchId, Scene};
+use super::{BodyId, Patch, PatchId, Scene};
 use crate::geometry::{Aabb, Plane};
 use crate::scene::tuning::{SHELL_LOOKS_MAX, SHELL_PIECES_MAX};
 
@@ -51,6 +51,7 @@ pub(super) struct Face {
     pub(super) patch: PatchId,
     /// Whether the patch looks out of the shell; otherwise it looks in.
     pub(super) outwards: bool,
+    is_two_sided: bool,
     /// Counter-clockwise seen from outside.
     pub(super) corners: Vec<DVec3>,
     /// Outwards.
@@ -109,7 +110,8 @@ impl Scene {
             }
             let plane = Plane::through(p.frame.origin, normal);
             let bounds = Aabb::of(corners.iter().copied());
-            Face { patch, outwards: !member.turned, corners, plane, bounds }
+            let (outwards, is_two_sided) = (!member.turned, p.twin.is_some());
+            Face { patch, outwards, is_two_sided, corners, plane, bounds }
         };
         let mut faces: Vec<Face> = group.iter().map(face).collect();
         let origin = faces[0].corners[0];
@@ -121,11 +123,10 @@ impl Scene {
         if volume < 0.0 {
             faces.iter_mut().for_each(Face::turn);
         }
-        let two_sided = |f: &Face| self.patches[f.patch.0 as usize].twin.is_some();
         let bounds = faces.iter().fold(Aabb::EMPTY, |b, f| b.union(f.bounds));
         let corners = faces.iter().map(|f| f.corners.len()).sum();
         let shell = Shell { faces, bounds, tolerance: weld.tolerance, corners };
-        let looks_out = shell.faces.iter().all(|f| f.outwards || two_sided(f));
+        let looks_out = shell.faces.iter().all(|f| f.outwards || f.is_two_sided);
         (looks_out && !shell.crosses_itself(effort)).then_some(shell)
     }
 }
@@ -282,6 +283,19 @@ impl Shell {
             }
         }
         false
+    }
+
+    /// Whether a patch of the same frame lies flush in a double-sided face and looks to the inside.
+    pub(super) fn is_looked_into(&self, patch: &Patch) -> bool {
+        let corners: Vec<DVec3> = patch.corners_in_body().collect();
+        let bounds = Aabb::of(corners.iter().copied());
+        meet(&self.bounds, &bounds, self.tolerance)
+            && self.faces.iter().any(|face| {
+                face.is_two_sided
+                    && face.plane.normal.dot(patch.frame.normal) < -0.5
+                    && meet(&face.bounds, &bounds, self.tolerance)
+                    && corners.iter().all(|&c| face.plane.distance(c).abs() <= self.tolerance)
+            })
     }
 
     /// Winding number of the shell about a point: 1 inside, 1/2 on a face, 0 outside.

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::shell;
+use super::shell::{self, Effort};
 use super::topology::Polygon;
 use super::weld::Weld;
 use super::{BodyId, Scene};
@@ -79,7 +79,37 @@ impl Scene {
             list: Vec::new(),
         };
         (0..self.bodies.len() as u32).for_each(|body| self.add_solids(BodyId(body), &mut out));
+        self.open_let_in_lamps(&mut out.enclosures);
         out
+    }
+
+    /// Faces of bodies that emit, lie flush in a closed double-sided surface and look into it (a lamp let into a ceiling) count as
+    /// lone sheets there: by the rule for bodies that rest on sheets they would be hidden, and the room dark. What rests with it.
+    fn open_let_in_lamps(&self, enclosures: &mut [Enclosure]) {
+        let is_lamp = |&id: &u32| {
+            let patch = &self.patches[id as usize];
+            enclosures[id as usize] == Enclosure::Body && self.patch_emits(patch)
+        };
+        let lamps: Vec<u32> = (0..self.patches.len() as u32).filter(is_lamp).collect();
+        if lamps.is_empty() {
+            return;
+        }
+        let mut effort = Effort::new();
+        for body in (0..self.bodies.len() as u32).map(BodyId) {
+            if self.patches_of(body).all(|(_, patch)| patch.twin.is_none()) {
+                continue;
+            }
+            for shell in self.shells(body, &mut effort) {
+                for &lamp in &lamps {
+                    let patch = &self.patches[lamp as usize];
+                    let other = patch.body;
+                    let rests = other == body || !(self.moves(body) || self.moves(other));
+                    if rests && shell.is_looked_into(patch) {
+                        enclosures[lamp as usize] = Enclosure::Open;
+                    }
+                }
+            }
+        }
     }
 
     fn add_solids(&self, body: BodyId, out: &mut Solids) {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::geometry::Pose;
-use crate::scene::limits::{COORDINATE_MAX_M, EMISSION_MAX, is_place};
+use crate::scene::limits::{COORDINATE_MAX_M, EMISSION_MAX, EMISSION_MIN, is_place};
 use crate::scene::{BodyId, LightId, MaterialId, NewBody, Scene, SceneError, TakenBody};
 
 use super::Session;
@@ -247,11 +247,12 @@ fn name_of(scene: &Scene, body: BodyId) -> Result<&str, CommandError> {
 }
 
 fn check_emission(subject: String, to: &Option<[f64; 3]>) -> Result<(), CommandError> {
-    match to.iter().flatten().find(|m| !(0.0..=EMISSION_MAX).contains(*m)) {
+    let counts = |m: &f64| *m == 0.0 || (EMISSION_MIN..=EMISSION_MAX).contains(m);
+    match to.iter().flatten().find(|m| !counts(m)) {
         Some(bad) => Err(CommandError::Value {
             subject,
             what: format!("it would emit {bad:e}"),
-            remedy: format!("choose values from 0 to {EMISSION_MAX:e}"),
+            remedy: format!("choose 0, or values from {EMISSION_MIN:e} to {EMISSION_MAX:e}"),
         }),
         None => Ok(()),
     }

@@ -24,7 +24,9 @@ fn flux(solved: &Solved) -> (RowSumError, Energy) {
         let patch = forest.patch(*facet).expect("has a patch");
         view.is_present(scene.patches[patch.0 as usize].body)
     };
-    let facets = forest.near_facets().iter().copied().filter(present);
+    // What lies wholly on or under something sends nothing to anyone, whatever it emits.
+    let counts = |facet: &ElementId| present(facet) && !forest.is_wholly_covered(*facet);
+    let facets = forest.near_facets().iter().copied().filter(counts);
     let is_surface = |id: u32| forest.receives(ElementId(id));
     let Solved { links, radiosity, .. } = solved;
     let (rows, mut energy) = balance_of(&surfaces, links, radiosity, facets, &is_surface);

@@ -145,10 +145,15 @@ impl<'a> Writer<'a> {
         };
         for node in &scene.motion.nodes {
             let index = writer.add_node(node.parent.map(|p| p.0 as usize), &node.name);
-            let placement = placement(node);
+            let placement = placement(node, writer.above(node));
             writer.nodes[index].extend(placement);
         }
         writer
+    }
+
+    /// What the place of a node is told from: the origin of the file, for one that hangs on no other.
+    fn above(&self, node: &Node) -> DVec3 {
+        if node.parent.is_none() { self.scene.origin } else { DVec3::ZERO }
     }
 
     pub(super) fn add_node(&mut self, parent: Option<usize>, name: &str) -> usize {
@@ -157,7 +162,10 @@ impl<'a> Writer<'a> {
         self.children.push(Vec::new());
         match parent {
             Some(parent) => self.children[parent].push(index),
-            None => self.roots.push(index),
+            None => {
+                self.roots.push(index);
+                self.nodes[index].extend(translated(self.scene.origin));
+            }
         }
         index
     }
@@ -367,7 +375,14 @@ impl<'a> Writer<'a> {
             let target = |path: &str| json!({ "node": index, "path": path });
             if let Some(track) = &node.translation_track {
                 let input = self.times(&track.times_s);
-                let values: Vec<_> = track.values.iter().map(|v| v.as_vec3().to_array()).collect();
+                let from = self.above(node);
+                let is_cubic = track.interpolation == Interpolation::CubicSpline;
+                let place = |(k, v): (usize, &DVec3)| {
+                    let is_value = !is_cubic || k % 3 == 1;
+                    let place = if is_value { from + *v } else { *v };
+                    place.as_vec3().to_array()
+                };
+                let values: Vec<_> = track.values.iter().enumerate().map(place).collect();
                 let output = self.vec3_accessor(&values, None, false);
                 self.channel(target("translation"), [input, output], name(track.interpolation));
             }
@@ -487,12 +502,14 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// `rotation`, `translation` of a node that differ from the identity.
-fn placement(node: &Node) -> Map<String, Value> {
-    let mut map = Map::new();
-    if node.translation != DVec3::ZERO {
-        map.insert("translation".into(), json!(node.translation.to_array()));
-    }
+/// `translation`, unless it is none.
+fn translated(by: DVec3) -> Option<(String, Value)> {
+    (by != DVec3::ZERO).then(|| ("translation".to_owned(), json!(by.to_array())))
+}
+
+/// `rotation`, `translation` of a node that differ from the identity, from a place on.
+fn placement(node: &Node, from: DVec3) -> Map<String, Value> {
+    let mut map = Map::from_iter(translated(from + node.translation));
     if node.rotation != DQuat::IDENTITY {
         map.insert("rotation".into(), json!(node.rotation.normalize().to_array()));
     }

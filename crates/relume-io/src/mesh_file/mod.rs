@@ -120,7 +120,8 @@ pub(super) fn import(
         Format::Ply => ply::read(&bytes, &stem, &folder),
     }?;
     let draft = draft(contents, stem, (format, options.pictures))?;
-    Scene::from_draft(Draft { edits: options.edits.clone(), ..draft })
+    let edits = options.edits.clone();
+    Scene::from_draft(Draft { edits, near_origin: options.near_origin, ..draft })
 }
 
 /// An error about the content of a file.

@@ -13,9 +13,7 @@ use crate::folder::read_scene;
 use relume_core::scene::draft::{Draft, DraftNode, DraftSurface};
 use relume_core::scene::flatten::{Flaw, flatten};
 use relume_core::scene::names::Names;
-use relume_core::scene::{
-    Edits, Material, MaterialId, Note, Scene, SceneError, Severity, SurfaceId,
-};
+use relume_core::scene::{Material, MaterialId, Note, Scene, SceneError, Severity, SurfaceId};
 
 mod carve;
 mod read;
@@ -42,7 +40,7 @@ pub(super) fn is_view3d(path: &Path) -> bool {
 pub(super) fn import(path: &Path, options: &ImportOptions) -> Result<Scene, SceneError> {
     let file = path.display().to_string();
     let (bytes, stem) = read_scene(path, options.max_memory_bytes)?;
-    scene(&stem, &String::from_utf8_lossy(&bytes), &options.edits).map_err(|error| match error {
+    scene(&stem, &String::from_utf8_lossy(&bytes), options).map_err(|error| match error {
         Refused::Text(Wrong { line, what, remedy }) => {
             SceneError::View3d { file, line, what, remedy }
         }
@@ -63,7 +61,7 @@ impl From<Wrong> for Refused {
     }
 }
 
-fn scene(name: &str, text: &str, edits: &Edits) -> Result<Scene, Refused> {
+fn scene(name: &str, text: &str, options: &ImportOptions) -> Result<Scene, Refused> {
     let file = read::read(text)?;
     check(&file.surfaces)?;
     let mut notes = notes_of(&file);
@@ -111,7 +109,8 @@ fn scene(name: &str, text: &str, edits: &Edits) -> Result<Scene, Refused> {
         nodes: vec![node],
         materials: materials.list,
         notes,
-        edits: edits.clone(),
+        edits: options.edits.clone(),
+        near_origin: options.near_origin,
         ..Draft::default()
     };
     let mut scene = Scene::from_draft(draft).map_err(Refused::Scene)?;

@@ -22,7 +22,7 @@ S 6 7 8 4 3 0 0 1.00 black
 ";
 
 fn read(text: &str) -> Scene {
-    scene("case", text, &Edits::default()).unwrap()
+    scene("case", text, &ImportOptions::default()).unwrap()
 }
 
 fn names(scene: &Scene) -> Vec<&str> {
@@ -126,7 +126,7 @@ fn what_is_wrong_is_said_with_its_line() {
         ("F 3a\nS 1 R 0 0 0.5 a\n0 0 0 0 0 1\n".into(), 2, "1 numbers are missing"),
         ("F 3a\nS 1 C 0 0 0.5 a\n0 0 0 0 0 1 1\n".into(), 2, "the shape is `C`"),
     ] {
-        match scene("case", &text, &Edits::default()) {
+        match scene("case", &text, &ImportOptions::default()) {
             Err(Refused::Text(wrong)) => {
                 let said = format!("{}: {}", wrong.line, wrong.what);
                 assert!(

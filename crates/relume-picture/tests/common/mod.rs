@@ -40,6 +40,7 @@ pub(crate) fn empty() -> Scene {
         lights: Vec::new(),
         cameras: Vec::new(),
         motion: Motion::default(),
+        origin: DVec3::ZERO,
         outside: None,
         outside_m: 0.0,
         environment: None,

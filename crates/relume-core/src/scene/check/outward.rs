@@ -3,8 +3,9 @@
 //!
 //! A wall is a flat single-sided object. It faces outwards if what it joins on three sides or more lies behind it and shows its
 //! fronts to it, if rays from its back meet fronts and rays from its front next to nothing, and if light is behind it. A panel
-//! that stands free joins a floor alone; outsides of houses and of furniture join others that turn their backs to them. Must
-//! not know light transport.
+//! that stands free joins a floor alone; outsides of houses and of furniture join others that turn their backs to them. Walls that
+//! join each other and face outwards together are tried with the others of them turned round, as long as they are the smaller part of
+//! what they join: the larger part says where inside is. Must not know light transport.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,6 +20,11 @@ use crate::scene::tuning::{
 };
 use crate::scene::{LightKind, Note, Patch, Scene, Severity};
 
+/// Walls that are turned round at once.
+const TURNED_MAX: usize = 12;
+/// What a half may be more than one, by rounding.
+const ROUNDING: f64 = 1e-6;
+
 /// Adds walls that face outwards, but for objects of which that is said.
 pub(super) fn outward(scene: &Scene, notes: &mut Vec<Note>) {
     let said: BTreeSet<String> =
@@ -26,11 +32,13 @@ pub(super) fn outward(scene: &Scene, notes: &mut Vec<Note>) {
     let world = World::of(scene, 0.0);
     let boxes: Vec<Aabb> = world.faces.iter().map(|face| Aabb::of(corners(&world, face))).collect();
     let flat = flat(&world);
+    let walls = walls(&world);
+    let meetings = Meetings::of(&walls, &world, &boxes);
     let mut left = WALL_TRIALS;
-    for wall in walls(&world).into_iter().filter(|wall| !said.contains(wall.name)) {
-        let Some(neighbours) = wall.faces_outwards(&world, (&boxes, &flat), &mut left) else {
-            continue;
-        };
+    for (k, wall) in walls.iter().enumerate().filter(|(_, wall)| !said.contains(wall.name)) {
+        let alone = wall.faces_outwards(&world, (&boxes, &flat), &mut left);
+        let together = || meetings.face_outwards(k, (&walls, &world), (&boxes, &flat), &mut left);
+        let Some(neighbours) = alone.or_else(together) else { continue };
         let message = format!(
             "it faces away from where what joins it faces ({}), so it is black on their side; flip its normals (in Blender: \
              Mesh > Normals > Flip) or make the material double-sided",
@@ -48,6 +56,83 @@ struct Wall<'a> {
     normal: DVec3,
     /// What is as near as this joins it, metres.
     reach_m: f64,
+    area_m2: f64,
+}
+
+/// Which walls join each other, by their numbers.
+struct Meetings {
+    /// All that join one.
+    all: Vec<BTreeSet<usize>>,
+    /// Those that look away from each other: the outsides of one corner.
+    away: Vec<BTreeSet<usize>>,
+}
+
+impl Meetings {
+    fn of(walls: &[Wall], world: &World, boxes: &[Aabb]) -> Meetings {
+        let number: BTreeMap<&str, usize> =
+            walls.iter().enumerate().map(|(k, wall)| (wall.name, k)).collect();
+        let mut out = Meetings {
+            all: vec![BTreeSet::new(); walls.len()],
+            away: vec![BTreeSet::new(); walls.len()],
+        };
+        for (k, wall) in walls.iter().enumerate() {
+            for (name, joint) in wall.joints(world, boxes) {
+                let Some(&other) = number.get(name) else { continue };
+                let join = |sets: &mut [BTreeSet<usize>]| {
+                    sets[k].insert(other);
+                    sets[other].insert(k);
+                };
+                match joint {
+                    Joint::OnBothSides | Joint::Double => {}
+                    Joint::Away => {
+                        join(&mut out.all);
+                        join(&mut out.away);
+                    }
+                    Joint::SameWay | Joint::Against => join(&mut out.all),
+                }
+            }
+        }
+        out
+    }
+
+    /// The walls that face outwards if one does, by number, if they are several and at most half of all that hangs together.
+    fn turned(&self, one: usize, walls: &[Wall]) -> Option<BTreeSet<usize>> {
+        let area_m2 = |of: &BTreeSet<usize>| of.iter().map(|&k| walls[k].area_m2).sum::<f64>();
+        let away = hanging_together(one, &self.away);
+        let all = hanging_together(one, &self.all);
+        let is_smaller = area_m2(&away) <= (0.5 + ROUNDING) * area_m2(&all);
+        ((2..=TURNED_MAX).contains(&away.len()) && is_smaller).then_some(away)
+    }
+
+    /// What a wall faces away from, if it and those that look away beside it all face outwards, each with the others turned round.
+    fn face_outwards<'a>(
+        &self,
+        one: usize,
+        (walls, world): (&[Wall<'a>], &World<'a>),
+        around: (&[Aabb], &BTreeSet<&str>),
+        left: &mut usize,
+    ) -> Option<BTreeSet<&'a str>> {
+        let turned = self.turned(one, walls)?;
+        let names: BTreeSet<&str> = turned.iter().map(|&k| walls[k].name).collect();
+        let mut out = BTreeSet::new();
+        for &k in &turned {
+            let others = names.iter().copied().filter(|&name| name != walls[k].name).collect();
+            let found = walls[k].faces_outwards(&world.with_turned(&others), around, left)?;
+            if k == one {
+                out = found.into_iter().filter(|name| !names.contains(name)).collect();
+            }
+        }
+        (!out.is_empty()).then_some(out)
+    }
+}
+
+/// All that can be reached from one.
+fn hanging_together(one: usize, beside: &[BTreeSet<usize>]) -> BTreeSet<usize> {
+    let (mut found, mut waiting) = (BTreeSet::from([one]), vec![one]);
+    while let Some(k) = waiting.pop() {
+        waiting.extend(beside[k].iter().filter(|&&other| found.insert(other)));
+    }
+    found
 }
 
 /// A part of a wall's outline: from, to, and out of it in its plane.
@@ -61,8 +146,10 @@ struct Side {
 enum Joint {
     /// It goes on in front of the wall and behind it.
     OnBothSides,
-    /// Its front and the wall's are the fronts of one corner.
+    /// Its front and the wall's are the fronts of one corner, seen from within.
     SameWay,
+    /// The same, seen from outside: it is behind the wall, and shows its back there.
+    Away,
     /// It is behind the wall, and double-sided.
     Double,
     /// It is behind the wall, and shows its front there.
@@ -88,7 +175,7 @@ fn walls<'a>(world: &'a World<'a>) -> Vec<Wall<'a>> {
                     .all(|c| (*c - corner).dot(first.normal).abs() < 0.5 * reach_m)
         };
         let is_wall = world.objects[name].diagonal() >= smallest && faces.iter().all(is_flat);
-        is_wall.then_some(Wall { name, normal: first.normal, faces, reach_m })
+        is_wall.then_some(Wall { name, normal: first.normal, faces, reach_m, area_m2 })
     };
     let mut walls: Vec<Wall> = objects.into_iter().filter_map(wall).collect();
     walls.sort_by(|a, b| b.reach_m.total_cmp(&a.reach_m));
@@ -151,7 +238,7 @@ impl<'a> Joints<'a> {
             Joint::OnBothSides => {
                 self.found.on_both_sides.insert(object);
             }
-            Joint::SameWay => {
+            Joint::SameWay | Joint::Away => {
                 self.same_m += length_m;
                 return;
             }
@@ -170,7 +257,7 @@ impl<'a> Wall<'a> {
     /// What it faces away from, if it faces out of what is behind it.
     fn faces_outwards(
         &self,
-        world: &'a World<'a>,
+        world: &World<'a>,
         (boxes, flat): (&[Aabb], &BTreeSet<&str>),
         left: &mut usize,
     ) -> Option<BTreeSet<&'a str>> {
@@ -208,17 +295,35 @@ impl<'a> Wall<'a> {
         sides
     }
 
+    /// Polygons of others that may join it, with their corners.
+    fn near<'w>(&self, world: &'w World<'a>, boxes: &[Aabb]) -> Vec<(&'w Face, Vec<DVec3>)> {
+        let own = self.faces.iter().flat_map(|face| corners(world, face));
+        let around = Aabb::of(own).grown(self.reach_m);
+        let beside = world.faces.iter().zip(boxes);
+        let beside = beside.filter(|(face, b)| b.meets(&around) && !self.is_of(face));
+        beside.map(|(face, _)| (face, corners(world, face))).collect()
+    }
+
+    /// The objects that join it somewhere, and how.
+    fn joints(&self, world: &World<'a>, boxes: &[Aabb]) -> BTreeSet<(&'a str, Joint)> {
+        let near = self.near(world, boxes);
+        let mut found = BTreeSet::new();
+        for Side { ends: [from, to], out } in self.sides(world) {
+            for k in 0..SIDE_POINTS {
+                let at = from.lerp(to, (f64::from(k) + 0.5) / f64::from(SIDE_POINTS));
+                let here = near.iter().filter(|(f, c)| distance(world, f, c, at) <= self.reach_m);
+                let joints = here.filter_map(|(face, c)| {
+                    Some((object(world, face), self.joint(face, c, at, out)?))
+                });
+                found.extend(joints);
+            }
+        }
+        found
+    }
+
     /// What joins it, if that lies behind it on three sides or more and nothing of it turns its back there.
-    fn joined(&self, world: &'a World<'a>, boxes: &[Aabb]) -> Option<Joined<'a>> {
-        let around =
-            Aabb::of(self.faces.iter().flat_map(|face| corners(world, face))).grown(self.reach_m);
-        let near: Vec<(&Face, Vec<DVec3>)> = world
-            .faces
-            .iter()
-            .zip(boxes)
-            .filter(|(face, b)| b.meets(&around) && !self.is_of(face))
-            .map(|(face, _)| (face, corners(world, face)))
-            .collect();
+    fn joined(&self, world: &World<'a>, boxes: &[Aabb]) -> Option<Joined<'a>> {
+        let near = self.near(world, boxes);
         let mut joints = Joints::default();
         for side in self.sides(world) {
             let along = side.ends[1] - side.ends[0];
@@ -280,7 +385,7 @@ impl<'a> Wall<'a> {
         match (behind > before, face.two_sided) {
             (true, true) => Some(Joint::Double),
             (true, false) if looks > 0.3 => Some(Joint::Against),
-            (true, false) => (looks < -0.3).then_some(Joint::SameWay),
+            (true, false) => (looks < -0.3).then_some(Joint::Away),
             (false, two_sided) => (two_sided || looks > 0.3).then_some(Joint::SameWay),
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! Rays are tried against one polygon after another. Must not know what they are cast for.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
@@ -14,6 +14,7 @@ use crate::scene::{BodyId, PatchId, Scene, SurfaceId};
 const SKIPPED: f64 = 1e-7;
 
 /// A polygon in the world; of two twins the first.
+#[derive(Clone)]
 pub(super) struct Face {
     pub(super) patch: PatchId,
     pub(super) surface: SurfaceId,
@@ -24,6 +25,7 @@ pub(super) struct Face {
 }
 
 /// What is present at one instant.
+#[derive(Clone)]
 pub(super) struct World<'a> {
     pub(super) scene: &'a Scene,
     pub(super) time_s: f64,
@@ -75,6 +77,17 @@ impl<'a> World<'a> {
             }
         }
         world
+    }
+
+    /// The same with some objects turned inside out.
+    pub(super) fn with_turned(&self, objects: &BTreeSet<&str>) -> World<'a> {
+        let mut turned = self.clone();
+        for face in &mut turned.faces {
+            if objects.contains(self.scene.surfaces[face.surface.0 as usize].object.as_str()) {
+                face.normal = -face.normal;
+            }
+        }
+        turned
     }
 
     /// The first polygon on a ray's way, but for those that it starts on.

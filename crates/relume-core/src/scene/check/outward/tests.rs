@@ -241,3 +241,58 @@ fn panels_furniture_and_outsides_of_houses_are_passed() {
         assert_eq!(sound(seed), [""; 0], "seed {seed}");
     }
 }
+
+/// The sides of a closed room of which some face outwards, by number, as they are named.
+fn room_with(draw: &mut Draw, turned: &[usize]) -> (Vec<String>, Vec<String>) {
+    let mut stage = Stage::new(draw);
+    let size = DVec3::new(draw.within(2.0, 8.0), draw.within(2.0, 4.0), draw.within(2.0, 8.0));
+    let one_sided = stage.one_sided;
+    let mut wanted = Vec::new();
+    for (k, (name, mut corners)) in sides(DVec3::ZERO, size, 0.0, false).into_iter().enumerate() {
+        if turned.contains(&k) {
+            corners.reverse();
+            wanted.push(name.to_owned());
+        }
+        stage.panel(name, one_sided, &corners);
+    }
+    stage.lamp(size * DVec3::new(0.45, 0.8, 0.5), 0.2);
+    let mut found = stage.flipped();
+    found.sort();
+    wanted.sort();
+    (found, wanted)
+}
+
+#[test]
+fn walls_beside_each_other_that_face_outwards_are_all_named() {
+    let mut draw = Draw(7);
+    for seed in 0..40 {
+        for one in 0..6 {
+            for other in one + 1..6 {
+                let (found, wanted) = room_with(&mut draw, &[one, other]);
+                assert_eq!(found, wanted, "seed {seed}");
+            }
+        }
+    }
+}
+
+#[test]
+fn three_walls_about_a_corner_that_face_outwards_are_all_named() {
+    let normals = |k: usize| {
+        let c = &sides(DVec3::ZERO, DVec3::ONE, 0.0, false)[k].1;
+        (c[1] - c[0]).cross(c[2] - c[0])
+    };
+    let mut draw = Draw(3);
+    for seed in 0..10 {
+        for one in 0..6 {
+            for other in one + 1..6 {
+                for third in other + 1..6 {
+                    let [p, q, r] = [one, other, third].map(normals);
+                    if p.cross(q).dot(r).abs() > 0.5 {
+                        let (found, wanted) = room_with(&mut draw, &[one, other, third]);
+                        assert_eq!(found, wanted, "seed {seed}");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -57,9 +57,8 @@ pub(super) fn outward(scene: &Scene, notes: &mut Vec<Note>) {
     let mut left = TRIALS;
     for (k, wall) in walls.iter().enumerate().filter(|(_, wall)| !said.contains(wall.name)) {
         let alone = wall.faces_outwards(&world, (&boxes, &flat), &mut left);
-        let mut together =
-            || meetings.face_outwards(k, (&walls, &world), (&boxes, &flat), &mut left);
-        let Some(neighbours) = alone.or_else(|| together()) else { continue };
+        let together = || meetings.face_outwards(k, (&walls, &world), (&boxes, &flat), &mut left);
+        let Some(neighbours) = alone.or_else(together) else { continue };
         let message = format!(
             "it faces away from where what joins it faces ({}), so it is black on their side; flip its normals (in Blender: \
              Mesh > Normals > Flip) or make the material double-sided",

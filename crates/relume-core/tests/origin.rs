@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
+use relume_core::geometry::Aabb;
 use relume_core::scene::draft::{Draft, DraftNode, DraftSurface};
 use relume_core::scene::{Interpolation, Material, MaterialId, Scene, Track};
 use relume_core::session::Session;
@@ -72,7 +73,7 @@ fn at_map_coordinates_links_are_those_about_the_origin() {
     assert!(far.notes.iter().any(|n| n.code == "far-origin"), "{:?}", far.notes);
     let near = Scene::from_draft(draft(AWAY - far.origin, false)).unwrap();
     assert_eq!(near.origin, DVec3::ZERO);
-    let (low, high) = far.bounds(0.0).unwrap();
+    let Aabb { lo: low, hi: high } = far.bounds(0.0).unwrap();
     assert!((far.origin + low - AWAY).length() < 1e-6 && high.abs().max_element() < 16.0, "{low}");
     let [mut far, mut near] =
         [far, near].map(|scene| Session::new(Arc::new(scene), at_tolerance(0.05)).unwrap());

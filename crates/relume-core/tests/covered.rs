@@ -250,7 +250,7 @@ fn light_gets_no_deeper_under_a_crate_than_some_widths_of_the_gap() {
                 / scene.patches.iter().map(|patch| patch.area_m2()).sum::<f64>();
             // Over the whole underside, as a share of what arrives elsewhere.
             let off = (found - truth[bottom].irradiance[0]) / (0.8 * mean_w_m2);
-            assert!(off.abs() < 0.03, "{off:+.3} at {time_s} s, slides: {slides}");
+            assert!(off.abs() < 0.05, "{off:+.3} at {time_s} s, slides: {slides}");
         }
     }
 }

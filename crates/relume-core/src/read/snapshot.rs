@@ -115,6 +115,7 @@ impl Snapshot {
 }
 
 /// The leaves of a solved forest with a solution over it.
+// Over 60 lines: two closures over one state, and the offsets of what they find.
 pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Snapshot {
     let SpaceState { scene, forest, .. } = &solved.space;
     let surfaces = solved.space.surfaces();

@@ -6,16 +6,14 @@
 use glam::{DVec2, DVec3};
 
 use super::gap::{Gap, between, open_sides, widest_m};
+use super::placed::{IN_PLANE, Placed};
 use super::topology::{Polygon, components, matched, sides_of};
 use super::weld::Weld;
-use super::{BodyId, Frame, InPlane, Patch, PatchId, Scene, Sheet, Solids};
+use super::{BodyId, InPlane, PatchId, Scene, Sheet, Solids};
 use crate::geometry::{Aabb, Moments, Plane, Pose, Segment, common, difference, within_outlines};
 use crate::scene::tuning::{
     COVERED_CUTS_MAX, COVERED_PARTS_MAX, COVERED_WHOLLY, COVERING_POLYGONS_MAX,
 };
-
-/// What lies this close to a plane, as a share of the largest coordinate, lies in it: a few roundings of 32-bit numbers.
-pub(super) const IN_PLANE: f64 = 1e-6;
 
 /// Bodies are cut this far above a patch to see what they cover, in roundings.
 const ABOVE: f64 = 4.0;
@@ -86,44 +84,6 @@ struct Group {
     slack_m: f64,
     /// Whether they are those of a body that moves, in its frame.
     is_own: bool,
-}
-
-/// A patch in the frame of its group.
-pub(super) struct Placed {
-    pub(super) id: PatchId,
-    pub(super) corners: Vec<DVec3>,
-    pub(super) normal: DVec3,
-    pub(super) bounds: Aabb,
-    /// Origin and axes of its plane.
-    origin: DVec3,
-    axes: [DVec3; 2],
-}
-
-impl Placed {
-    /// A patch of a body that is at a pose.
-    pub(super) fn new(id: PatchId, patch: &Patch, pose: &Pose) -> Placed {
-        let corners: Vec<DVec3> = patch.corners_in_body().map(|c| pose.point(c)).collect();
-        let bounds = Aabb::of(corners.iter().copied());
-        let Frame { origin, u, v, normal } = patch.frame;
-        let [u, v, normal] = [u, v, normal].map(|d| pose.direction(d));
-        Placed { id, corners, normal, bounds, origin: pose.point(origin), axes: [u, v] }
-    }
-
-    /// Its corners in its own frame.
-    pub(super) fn outline(&self) -> Vec<DVec2> {
-        self.corners.iter().map(|&c| self.in_frame(c)).collect()
-    }
-
-    /// A point of its own frame in the group's.
-    pub(super) fn point(&self, p: DVec2) -> DVec3 {
-        self.origin + self.axes[0] * p.x + self.axes[1] * p.y
-    }
-
-    /// A point of the group's frame in the patch's own.
-    pub(super) fn in_frame(&self, p: DVec3) -> DVec2 {
-        let d = p - self.origin;
-        DVec2::new(d.dot(self.axes[0]), d.dot(self.axes[1]))
-    }
 }
 
 /// Where what emits can get in the whole animation, in the world.

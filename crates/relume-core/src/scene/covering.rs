@@ -7,8 +7,9 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use super::covered::{Hull, IN_PLANE, Placed, hide_gap, hulls_of, reach_m, stand};
+use super::covered::{Hull, hide_gap, hulls_of, reach_m, stand};
 use super::gap::{between, open_sides, widest_m};
+use super::placed::{IN_PLANE, Placed};
 use super::{BodyId, Covered, Patch, PatchId, Scene};
 use crate::geometry::{Aabb, Pose};
 use crate::scene::tuning::COVERING_CUTS_MAX;

@@ -5,7 +5,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::covered::{IN_PLANE, Placed};
+use super::placed::{IN_PLANE, Placed};
 use super::tuning::{GAP_BEND, GAP_LEAST, GAP_STRIP};
 use super::weld::Weld;
 use crate::geometry::{Aabb, Moments, Plane, common, part_in_front};

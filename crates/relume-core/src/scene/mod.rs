@@ -39,6 +39,7 @@ mod motion;
 pub mod names;
 mod origin;
 pub mod outside;
+mod placed;
 pub mod print;
 pub mod pyramid;
 mod rigid;

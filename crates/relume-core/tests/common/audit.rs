@@ -21,7 +21,7 @@ pub(crate) struct Audit {
     pub(crate) factor_max: f64,
     /// Smallest and largest row sum of a leaf.
     pub(crate) row_sum: [f64; 2],
-    /// Area-weighted RMS of how far row sums lie outside [0, 1].
+    /// RMS of how far row sums lie outside [0, 1], weighed by exposed areas.
     pub(crate) row_excess: f64,
 }
 
@@ -46,8 +46,8 @@ pub(crate) fn audit(session: &Session) -> Audit {
     for (id, row) in session.frame().unwrap().rows() {
         assert!(row.is_finite() && forest.kind(id) == Kind::Element);
         out.row_sum = [out.row_sum[0].min(row), out.row_sum[1].max(row)];
-        squares += forest.area_m2(id) * (row - row.clamp(0.0, 1.0)).powi(2);
-        area += forest.area_m2(id);
+        squares += forest.exposed_m2(id) * (row - row.clamp(0.0, 1.0)).powi(2);
+        area += forest.exposed_m2(id);
     }
     out.row_excess = (squares / f64::max(area, f64::MIN_POSITIVE)).sqrt();
     for link in tree.links() {

@@ -139,9 +139,13 @@ a_few! {
     a_crate_that_slides_over_panels_in_the_floor_holds_no_light: "motion", 181..182;
     white_closets: "closet", 0..8;
     white_tables: "table", 0..2;
-    furnished_rooms: "interior", 3..8;
     small_devices: "device", 0..5;
     lamps_let_into_a_ceiling: "downlight", 0..2;
+}
+
+#[test]
+fn furnished_rooms() {
+    check("interior", 4..8);
 }
 
 #[test]

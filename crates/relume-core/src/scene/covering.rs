@@ -12,7 +12,7 @@ use super::gap::{between, open_sides, widest_m};
 use super::placed::{IN_PLANE, Placed};
 use super::{BodyId, Covered, Patch, PatchId, Scene};
 use crate::geometry::{Aabb, Pose};
-use crate::scene::tuning::COVERING_CUTS_MAX;
+use crate::scene::tuning::{COVERING_CUTS_MAX, GAP_PAIRS_MAX};
 
 /// Bodies that may cover or be covered where one of them is moved.
 #[derive(Clone, Debug, Default)]
@@ -208,9 +208,6 @@ impl Covering {
     }
 }
 
-/// Pairs of polygons of two bodies that are looked at for gaps; of more none are.
-const PAIRS_MAX: usize = 1 << 20;
-
 /// Adds what of patches lies in narrow gaps between two bodies of which one is moved.
 fn narrow(
     scene: &Scene,
@@ -233,7 +230,7 @@ fn narrow(
                 all.filter(|(_, face)| face.bounds.meets(&by)).collect()
             };
             let (of_one, of_other) = (near(one, other), near(other, one));
-            if of_one.len() * of_other.len() > PAIRS_MAX {
+            if of_one.len() * of_other.len() > GAP_PAIRS_MAX {
                 continue;
             }
             for (i, p) in &of_one {

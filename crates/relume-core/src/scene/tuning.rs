@@ -43,6 +43,14 @@ pub(super) const GAP_BEND: f64 = 400.0;
 /// - Smaller: time; small things are looked at closely anyway
 pub(super) const GAP_LEAST: f64 = 0.01;
 
+/// Pairs of polygons of two bodies, of which one is moved, up to which gaps between them are looked for.
+///
+/// - Unit: pairs
+/// - Tried: not varied
+/// - Larger: time of a frame in which finely tessellated bodies move beside each other
+/// - Smaller: light fills the gaps between such bodies
+pub(super) const GAP_PAIRS_MAX: usize = 1 << 20;
+
 /// Faces of a solid up to which it is looked whether it is convex.
 ///
 /// - Unit: faces

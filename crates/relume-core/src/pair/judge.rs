@@ -416,6 +416,9 @@ impl SpaceJudge<'_> {
 
     /// Judges a pair of elements that face each other, at or below the coarse level; `x` is what they exchange by points.
     fn decide(&self, pair: &Elements<'_>, x: Exchange, known: Option<&Carried>) -> Judgement {
+        if let Some(linked) = self.by_whole_ends(pair, &x) {
+            return linked;
+        }
         let exchanged = match self.exchanged(pair, x) {
             Ok(exchanged) => exchanged,
             Err(decided) => return decided,
@@ -460,6 +463,29 @@ impl SpaceJudge<'_> {
             },
         };
         [end(pair.ids.0, place_a.area), end(pair.ids.1, place_b.area)]
+    }
+
+    /// The link of a pair with nothing between its ends where nothing shines, `x` by points.
+    ///
+    /// Links then serve tables of form factors alone, which ask what whole elements exchange: that is known exactly, and how it is
+    /// spread over the ends does not matter. Two turned rectangles 0.1 mm apart would be refined all over to find it again.
+    fn by_whole_ends(&self, pair: &Elements<'_>, x: &Exchange) -> Option<Judgement> {
+        let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
+        else {
+            return None;
+        };
+        let is_whole = pair.in_contact() || pair.found.is_clear();
+        if self.forest.shines() || !is_whole || x.area_m2 <= 0.0 {
+            return None;
+        }
+        let (clear, nothing) = (Visibility::CLEAR, BlockerSizes::NOTHING);
+        let ends = self.ends(pair, brightness);
+        let norm = norm_of(brightness, threshold);
+        let by_points = || estimate(x, &clear, ends.each_ref(), &nothing, &norm).error();
+        let is_found = pair.in_contact() || (!x.is_steep && by_points() <= threshold);
+        let (place_a, place_b) = pair.places;
+        let x = if is_found { *x } else { x.along_outlines(self.simd, place_a, place_b) };
+        Some(carrying(Verdict::Link, &x, &clear, pair.places))
     }
 
     /// What a pair exchanges without occlusion, `x` by points; as an error the verdict, where that alone decides.

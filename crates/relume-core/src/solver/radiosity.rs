@@ -10,9 +10,12 @@ use super::push::{RowSum, push};
 use super::surfaces::{Surfaces, for_each_below};
 use super::trend::Trend;
 
+mod levels;
 mod scaling;
 mod solve;
 
+pub(in crate::solver) use levels::Level;
+use levels::Levels;
 use scaling::RowScaling;
 pub use solve::{Bounds, Stop};
 
@@ -70,6 +73,8 @@ pub struct Radiosity {
     constant: bool,
     /// RowScaling of leaves; empty unless the solution would grow.
     scaling: RowScaling,
+    /// Levels of leaves; none where nothing is white.
+    levels: Levels,
     /// Sweeps made by the last solve.
     pub sweeps: u32,
     /// Receivers gathered by the last solve, each time counted.
@@ -116,6 +121,7 @@ impl Radiosity {
         self.over_groups.renumber(to);
         self.trend.renumber(to);
         self.scaling.renumber(to);
+        self.levels.renumber(to);
         let numbers = [&mut self.pending, &mut self.deferred];
         let kept = numbers.into_iter().filter(|v| !v.is_empty());
         for values in kept {
@@ -212,12 +218,18 @@ impl Radiosity {
         visit: &mut dyn FnMut(u32, &Linear),
     ) {
         let own = |id: u32| self.gathered.get(id);
-        push(surfaces, facet, &surfaces.place(facet), &Linear::default(), &own, &mut |id, h| {
-            match self.scaling.factors.get(id as usize) {
-                Some(&factor) => visit(id, &h.times(factor)),
-                None => visit(id, h),
-            }
-        });
+        push(
+            surfaces,
+            facet,
+            &surfaces.place(facet),
+            &Linear::default(),
+            &own,
+            &mut |id, h| match (self.scaling.factors.get(id as usize), self.levels.get(id)) {
+                (Some(&factor), _) => visit(id, &h.times(factor)),
+                (None, Some(level)) => visit(id, &level.of(h)),
+                (None, None) => visit(id, h),
+            },
+        );
     }
 
     /// Bytes held, without [`Radiosity::group_bytes`].
@@ -225,7 +237,7 @@ impl Radiosity {
         let single =
             ((self.pending.capacity() + self.deferred.capacity()) * size_of::<f32>()) as u64;
         let fields = self.radiosity.bytes() + self.gathered.bytes();
-        fields + single + self.scaling.bytes() + self.trend.bytes()
+        fields + single + self.scaling.bytes() + self.levels.bytes() + self.trend.bytes()
     }
 
     /// Bytes held for what came over links of groups.

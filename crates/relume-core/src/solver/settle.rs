@@ -7,6 +7,7 @@
 use super::dirty_path::{DirtyPath, bit};
 use super::field::{Field, Linear};
 use super::place::Place;
+use super::radiosity::Level;
 use super::surfaces::{FacetMaterial, Surfaces};
 
 /// Result of pushing and pulling through one facet.
@@ -43,6 +44,8 @@ pub(super) struct Below<'a, S> {
     pub(super) deferred: &'a [f32],
     /// Factor of what each leaf receives and sends; empty where all are 1.
     pub(super) factors: &'a [f32],
+    /// Level of each leaf; empty where there are none.
+    pub(super) levels: &'a [Level],
     pub(super) surfaces: &'a S,
     pub(super) material: &'a FacetMaterial,
     pub(super) limit: f32,
@@ -65,9 +68,10 @@ impl<S: Surfaces> Below<'_, S> {
         let children = self.surfaces.children(id);
         let mut deferred = 0.0_f32;
         let b = if children.is_empty() {
-            match self.factors.get(id as usize) {
-                Some(&factor) => self.reflect(&h.times(factor), place).times(factor),
-                None => self.reflect(&h, place),
+            match (self.factors.get(id as usize), self.levels.get(id as usize)) {
+                (Some(&factor), _) => self.reflect(&h.times(factor), place).times(factor),
+                (None, Some(level)) => self.reflect(&level.of(&h), place),
+                (None, None) => self.reflect(&h, place),
             }
         } else {
             let change = match self.path {

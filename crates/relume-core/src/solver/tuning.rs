@@ -94,23 +94,17 @@ pub(super) const GAIN_MAX: f64 = 0.005;
 /// - Smaller: time: a pass over all links where nothing can grow
 pub(super) const GAIN_SURE: f64 = 0.0015;
 
-/// Flux that facets with rows above 1 make in a solution, over what is emitted, from which factors of leaves count.
+/// Flux that escapes from closed surroundings, or arrives without being sent, or the other way round, over what is emitted, from which
+/// factors of leaves count.
 ///
 /// - Unit: 1
-/// - Tried: 0.05; white rooms of boxes make 0.003 to 0.045, and are 8 to 20 % too dark with factors; closets do not settle without
-/// - Larger: light is unaccounted for in white gaps
-/// - Smaller: white rooms are too dark: factors know nothing of where light is
-pub(super) const MADE_MAX: f64 = 0.05;
+/// - Tried: 0.01 (closets of reflectance 0.98 lose up to a tenth with levels alone)
+/// - Larger: more than a hundredth of the light may come of nothing, or be lost
+/// - Smaller: factors, which know nothing of where light is, where levels would do
+pub(super) const ASTRAY_MAX: f64 = 0.01;
 
-/// Flux that rows make in a solution, those above 1 less those below, over what is emitted, from which factors of leaves count.
-///
-/// - Unit: 1
-/// - Tried: 0.01
-/// - Larger: more than a hundredth of the light may come of nothing
-/// - Smaller: white rooms are too dark, as with [`MADE_MAX`]
-pub(super) const MADE_OF_ALL_MAX: f64 = 0.01;
-
-/// Both with the paper's oracle, which bounds factors and not errors: rows are off by tenths.
+/// Flux that facets with rows above 1 make in a solution, over what is emitted, from which factors of leaves count with the paper's oracle.
+/// It bounds factors and not errors: rows are off by tenths, and leaves are not levelled.
 ///
 /// - Unit: 1
 /// - Tried: 0.05 and 0.01 (a room with a white lamp 10 % too dark with factors, 10 % too bright without, and frames that jump between),
@@ -126,6 +120,22 @@ pub(super) const COARSE_MADE_MAX: f64 = 0.5;
 /// - Larger: light is unaccounted for in gaps between bright surfaces
 /// - Smaller: time: a pass over all links where nothing can grow
 pub(super) const WHITE: f32 = 0.85;
+
+/// Mean of the sums of rows over a part of a surface from which it counts as closed in, and its leaves are levelled.
+///
+/// - Unit: 1
+/// - Tried: 0.995
+/// - Larger: parts whose rows are a little off are not levelled
+/// - Smaller: what lies beside an opening of 1 % is too bright
+pub(super) const CLOSED: f64 = 0.995;
+
+/// Most that the reflected light of a leaf is multiplied with, and divided by.
+///
+/// - Unit: 1
+/// - Tried: 2
+/// - Larger: leaves that see little are bright by chance
+/// - Smaller: light is made in narrow gaps
+pub(super) const LEVEL_MOST: f32 = 2.0;
 
 /// Flux that scaled rows may lose or make where lines reach below zero, over what is emitted, before elements are taken to be constant.
 ///

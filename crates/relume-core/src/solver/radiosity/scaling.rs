@@ -5,21 +5,16 @@
 //! directions, and d is such that rows have the sums that they should: at most 1, and over each facet as much as before, since sums over
 //! facets are good. That is the symmetric scaling of a matrix to given row sums (Sinkhorn and Knopp 1967).
 
-use fearless_simd::dispatch;
-use rayon::prelude::*;
-
 use super::Radiosity;
-use super::solve::CHUNK;
+use super::levels::gathered_from;
 use crate::element::Renumbering;
 use crate::solver::field::{Field, Linear};
-use crate::solver::gather::gather_some;
 use crate::solver::links::Links;
 use crate::solver::place::Place;
 use crate::solver::push::{RowSum, push};
 use crate::solver::settle::Fit;
 use crate::solver::surfaces::{Surfaces, for_each_below};
 use crate::solver::tuning::{FACTOR_LEAST, RAISED_MOST, SCALING_ROUNDS};
-use crate::transport;
 
 /// Factors of leaves, and the sums of their rows with them; by id, of no meaning for what is no leaf.
 #[derive(Clone, Debug, Default)]
@@ -160,19 +155,7 @@ impl RowScaling {
             };
             pull(surfaces, facet.0, &leaf, &mut sent);
         }
-        let mut gathered = vec![Linear::default(); surfaces.len()];
-        let level = transport::Simd::detect().level();
-        gathered.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
-            let first = (chunk * CHUNK) as u32;
-            let ids: Vec<u32> = (first..first + out.len() as u32).collect();
-            dispatch!(level, simd => gather_some(simd, &sent, links, surfaces, &ids, self.linear, out));
-        });
-        if let Some(groups) = surfaces.groups() {
-            let arriving = groups.arriving(&|id| sent.get(id), surfaces.source_moment());
-            for (id, h) in (0..).zip(&mut gathered) {
-                *h = h.plus(&groups.at(&arriving, id));
-            }
-        }
+        let gathered = gathered_from(&sent, surfaces, links, self.linear);
         let own = |id: u32| gathered[id as usize];
         for facet in surfaces.facets() {
             let at = surfaces.place(facet.0);

@@ -3,6 +3,7 @@
 use fearless_simd::dispatch;
 use rayon::prelude::*;
 
+use super::levels::Levels;
 use super::scaling::{CLOSE, RowScaling, most};
 use super::{OverGroups, Radiosity};
 use crate::element::ElementId;
@@ -16,8 +17,8 @@ use crate::solver::settle::{Below, IrradianceChange, Settled};
 use crate::solver::surfaces::{FacetMaterial, Surfaces, for_each_below};
 use crate::solver::trend::{Start, Trend};
 use crate::solver::tuning::{
-    COARSE_MADE_MAX, FURTHER_MAX, GAIN_MAX, GAIN_SURE, LOST_MAX, MADE_MAX, MADE_OF_ALL_MAX,
-    PENDING_SHARE, SCALED_RESIDUAL, SKIPPED_MAX, SWEEPS_MAX, UNBALANCED_MAX, UNKNOWN_MAX, WHITE,
+    ASTRAY_MAX, COARSE_MADE_MAX, FURTHER_MAX, GAIN_MAX, GAIN_SURE, LOST_MAX, PENDING_SHARE,
+    SCALED_RESIDUAL, SKIPPED_MAX, SWEEPS_MAX, UNBALANCED_MAX, UNKNOWN_MAX, WHITE,
 };
 use crate::solver::work::{Dirty, Work};
 use crate::transport;
@@ -107,12 +108,19 @@ impl Radiosity {
         }
         let was_scaled = !std::mem::take(&mut self.scaling).is_none();
         self.constant = false;
-        let gain = if is_white(surfaces) { RowScaling::gain(surfaces, links) } else { 0.0 };
+        let rows = is_white(surfaces).then(|| RowScaling::none(surfaces, links, true));
+        let dirty = self.level(surfaces, links, dirty, rows.as_ref().filter(|_| rows_are_close));
+        let gain = if rows.is_some() { RowScaling::gain(surfaces, links) } else { 0.0 };
+        let is_sure = |light: &Radiosity| match &rows {
+            Some(rows) if rows_are_close || gain > GAIN_SURE => {
+                light.is_balanced(surfaces, links, rows)
+            }
+            _ => true,
+        };
         if gain <= GAIN_MAX {
             let dirty = if was_scaled { Dirty::All } else { dirty };
             self.solve(surfaces, links, dirty, stop);
-            let is_sure = gain <= GAIN_SURE || self.is_balanced(surfaces, links, rows_are_close);
-            if self.has_settled() && is_sure {
+            if self.has_settled() && is_sure(self) {
                 return;
             }
         }
@@ -120,9 +128,10 @@ impl Radiosity {
         let stop = Stop::Bounded { residual: SCALED_RESIDUAL * from_nothing, mean_w_m2 };
         self.start_anew(surfaces);
         self.solve(surfaces, links, Dirty::All, stop);
-        if self.has_settled() && self.is_balanced(surfaces, links, rows_are_close) {
+        if self.has_settled() && is_sure(self) {
             return;
         }
+        self.levels = Levels::default();
         for (linear, strict) in [(true, false), (false, false), (false, true)] {
             self.constant = !linear;
             let rows = RowScaling::none(surfaces, links, linear);
@@ -138,32 +147,53 @@ impl Radiosity {
         }
     }
 
-    /// Whether facets whose rows sum to more than 1 in this light make little of nothing, and all facets together next to nothing.
-    fn is_balanced(&self, surfaces: &impl Surfaces, links: &Links, rows_are_close: bool) -> bool {
-        let rows = RowScaling::none(surfaces, links, true);
-        let mut of_all = 0.0;
-        let (mut made, mut emitted) = (0.0, self.light_arriving_w(surfaces, links));
+    /// Levels the leaves anew by their rows, or none of them; what is dirty with that.
+    fn level(
+        &mut self,
+        surfaces: &impl Surfaces,
+        links: &Links,
+        dirty: Dirty,
+        rows: Option<&RowScaling>,
+    ) -> Dirty {
+        let levels = rows.map(|rows| Levels::new(surfaces, links, rows, &self.radiosity));
+        let before = std::mem::replace(&mut self.levels, levels.unwrap_or_default());
+        match (dirty, self.levels.changed_from(&before, surfaces)) {
+            (Dirty::Some { receivers, mut parents }, Some(changed)) => {
+                parents.extend(changed);
+                Dirty::Some { receivers, parents }
+            }
+            _ => Dirty::All,
+        }
+    }
+
+    /// Whether little light is made or lost. Of levelled leaves nothing escapes, and all that arrives was sent. Else facets whose rows
+    /// sum to more than 1 in this light may make little of nothing, and all facets together next to nothing.
+    fn is_balanced(&self, surfaces: &impl Surfaces, links: &Links, rows: &RowScaling) -> bool {
+        let mut emitted = self.light_arriving_w(surfaces, links);
+        let (mut made, mut of_all, mut closed, mut unaccounted) = (0.0, 0.0, 0.0, emitted);
         for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
-            let exitance = surfaces.material(facet.0).exitance;
+            let FacetMaterial { exitance, reflectance } = surfaces.material(facet.0);
             let mut of_facet = 0.0;
-            for_each_below(surfaces, facet.0, &mut |id| {
-                if !surfaces.children(id).is_empty() {
-                    return;
-                }
-                let area = surfaces.area_m2(id);
-                let above = f64::from(rows.rows[id as usize].mean) - 1.0;
-                let b = self.radiosity(id);
+            self.irradiances(surfaces, facet.0, &mut |leaf, h| {
+                let area = surfaces.area_m2(leaf);
+                let row = &rows.rows[leaf as usize];
+                let (b, carried) = (self.radiosity(leaf), self.carried(surfaces, leaf, row));
                 for c in 0..3 {
-                    of_facet += area * above * f64::from(b[c]);
+                    let escapes = area * (f64::from(b[c]) - carried[c]);
+                    let absorbed = (1.0 - reflectance[c]) * h.mean[c].max(0.0);
+                    of_facet += area * (f64::from(row.mean) - 1.0) * f64::from(b[c]);
                     emitted += area * f64::from(exitance[c]);
+                    unaccounted += area * f64::from(exitance[c] - absorbed) - escapes;
+                    closed += if self.levels.is_closed(leaf) { escapes } else { 0.0 };
                 }
             });
             made += of_facet.max(0.0);
             of_all += of_facet;
         }
-        let [most, most_of_all] =
-            if rows_are_close { [MADE_MAX, MADE_OF_ALL_MAX] } else { [COARSE_MADE_MAX; 2] };
-        made <= most * emitted && of_all <= most_of_all * emitted
+        if !self.levels.is_none() {
+            return closed.abs().max(unaccounted.abs()) <= ASTRAY_MAX * emitted;
+        }
+        made.max(of_all) <= COARSE_MADE_MAX * emitted
     }
 
     /// Whether surfaces receive of each other what they send, but for `LOST_MAX` of what is emitted: with factors, as lines may
@@ -573,6 +603,7 @@ impl Radiosity {
                 gathered: &self.gathered,
                 deferred: &self.deferred,
                 factors: &self.scaling.factors,
+                levels: self.levels.all(),
                 surfaces,
                 material,
                 limit,

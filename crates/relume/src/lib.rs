@@ -89,7 +89,7 @@ pub use relume_core::glam;
 pub use relume_core::scene::{
     Body, BodyId, Camera, Edits, Held, Interpolation, Light, LightId, LightKind, Material,
     MaterialId, NewBody, Note, Patch, PatchId, Projection, RotationTrack, Scene, SceneBuilder,
-    SceneError, Severity, Surface, SurfaceId, TakenBody, Track, World, outside,
+    SceneError, Severity, Surface, SurfaceId, Track, World, outside,
 };
 pub use relume_core::session::{
     Accuracy, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Flux,

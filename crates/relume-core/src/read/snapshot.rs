@@ -22,8 +22,8 @@ pub struct Snapshot {
     pub scene: Arc<Scene>,
     /// Time in the animation, seconds.
     pub time_s: f64,
-    /// What radiosities may be off by where little light arrives, W/m2: a share of the tolerance times the mean irradiance,
-    /// rough. Pictures show nothing darker than this.
+    /// Error of radiosities where little light arrives, W/m2, roughly: a share of the tolerance times the mean irradiance.
+    /// Pictures show nothing darker than this.
     pub error_w_m2: f64,
     /// Poses, materials and lights as they were.
     pub world: World,
@@ -36,9 +36,9 @@ pub struct Snapshot {
 /// A leaf of the element forest: a convex piece of a patch, over which irradiance is linear.
 #[derive(Clone, Copy, Debug)]
 pub struct Leaf {
-    /// Which of the facets of its patch it is a part of, from 0: triangles and quadrilaterals are one.
+    /// Index of its facet in its patch, from 0: triangles and quadrilaterals are one.
     pub facet: u32,
-    /// Where it is in its facet: a one bit, then two bits for each time that it was quartered. The same in every solution.
+    /// Place in its facet: a one bit, then two bits for each quartering. The same in every solution.
     pub path: u32,
     /// Corners in the patch's frame, counter-clockwise, metres; a triangle repeats its last corner.
     pub corners: [DVec2; 4],
@@ -51,7 +51,7 @@ pub struct Leaf {
 }
 
 impl Leaf {
-    /// How often its facet was quartered for it.
+    /// Number of quarterings from its facet down to it.
     pub fn level(&self) -> u32 {
         self.path.max(1).ilog2() / 2
     }
@@ -79,12 +79,12 @@ impl Leaf {
 }
 
 impl Snapshot {
-    /// Irradiance that the mesh says is at a point of a surface, W/m2, linear RGB: on the nearest
-    /// patch that faces along `normal` (to within 25 degrees) and has the point on it, no further
-    /// than a 1/1000 of the scene's diagonal away; `None` where there is none.
+    /// Irradiance of the mesh at a point of a surface, W/m2, linear RGB: on the nearest patch that faces along `normal` (to
+    /// within 25 degrees) and has the point on it, no further than a 1/1000 of the scene's diagonal away; `None` where there is
+    /// none.
     ///
     /// Linear over a leaf, with jumps between leaves: across the edge of a shadow it is right in the
-    /// mean and wrong on either side. [`super::Frame::irradiance_at`] has no such limit.
+    /// mean and wrong on either side. [`Frame::irradiance_at`](super::Frame::irradiance_at) has no such limit.
     pub fn irradiance_at(&self, point: DVec3, normal: DVec3) -> Option<[f64; 3]> {
         let near_m = 1e-3 * self.scene.bounds_in(&self.world)?.diagonal();
         let mut found: Vec<(f64, PatchId, DVec2)> = Vec::new();

@@ -56,7 +56,11 @@ impl Scene {
     /// count, all wound alike, and without lamps in it; and what lies in narrow gaps (`scene/gap.rs`). Bodies that never move cover each other, a body that moves only itself.
     /// Exact to a millionth of the largest coordinate. Of patches that are covered by more than 0.999 by one thing only that is said.
     /// Those that `is_displaced` names are not where the file has them: they cover themselves alone, as if they moved.
-    pub fn covered(&self, solids: &Solids, is_displaced: &dyn Fn(BodyId) -> bool) -> Vec<Covered> {
+    pub(crate) fn covered(
+        &self,
+        solids: &Solids,
+        is_displaced: &dyn Fn(BodyId) -> bool,
+    ) -> Vec<Covered> {
         let mut out = vec![Covered::default(); self.patches.len()];
         let bodies = (0..self.bodies.len() as u32).map(BodyId);
         let (moving, at_rest): (Vec<BodyId>, Vec<BodyId>) = bodies

@@ -65,7 +65,7 @@ impl Scene {
     }
 
     /// Whether there is a body of this id with patches, at some time or by hand.
-    pub fn has_body(&self, body: BodyId) -> bool {
+    pub(crate) fn has_body(&self, body: BodyId) -> bool {
         let found = self.bodies.get(body.0 as usize);
         found.is_some_and(|found| !found.patches.is_empty()) && !self.is_removed(body)
     }

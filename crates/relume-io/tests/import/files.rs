@@ -127,7 +127,7 @@ fn environments_of_files_are_named() {
     assert!(with_code(&scene_of(&g).unwrap().notes, "environment").is_empty());
     g.json["extensionsUsed"] = json!(["KHR_lights_environment"]);
     let scene = scene_of(&g).unwrap();
-    assert!(with_code(&scene.notes, "environment")[0].message.contains("--environment FILE"));
+    assert!(with_code(&scene.notes, "environment")[0].message.contains("`Sky::Environment`"));
 }
 
 #[test]

@@ -96,11 +96,7 @@ impl Outside {
         }
         if self.sky.as_ref().is_some_and(Sky::follows_the_sun) && self.sun.is_none() {
             let what = "how it looks depends on where the sun is".into();
-            return fails(
-                "the sky",
-                what,
-                "give the sun's place: --sun AZIMUTH,ELEVATION or LATITUDE,LONGITUDE,TIME",
-            );
+            return fails("the sky", what, "give the sun's place: `Outside::sun`");
         }
         if let Some(sun) = &self.sun {
             if !(sun.diameter_deg >= 1e-3 && sun.diameter_deg <= 60.0) {
@@ -119,7 +115,7 @@ impl Outside {
             _ => {
                 let what =
                     "the sun moves over the day of a place on earth, and there is none".into();
-                fails("the day", what, "give --sun LATITUDE,LONGITUDE,TIME")
+                fails("the day", what, "give `SunPlace::Earth`")
             }
         }
     }

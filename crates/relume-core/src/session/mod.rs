@@ -216,7 +216,7 @@ impl Session {
         }
     }
 
-    /// Says at which time the frame before the next step was, where that is not the last step:
+    /// Sets the time of the frame before the next step, where that is not the last step:
     /// [`FrameReport::moved`] and [`Work::dynamic_links`](crate::pair::Work::dynamic_links) count from there. Nothing else
     /// depends on it.
     #[doc(hidden)]

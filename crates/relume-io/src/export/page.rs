@@ -20,14 +20,14 @@ const PLAYER: &str = include_str!("player.html");
 /// at a hundredth of that 1/200.
 const STEPS: f64 = 4095.0;
 
-/// Where a page looks from at first.
+/// First view of a page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PageView {
     /// Where from, metres.
     pub eye: DVec3,
-    /// At what, metres: the view turns about it.
+    /// Point in the middle of the view, metres: the view turns about it.
     pub target: DVec3,
-    /// Which way is up.
+    /// Direction that is up in the view.
     pub up: DVec3,
     /// Vertical field of view, radians.
     pub yfov: f64,

@@ -6,6 +6,7 @@ use crate::pair::Work;
 
 /// Counters, energies and seconds of a frame: an entry of `frames` in a report of schema `relume-report/1`.
 #[derive(Clone, Debug, Default, Serialize)]
+#[non_exhaustive]
 pub struct FrameReport {
     /// Frame number.
     pub frame: u32,
@@ -77,6 +78,7 @@ pub struct LinkKinds {
 
 /// |1 - row sum| over the leaf elements of one frame.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
+#[non_exhaustive]
 pub struct RowSumError {
     /// Area-weighted root mean square.
     pub rms: f64,
@@ -110,6 +112,7 @@ impl Energy {
 /// mesh (`Snapshot::irradiance_at`), or of what sensors read (`Frame::irradiance_at`), as it was asked for. Estimated, not
 /// bounded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Accuracy {
     /// Number of points.
     pub points: u32,
@@ -139,6 +142,7 @@ pub struct Memory {
 
 /// Wall-clock seconds by phase.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
+#[non_exhaustive]
 pub struct Seconds {
     /// Poses and bounds.
     #[serde(rename = "move")]

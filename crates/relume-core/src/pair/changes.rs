@@ -8,6 +8,7 @@ use super::tree::{Carried, PairId};
 
 /// Exact counts of the work of an update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Work {
     /// Pairs visited on the walk, unaffected ones included.
     pub visited: u64,

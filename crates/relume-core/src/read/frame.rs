@@ -36,6 +36,7 @@ impl std::fmt::Display for Hash {
 
 /// The leaves of a solution as flat arrays, in the world: one entry for each leaf.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Mesh {
     /// Corners, metres, counter-clockwise seen from the front; a triangle repeats its last.
     pub corners: Vec<[[f32; 3]; 4]>,

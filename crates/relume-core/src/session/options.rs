@@ -41,6 +41,7 @@ impl Default for Options {
 
 /// Oracle: the criterion by which a pair becomes a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Oracle {
     /// Estimated irradiance error that a link causes on its receivers: the default.
     Error,

@@ -1,10 +1,11 @@
 //! What the library advises, in flags of the command: its messages name options of functions. Knows names only.
 
 /// Names in messages of the library, and what of the command they are.
-const FLAGS: [(&str, &str); 11] = [
+const FLAGS: [(&str, &str); 12] = [
     ("`ImportOptions::max_memory_bytes`", "--max-memory"),
     ("`ImportOptions::allow_outside`", "--allow-outside"),
     ("`ImportOptions::animation`", "--animation"),
+    ("`ImportOptions::edits`", "--reflect and --emit"),
     ("`ImportOptions::rebuild`", "--deform rebuild"),
     ("`Options::max_memory_bytes`", "--max-memory"),
     ("`Options::tolerance`", "--tolerance"),

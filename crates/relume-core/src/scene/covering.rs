@@ -87,7 +87,7 @@ impl Covering {
     }
 
     /// What of patches is covered at an instant, with what is always covered of them (`rest`, by patch): of a moving body by others, of
-    /// others by it. By the rules of [`Scene::covered`], with lamps where they are now.
+    /// others by it. By the rules of `Scene::covered`, with lamps where they are now.
     pub fn at(
         &self,
         scene: &Scene,

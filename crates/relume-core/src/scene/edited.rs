@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::{BodyId, Scene};
 
-/// Bodies that came into a scene or left it after it was made ([`Scene::with_body`], [`Scene::without_body`]).
+/// Bodies that came into a scene or left it after it was made (`Scene::with_body`, `Scene::without_body`).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Edited {
     /// Names for the parts of each body that was inserted, also where it left again and its id is reserved.

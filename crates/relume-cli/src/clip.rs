@@ -255,13 +255,13 @@ fn instants(flags: &ClipFlags) -> Instants {
 /// The message of a step that failed; `kept` says what stays of the frames before it, if anything.
 pub(crate) fn step_failure(error: SessionError, kept: &str) -> Failure {
     match error {
-        SessionError::OutOfMemory { frame, tolerance, limit_bytes, links } => {
+        SessionError::OutOfMemory { frame, tolerance, limit_bytes, pairs } => {
             let separator = if kept.is_empty() { "" } else { "; " };
             Failure::out_of_memory(format_args!(
                 "frame {frame} at tolerance {tolerance} needs more than the {} of memory \
                  allowed ({} pairs so far)",
                 HumanBytes(memory::limit_bytes().unwrap_or(limit_bytes)),
-                count(links)
+                count(pairs)
             ))
             .help(format_args!("raise --max-memory or the tolerance{separator}{kept}"))
         }

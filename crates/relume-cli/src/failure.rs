@@ -4,6 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::Path;
 
+use crate::in_flags::in_flags;
 use crate::text;
 
 /// Exit code where `--max-memory` does not suffice.
@@ -84,14 +85,14 @@ fn describe(error: &io::Error) -> String {
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let message = text::one_line(&self.message);
+        let message = text::one_line(&in_flags(&self.message));
         if self.exit_code == 130 {
             write!(f, "{message}")?;
         } else {
             write!(f, "error: {message}")?;
         }
         match &self.help {
-            Some(help) => write!(f, "\n  help: {}", text::one_line(help)),
+            Some(help) => write!(f, "\n  help: {}", text::one_line(&in_flags(help))),
             None => Ok(()),
         }
     }

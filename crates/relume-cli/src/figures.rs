@@ -533,18 +533,20 @@ pub(crate) fn whole(mean: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use relume::session::{PairCounts, Work};
+    use relume::session::PairCounts;
 
     use super::*;
 
     /// Two frames after the first: 10 and 30 ms, against 200 ms from scratch for one of them.
     fn figures() -> Figures {
-        let report = |dynamic_links, examined| FrameReport {
-            work: Work { dynamic_links, examined, changed: 5, ..Work::default() },
-            links: 1_000,
-            pairs: PairCounts { active: 100, refined: 30, culled: 20 },
-            seconds: Seconds { evaluate: 0.1, solve: 0.004, ..<_>::default() },
-            ..<_>::default()
+        let report = |dynamic_links, examined| {
+            let mut report = FrameReport::default();
+            let (work, seconds) = (&mut report.work, &mut report.seconds);
+            (work.dynamic_links, work.examined, work.changed) = (dynamic_links, examined, 5);
+            (seconds.evaluate, seconds.solve) = (0.1, 0.004);
+            report.links = 1_000;
+            report.pairs = PairCounts { active: 100, refined: 30, culled: 20 };
+            report
         };
         let frame = |seconds, cold| Measured {
             seconds,

@@ -15,6 +15,7 @@ mod failure;
 mod figures;
 mod flat;
 mod frames;
+mod in_flags;
 mod info;
 mod interrupt;
 mod light;

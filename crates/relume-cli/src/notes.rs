@@ -2,6 +2,7 @@
 
 use relume::scene::{Note, Severity};
 
+use crate::in_flags::in_flags;
 use crate::text;
 
 /// As many of one kind are one line.
@@ -34,7 +35,7 @@ pub(crate) fn line(note: &Note) -> String {
     } else {
         format!("{}: ", text::name(&note.subject))
     };
-    text::one_line(&format!("{}: {subject}{}{count}", head(note), note.message))
+    text::one_line(&format!("{}: {subject}{}{count}", head(note), in_flags(&note.message)))
 }
 
 /// One line about many notes of one kind: how many, whose they are, and what the first says.
@@ -59,7 +60,7 @@ fn folded(alike: &[&Note]) -> String {
         "{} ({} of this kind, --verbose lists all): {whose}: {}{of_first}",
         head(first),
         alike.len(),
-        first.message
+        in_flags(&first.message)
     );
     text::one_line(&text)
 }

@@ -312,7 +312,8 @@ mod tests {
         let mut report = report();
         let third = 1.0 / 3.0;
         for frame in [7, 2] {
-            let entry = FrameReport { frame, time_s: third, ..FrameReport::default() };
+            let mut entry = FrameReport::default();
+            (entry.frame, entry.time_s) = (frame, third);
             report.add(&entry, None).unwrap();
         }
         report.write(&path).unwrap();
@@ -327,8 +328,8 @@ mod tests {
     fn an_entry_says_what_is_unaccounted_for_and_has_the_digest_of_its_picture() {
         let mut report = report();
         let energy = Energy { emitted_w: 50.0, absorbed_w: 48.0, escaped_w: 0.0 };
-        let suspects = vec!["shelf".to_owned()];
-        let frame = FrameReport { frame: 3, energy: Some(energy), suspects, ..Default::default() };
+        let mut frame = FrameReport::default();
+        (frame.frame, frame.energy, frame.suspects) = (3, Some(energy), vec!["shelf".to_owned()]);
         report.add(&frame, Some("00ff")).unwrap();
         let found = report.finished(3);
         assert_eq!((found.unbalanced, found.picture.as_deref()), (0.04, Some("00ff")));
@@ -338,7 +339,8 @@ mod tests {
 
     #[test]
     fn a_number_that_is_not_finite_is_refused() {
-        let frame = FrameReport { residual: f64::INFINITY, ..FrameReport::default() };
+        let mut frame = FrameReport::default();
+        frame.residual = f64::INFINITY;
         assert!(report().add(&frame, None).is_err());
     }
 

@@ -263,7 +263,9 @@ mod tests {
     fn whole_frames_and_the_exposure_are_taken_over() {
         let mut earlier = report();
         for frame in [0, 1, 2] {
-            earlier.add(&FrameReport { frame, ..FrameReport::default() }, None).unwrap();
+            let mut entry = FrameReport::default();
+            entry.frame = frame;
+            earlier.add(&entry, None).unwrap();
         }
         earlier.peak_memory_bytes = 77;
         let mut now = with(|r| {

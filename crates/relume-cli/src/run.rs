@@ -824,8 +824,8 @@ mod tests {
         let mut add = |frame, absorbed_w, suspects: &[&str]| {
             let energy = Some(Energy { emitted_w: 100.0, absorbed_w, escaped_w: 0.0 });
             let suspects = suspects.iter().map(|s| (*s).to_owned()).collect();
-            let entry =
-                relume::session::FrameReport { frame, energy, suspects, ..Default::default() };
+            let mut entry = relume::session::FrameReport::default();
+            (entry.frame, entry.energy, entry.suspects) = (frame, energy, suspects);
             report.add(&entry, None).unwrap();
         };
         add(0, 99.5, &[]);

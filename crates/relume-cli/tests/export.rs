@@ -4,6 +4,8 @@ use std::fs;
 use std::io::Read;
 use std::path::Path;
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
 use crate::common::{relume, room, text};
@@ -244,7 +246,7 @@ fn a_page_holds_the_light_of_every_frame_and_asks_for_nothing_else() {
     let moves = |body: &Value| body["poses"].as_array().unwrap().len() == 3;
     assert!(described["bodies"].as_array().unwrap().iter().any(moves), "the lamp moves");
     let mut data = Vec::new();
-    let packed = decoded(element(&page, "light"));
+    let packed = STANDARD.decode(element(&page, "light")).unwrap();
     flate2::read::ZlibDecoder::new(&packed[..]).read_to_end(&mut data).unwrap();
     let (points, roots, top) = of_floor(&described, &data);
     let lines = points.chunks(3).map(|p| format!("{} {} {} 0 1 0\n", p[0], p[1], p[2]));
@@ -292,23 +294,6 @@ fn of_floor(described: &Value, mut data: &[u8]) -> (Vec<f32>, Vec<i32>, f64) {
     let (points, roots, top) = floor.expect("there is a floor whose light changes");
     let word = |b: &[u8]| f32::from_le_bytes(b.try_into().unwrap());
     (points.chunks(4).map(word).collect(), roots, top)
-}
-
-/// The bytes of base64.
-fn decoded(text: &str) -> Vec<u8> {
-    let digit = |b: u8| match b {
-        b'A'..=b'Z' => b - b'A',
-        b'a'..=b'z' => b - b'a' + 26,
-        b'0'..=b'9' => b - b'0' + 52,
-        b'+' => 62,
-        _ => 63,
-    };
-    let digits: Vec<u8> = text.bytes().filter(|&b| b != b'=').map(digit).collect();
-    let four = |d: &[u8]| {
-        let bits = d.iter().fold(0_u32, |bits, &d| bits << 6 | u32::from(d)) << (6 * (4 - d.len()));
-        bits.to_be_bytes()[1..d.len()].to_vec()
-    };
-    digits.chunks(4).flat_map(four).collect()
 }
 
 /// Radiance times 2^1, not cut off: what a file of one frame has, on a mesh of its own.

@@ -279,10 +279,10 @@ fn frames_against_cold(
 
 fn name(oracle: Oracle, tolerance: f64) -> String {
     match oracle {
-        Oracle::Error => format!("error {tolerance:.4}"),
         Oracle::FormFactor { epsilon, min_area_m2 } => {
             format!("form-factor {epsilon:.5},{min_area_m2:.1e}")
         }
+        _ => format!("error {tolerance:.4}"),
     }
 }
 

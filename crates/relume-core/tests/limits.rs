@@ -43,7 +43,7 @@ fn too_little_memory_is_an_error_that_names_the_remedy() {
                 matches!(error, SessionError::OutOfMemory { frame: 5, .. }),
                 "{oracle}: {text}"
             );
-            for word in ["frame 5", "300000", "--max-memory", "tolerance"] {
+            for word in ["frame 5", "300000", "Options::max_memory_bytes", "tolerance"] {
                 assert!(text.contains(word), "{oracle}: `{word}` is not in `{text}`");
             }
         }

@@ -484,10 +484,10 @@ fn what_makes_no_sense_is_refused_with_its_remedy() {
     let sun = |azimuth, elevation| Some(sun_at(azimuth, elevation, 1.0));
     let day = Some(Day { from_s: 0.0, to_s: 1.0, over_s: 1.0 });
     let outsides = [
-        (under(Sky::Clear { irradiance: 1.0 }), "--sun"),
+        (under(Sky::Clear { irradiance: 1.0 }), "`Outside::sun`"),
         (under(Sky::Uniform([-1.0; 3])), "0 to 1e12"),
         (Outside { sun: sun(0.0, 91.0), ..Outside::default() }, "-90 to 90"),
-        (Outside { sun: sun(0.0, 45.0), day, ..Outside::default() }, "LATITUDE"),
+        (Outside { sun: sun(0.0, 45.0), day, ..Outside::default() }, "`SunPlace::Earth`"),
         (Outside { ground: 1.0, ..under(Sky::Uniform([1.0; 3])) }, "less than 1"),
         (Outside { sun: sun(0.0, 45.0), ..under(Sky::Turbid { turbidity: 40.0 }) }, "hazy"),
     ];

@@ -29,7 +29,7 @@ pub fn read_environment(
         what: what.into(),
         needs_bytes,
         limit_bytes: max_memory_bytes.unwrap_or(u64::MAX),
-        remedy: "raise --max-memory, or use a smaller picture".into(),
+        remedy: "raise `ImportOptions::max_memory_bytes`, or use a smaller picture".into(),
     };
     let damaged = |what: String| SceneError::Geometry {
         subject: format!("environment `{file}`"),

@@ -85,7 +85,7 @@ impl Folder {
         SceneError::Outside {
             file: self.file.clone(),
             what,
-            remedy: "put it beside the scene file, or read it all the same with --allow-outside"
+            remedy: "put it beside the scene file, or read it all the same with `ImportOptions::allow_outside`"
                 .into(),
         }
     }

@@ -13,20 +13,20 @@ use relume_core::scene::{Scene, SceneError};
 /// Reads a scene from a .glb or .gltf file (glTF 2.0; external, embedded and compressed buffers), a .vs3 file
 /// of View3D, or an .obj, .stl or .ply file.
 ///
-/// Of the last three: a body at rest for each object or group, in metres as the numbers are. Materials of OBJ have Kd
-/// as reflectance and Ke as radiance in W/m2/sr, times their images; what has none is a middle grey, or has the colours of its
-/// vertices; all but what emits is double-sided.
-/// Of View3D: one body at rest with a surface for each of the file's, in its order and by its name;
-/// reflectance is 1 minus emittance, subsurfaces and null surfaces are cut out of their base, combined
-/// surfaces are one, obstructions are in [`Scene::obstructions`]. Of glTF:
+/// - glTF: units are metres, seconds and W. Emissive factors are radiances in W/m2/sr, punctual lights are converted
+///   ([`Light::conversion`](relume_core::scene::Light::conversion)). Emissions and visibility may be animated
+///   (KHR_animation_pointer). Extensions without effect on diffuse light are ignored. Skins whose triangles hang on one joint
+///   each move with their joints; other skins are held in their pose at the start, moving morph targets in their rest shape,
+///   unless [`ImportOptions::rebuild`] reads them anew for each frame, and scales that change at their first size, each with a
+///   warning that names the node.
+/// - OBJ, STL, PLY: a body at rest for each object or group; coordinates are metres. Materials of OBJ have Kd as reflectance and
+///   Ke as radiance in W/m2/sr, times their images; surfaces without a material are a middle grey, or have the colours of their
+///   vertices; all surfaces that do not emit are double-sided.
+/// - View3D: one body at rest with a surface for each of the file's, in the file's order and by the file's names. Reflectance is 1
+///   minus emittance; subsurfaces and null surfaces are cut out of their base, combined surfaces are one, obstructions are in
+///   [`Scene::obstructions`].
 ///
-/// Units are metres, seconds and W: emissive factors are radiances in W/m2/sr, punctual lights are
-/// converted ([`Light::conversion`](relume_core::scene::Light::conversion)). Emissions and visibility may be animated
-/// (KHR_animation_pointer). Extensions without effect on diffuse light are
-/// ignored; what is read otherwise than the file says is in [`Scene::notes`]. Skins whose triangles hang on one
-/// joint each move with their joints; other skins are held in their pose at the start, moving morph targets in their
-/// rest shape, unless [`ImportOptions::rebuild`] reads them anew for each frame, and scales that change at their first size, each
-/// with a warning that names the node. Only files in the scene's own folder and below are opened,
+/// Where the scene differs from the file, [`Scene::notes`] says so. Only files in the scene's own folder and below are opened,
 /// unless [`ImportOptions::allow_outside`] says otherwise.
 ///
 /// # Errors
@@ -55,6 +55,6 @@ fn no_animation(name: &str, format: &str) -> SceneError {
     SceneError::Animation {
         animation: name.to_owned(),
         what: format!("files of {format} have no animation"),
-        remedy: "leave out --animation".into(),
+        remedy: "leave out `ImportOptions::animation`".into(),
     }
 }

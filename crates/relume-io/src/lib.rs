@@ -6,7 +6,7 @@
 // Tests may measure and compare with whatever the platform offers: what they compute decides nothing.
 #![cfg_attr(test, allow(clippy::disallowed_methods, clippy::disallowed_types))]
 
-mod base64;
+mod data_uri;
 mod environment;
 pub mod export;
 pub mod flat;

@@ -12,7 +12,7 @@ use relume_core::geometry::Pose;
 use relume_core::scene::{BodyId, LightId, MaterialId, NewBody, Scene};
 use relume_core::session::{Command, CommandError, Frame, Session, SessionError};
 
-/// What was done to a session, one entry for each command, undo, redo and solve.
+/// Record of a session: one entry for each command, undo, redo and solve.
 #[derive(Debug, Default)]
 pub struct Log {
     entries: Vec<Entry>,
@@ -56,7 +56,7 @@ pub enum LogError {
     /// The log cannot be read.
     #[error("the log cannot be read: {0}")]
     Read(#[from] std::io::Error),
-    /// A line makes no sense.
+    /// A line is no entry of a log.
     #[error("line {line}: {what}")]
     Line {
         /// From 1.
@@ -88,7 +88,7 @@ impl Log {
         Log::default()
     }
 
-    /// Applies a command to a session; what was undone can be redone no more.
+    /// Applies a command to a session; commands undone before can no longer be redone.
     ///
     /// # Errors
     /// As [`Session::apply`]; a command that was refused is not logged.
@@ -106,7 +106,7 @@ impl Log {
         Ok(())
     }
 
-    /// Takes the last command that stands back; whether there was one.
+    /// Undoes the last command that is in force; returns false if there is none.
     ///
     /// # Errors
     /// [`CommandError`] if commands beside this log have changed what it would change.
@@ -116,7 +116,7 @@ impl Log {
         Ok(found)
     }
 
-    /// Applies the last command that was undone again; whether there was one.
+    /// Redoes the command that was undone last; returns false if there is none.
     ///
     /// # Errors
     /// As [`Log::undo`].
@@ -148,8 +148,8 @@ impl Log {
         Ok(())
     }
 
-    /// Does to a session what a log says was done to another; after each solve `each` is told the frame and the hash that
-    /// the log has for it. Returns the log of what was done.
+    /// Applies the entries of a log to a session, and calls `each` after every solve with the frame and the hash in the log.
+    /// Returns the log of this session.
     ///
     /// # Errors
     /// [`LogError`], with the number of the line; what was done before stays.

@@ -62,7 +62,7 @@ pub(super) fn unless_fits(
             what: what.to_string(),
             needs_bytes,
             limit_bytes,
-            remedy: "raise --max-memory, or make the file smaller".into(),
+            remedy: "raise `ImportOptions::max_memory_bytes`, or make the file smaller".into(),
         }),
         _ => Ok(()),
     }

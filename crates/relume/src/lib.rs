@@ -40,7 +40,7 @@
 //! let glow = b.material("glow", [0.0; 3], [1.0; 3]);
 //! let room = b.body("room");
 //! let ball = b.body("ball");
-//! b.mesh(room, "walls", grey, &room_corners, &room_triangles); // &[[f64; 3]], &[[u32; 3]]
+//! b.mesh(room, "walls", grey, &room_corners, &room_triangles); // &[[f64; 3]] in metres, &[[u32; 3]]
 //! b.mesh(ball, "lamp", glow, &lamp_corners, &lamp_triangles);
 //! let mut session = Session::new(b.build()?, Options { tolerance: 0.1, ..Options::default() })?;
 //! let first = session.solve()?.hash();
@@ -51,9 +51,14 @@
 //!
 //! session.apply(undo)?;
 //! assert_eq!(session.solve()?.hash(), first);
+//! let mesh = session.solve()?.snapshot(); // flat arrays, an entry a leaf: corners, radiosity, patch; and revision
+//! # assert_eq!(mesh.corners.len(), mesh.radiosity.len());
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! Triangles are counter-clockwise seen from their front, the side that is lit and shines: the walls of a room are seen from inside,
+//! a lamp from outside. The back is black and hides what is behind it; [`SceneBuilder::double_sided_material`] makes both sides fronts.
 //!
 //! Lengths are metres, times seconds, light is radiometric (W, W/m2, W/sr) in three linear channels. Work is done on
 //! rayon's global pool; inside `ThreadPool::install` on that pool. Results are the same on any. [`Session::watch`] shows a
@@ -89,7 +94,7 @@ pub use relume_core::glam;
 pub use relume_core::scene::{
     Body, BodyId, Camera, Edits, Held, Interpolation, Light, LightId, LightKind, Material,
     MaterialId, NewBody, Note, Patch, PatchId, Projection, RotationTrack, Scene, SceneBuilder,
-    SceneError, Severity, Surface, SurfaceId, TakenBody, Track, World, outside,
+    SceneError, Severity, Surface, SurfaceId, Track, World, outside,
 };
 pub use relume_core::session::{
     Accuracy, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Flux,

@@ -11,14 +11,14 @@ const LINES_MAX: usize = 60;
 const REASON: &str = "// Over 60 lines: ";
 
 /// Names and lengths of the functions of a file that are too long and have no reason beside them. A formatted file is
-/// assumed: a function ends at the brace that is as far in as its head.
+/// assumed: a function ends at the line that is as far in as its head and begins with a brace, in a macro too (`})*`).
 fn long(text: &str) -> Vec<(String, usize)> {
     let lines: Vec<&str> = text.lines().collect();
     let mut found = Vec::new();
     for (at, line) in lines.iter().enumerate() {
         let Some(name) = function(line) else { continue };
         let indent = &line[..line.len() - line.trim_start().len()];
-        let is_end = |l: &&str| l.strip_prefix(indent).is_some_and(|l| l == "}" || l == "};");
+        let is_end = |l: &&str| l.strip_prefix(indent).is_some_and(|l| l.starts_with('}'));
         let one_line = line.ends_with('}') || line.ends_with(';');
         let length = 1 + lines[at..].iter().take_while(|line| !is_end(line)).count();
         let above = lines[..at].iter().rev();
@@ -65,4 +65,10 @@ fn the_counter_finds_long_functions_and_reasons() {
         long(&function("    /// Words.\n    // Over 60 lines: a list.\n    #[test]\n", 90)),
         []
     );
+    let in_macro = format!(
+        "macro_rules! m {{\n    ($($f:ident)*) => {{\n        $(#[test]\n        fn $f() {{\n{}        }})*\n    }};\n}}\n\nm! {{\n{}}}\n",
+        "            x();\n".repeat(3),
+        "    one\n".repeat(90)
+    );
+    assert_eq!(long(&in_macro), []);
 }

@@ -1,5 +1,7 @@
 //! Valid files to begin with: one of each format, which between them use whatever is read.
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
 use super::glb::{pack, unpack};
@@ -62,25 +64,11 @@ pub(crate) fn written(format: Format, json: &Value, bin: &[u8]) -> Vec<u8> {
     let first = json.get_mut("buffers").and_then(|b| b.get_mut(0)).and_then(Value::as_object_mut);
     match (format, first) {
         (Format::Gltf, Some(buffer)) => {
-            buffer.insert("uri".into(), json!(format!("data:;base64,{}", base64(bin))));
+            buffer.insert("uri".into(), json!(format!("data:;base64,{}", STANDARD.encode(bin))));
             serde_json::to_vec(&json).unwrap()
         }
         _ => pack(&json, bin),
     }
-}
-
-fn base64(bytes: &[u8]) -> String {
-    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut out = String::new();
-    for chunk in bytes.chunks(3) {
-        let word =
-            chunk.iter().fold(0_u32, |w, &b| w << 8 | u32::from(b)) << (8 * (3 - chunk.len()));
-        for k in 0..4 {
-            let letter = LETTERS[(word >> (18 - 6 * k) & 63) as usize] as char;
-            out.push(if k <= chunk.len() { letter } else { '=' });
-        }
-    }
-    out
 }
 
 /// Buffers in the making.

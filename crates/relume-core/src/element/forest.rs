@@ -308,7 +308,7 @@ impl Forest {
         f64::from(self.nodes[id.0 as usize].area_m2)
     }
 
-    /// Area of what light can reach, m2: without what rests on the element ([`Scene::covered`](crate::scene::Scene::covered)); a millionth of the area
+    /// Area of what light can reach, m2: without what rests on the element (`Scene::covered`); a millionth of the area
     /// where it is covered wholly. Light counts over this area alone: an element has the mean radiosity of what can be seen of
     /// it. Exact up to single precision.
     #[inline]

@@ -392,6 +392,31 @@ mod tests {
     }
 
     #[test]
+    fn neighbours_share_corners_bit_for_bit_whatever_their_levels() {
+        let v = DVec2::new;
+        for corners in [
+            vec![v(0.3, 0.1), v(1., 0.), v(1.1, 1.), v(0., 0.9)],
+            vec![v(-1., 2.), v(3., 2.5), v(0.2, 4.)],
+        ] {
+            let facet = Shape::new(&corners);
+            let chart = Chart::of(&facet);
+            let below = |place: &Place| {
+                let (places, n) = place.children(facet.len, chart.shape(place).cut(), &[]);
+                places[..n].to_vec()
+            };
+            let halves = below(&Place::whole(facet.len));
+            let quarters: Vec<Place> = halves.iter().flat_map(below).collect();
+            let all: Vec<DVec2> =
+                halves.iter().chain(&quarters).flat_map(|p| chart.shape(p).corners).collect();
+            for p in &all {
+                for q in all.iter().filter(|q| p.distance(**q) < 1e-9) {
+                    assert_eq!(p.to_array().map(f64::to_bits), q.to_array().map(f64::to_bits));
+                }
+            }
+        }
+    }
+
+    #[test]
     fn the_chart_meets_the_corners_of_its_facet() {
         let v = DVec2::new;
         for corners in [

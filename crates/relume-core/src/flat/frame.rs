@@ -59,7 +59,7 @@ impl<'a> FlatFrame<'a> {
         (&self.solved.tree, &self.solved.space.forest)
     }
 
-    /// Where everything is at this instant.
+    /// Places of all elements at this instant.
     pub fn view(&self) -> &'a PlaneView {
         &self.solved.space.view
     }
@@ -96,7 +96,7 @@ impl<'a> FlatFrame<'a> {
         with_names(&self.solved.events, &|facet| self.solved.space.facet_name(ElementId(facet)))
     }
 
-    /// The same as the engine records them.
+    /// Events as the engine records them, by ids.
     pub fn link_events(&self) -> &'a [LinkEvent] {
         &self.solved.events
     }

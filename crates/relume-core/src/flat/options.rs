@@ -4,7 +4,7 @@ use crate::follow::Update;
 
 use super::scene::SceneError;
 
-/// How a scene in the plane is solved.
+/// Options of a solution in the plane.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlatOptions {
     /// Largest form factor of a link, in (0, 1). Default 0.05.
@@ -43,10 +43,10 @@ pub enum OptionError {
     /// A threshold out of range.
     #[error("{0} is {1}: it must lie between 0 and 1")]
     Range(&'static str, f64),
-    /// A length that is none.
+    /// A smallest length that is negative or not finite.
     #[error("the smallest length is {0} m: it must not be negative")]
     Length(f64),
-    /// What a strategy is given.
+    /// A parameter of a strategy out of its range.
     #[error("{0}")]
     Update(String),
     /// The scene.

@@ -44,7 +44,7 @@ impl Segment {
         self.along().perp() / self.length()
     }
 
-    /// The same seen from behind.
+    /// The segment from end to start: its front is this one's back.
     pub fn reversed(&self) -> Segment {
         Segment { start: self.end, end: self.start }
     }
@@ -110,7 +110,7 @@ pub(super) fn rounding(a: &Segment, b: &Segment) -> f64 {
 pub struct PlanePose {
     /// Cosine and sine of the angle.
     pub turn: DVec2,
-    /// Where the body's origin is.
+    /// World position of the body's origin, metres.
     pub origin: DVec2,
 }
 

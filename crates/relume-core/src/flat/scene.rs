@@ -18,14 +18,14 @@ pub struct BodyIndex(pub u32);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct WallIndex(pub u32);
 
-/// What a wall is made of, linear RGB.
+/// Diffuse material of a wall, linear RGB.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Reflectance rho, in [0, 1).
     pub reflectance: [f64; 3],
     /// Exitance M, W/m2.
     pub exitance: [f64; 3],
-    /// Whether the back is like the front; if not it is black. Either way it blocks.
+    /// Whether both sides reflect and emit; otherwise the back is black. Both sides block light.
     pub two_sided: bool,
 }
 
@@ -65,7 +65,7 @@ pub struct Key {
     pub angle: f64,
 }
 
-/// How a body moves: straight from key to key, at rest before the first and after the last.
+/// Motion of a body: straight from key to key, at rest before the first and after the last.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
     keys: Vec<Key>,
@@ -103,7 +103,7 @@ impl Motion {
     }
 }
 
-/// What moves rigidly together.
+/// Rigid body of the plane: walls with one motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// What it is called.
@@ -121,7 +121,7 @@ pub struct FlatScene {
     walls: Vec<Wall>,
 }
 
-/// What is wrong with a scene.
+/// Error: a scene of the plane that cannot be solved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SceneError {
     /// A wall without a direction.
@@ -129,7 +129,7 @@ pub enum SceneError {
         "segment `{0}` has no length, or too little for where it is: give it two different ends"
     )]
     NoLength(String),
-    /// A number that is none, or too large to compute with.
+    /// A number that is not finite, or too large to compute with.
     #[error("`{0}` has a number that is not finite, or larger than 1e12")]
     NotFinite(String),
     /// A reflectance out of range.
@@ -144,13 +144,13 @@ pub enum SceneError {
     /// Keys out of order.
     #[error("body `{0}`: the times of its keys must ascend")]
     Keys(String),
-    /// Nothing at all.
+    /// A scene without walls.
     #[error("the scene has no segments")]
     Nothing,
 }
 
 impl FlatScene {
-    /// Nothing yet.
+    /// A scene without bodies.
     pub fn new() -> FlatScene {
         FlatScene::default()
     }

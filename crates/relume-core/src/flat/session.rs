@@ -45,7 +45,7 @@ impl FlatSession {
         self.step_within(frame, time_s, None).expect("there is no limit")
     }
 
-    /// The same within a limit on memory, bytes.
+    /// Brings the solution to `time_s` as [`FlatSession::step`] does, within a limit on memory, bytes.
     ///
     /// # Errors
     /// [`OutOfMemory`] if the links do not fit; [`FlatSession::frame`] is then that of the last solution as before.
@@ -111,7 +111,7 @@ impl FlatSession {
         self.solved.as_ref()
     }
 
-    /// Says at which time the frame before the next step was, where that is not the last step:
+    /// Sets the time of the frame before the next step, where that is not the last step:
     /// [`Work::dynamic_links`](crate::pair::Work::dynamic_links) of a cold build count from there. Nothing else depends on it.
     pub fn count_motion_from(&mut self, time_s: Option<f64>) {
         self.count_motion_from = time_s;

@@ -45,7 +45,7 @@ pub(crate) enum Why {
     },
     /// Absorbed and escaped flux differ from the emitted flux.
     Unbalanced {
-        /// Share of what is emitted.
+        /// Difference as a share of the emitted flux, 1.
         share: f64,
         /// Names of the surfaces whose rows exceed 1 by most.
         surfaces: Vec<String>,

@@ -4,8 +4,9 @@ use serde::Serialize;
 
 use crate::pair::Work;
 
-/// One entry of `frames` in a report of schema `relume-report/1`.
+/// Counters, energies and seconds of a frame: an entry of `frames` in a report of schema `relume-report/1`.
 #[derive(Clone, Debug, Default, Serialize)]
+#[non_exhaustive]
 pub struct FrameReport {
     /// Frame number.
     pub frame: u32,
@@ -77,6 +78,7 @@ pub struct LinkKinds {
 
 /// |1 - row sum| over the leaf elements of one frame.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
+#[non_exhaustive]
 pub struct RowSumError {
     /// Area-weighted root mean square.
     pub rms: f64,
@@ -91,13 +93,13 @@ pub struct Energy {
     pub emitted_w: f64,
     /// Absorbed by surfaces.
     pub absorbed_w: f64,
-    /// Left the scene: what surfaces send and links carry nowhere. Below 0 where form factors sum to more than 1.
+    /// Flux that leaves the scene: sent by surfaces along no link. Below 0 where form factors sum to more than 1.
     pub escaped_w: f64,
 }
 
 impl Energy {
-    /// Share of what is emitted that is neither absorbed nor escaped, or that is so without having been emitted: the larger of the
-    /// residual of the balance and of what arrives beyond what is sent.
+    /// Error of the balance as a share of the emitted flux, 1: the larger of |emitted - absorbed - escaped| and of the flux that
+    /// arrives beyond what is sent.
     pub fn unbalanced(&self) -> f64 {
         let residual_w = (self.emitted_w - self.absorbed_w - self.escaped_w).abs();
         // What is not a number stays one.
@@ -106,10 +108,11 @@ impl Energy {
     }
 }
 
-/// Errors of a solution, relative to the irradiance (sum of the channels) at each of some points: 1. Of what the mesh says there
-/// (`Snapshot::irradiance_at`), or of what sensors read (`Frame::irradiance_at`), as it was asked for. Estimated, not
+/// Estimated errors of irradiance at some points, relative to the irradiance there (sum of the channels), dimensionless: of the
+/// mesh (`Snapshot::irradiance_at`), or of what sensors read (`Frame::irradiance_at`), as it was asked for. Estimated, not
 /// bounded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Accuracy {
     /// Number of points.
     pub points: u32,
@@ -139,6 +142,7 @@ pub struct Memory {
 
 /// Wall-clock seconds by phase.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
+#[non_exhaustive]
 pub struct Seconds {
     /// Poses and bounds.
     #[serde(rename = "move")]

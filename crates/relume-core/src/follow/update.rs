@@ -2,6 +2,7 @@
 
 /// Strategy by which the pair tree follows motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Update {
     /// Rebuild everything in every frame: the reference that others are checked against.
     Scratch,

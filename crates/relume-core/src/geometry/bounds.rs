@@ -114,19 +114,19 @@ impl Aabb {
         self.hi - self.lo
     }
 
-    /// The box of all sums of a vector of this box and one of the other.
+    /// Minkowski sum: the box of all sums of a point of this box and a point of the other.
     #[inline]
     pub fn sum(&self, other: &Aabb) -> Aabb {
         Aabb { lo: self.lo + other.lo, hi: self.hi + other.hi }
     }
 
-    /// The box of all differences of a vector of this box and one of the other.
+    /// Minkowski difference: the box of all differences of a point of this box and a point of the other.
     #[inline]
     pub fn difference(&self, other: &Aabb) -> Aabb {
         Aabb { lo: self.lo - other.hi, hi: self.hi - other.lo }
     }
 
-    /// How far the vectors of the box go along a direction.
+    /// Interval of the dot products of the box's points with a direction.
     #[inline]
     pub fn along(&self, direction: DVec3) -> Interval {
         let forwards = direction.cmpge(DVec3::ZERO);

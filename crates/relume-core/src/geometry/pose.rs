@@ -42,7 +42,7 @@ impl Pose {
         self.rotation.transpose() * (world - self.translation)
     }
 
-    /// The way back.
+    /// Inverse placement: local = rotation^T * (world - translation).
     pub fn inverse(&self) -> Pose {
         Pose { rotation: self.rotation.transpose(), translation: self.inverse_point(DVec3::ZERO) }
     }

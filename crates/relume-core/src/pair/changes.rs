@@ -8,6 +8,7 @@ use super::tree::{Carried, PairId};
 
 /// Exact counts of the work of an update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Work {
     /// Pairs visited on the walk, unaffected ones included.
     pub visited: u64,
@@ -47,7 +48,7 @@ pub struct Work {
 impl Work {
     /// Adds the update with the oracle to the update down to the coarse level. Visits and judgements are those of the second
     /// update, which visits every pair of the first again; edits are the sum of both.
-    pub fn add_after_coarse(&mut self, other: Work) {
+    pub(crate) fn add_after_coarse(&mut self, other: Work) {
         self.coarse_examined = self.examined;
         self.visited = other.visited;
         self.examined = other.examined;
@@ -83,13 +84,13 @@ pub enum EventKind {
     Promoted,
     /// A link became refined.
     Demoted,
-    /// More stands between its ends.
+    /// The visibility of a link fell.
     Occluded,
-    /// Less stands between its ends.
+    /// The visibility of a link rose.
     Revealed,
-    /// Its ends no longer face each other, or one vanished.
+    /// A pair was culled: its ends no longer face each other, or one of them vanished.
     Culled,
-    /// Its ends came to face each other.
+    /// A culled pair came back: its ends face each other again.
     Woken,
 }
 

@@ -1,4 +1,5 @@
-//! Judging pairs of the three-dimensional forest.
+//! Verdicts on pairs of elements in space: exchange area and visibility of a pair, by `transport`, and what the oracle makes of
+//! them.
 
 use std::cell::Cell;
 use std::ops::Range;

@@ -474,7 +474,7 @@ impl PairTree {
         (0..self.nodes.len() as u32).map(PairId).filter(|&id| self.state(id) == State::Active)
     }
 
-    /// All links, in no order of meaning.
+    /// All links, in no particular order.
     pub fn links(&self) -> impl Iterator<Item = Link> + Clone + '_ {
         (0..self.nodes.len() as u32).filter_map(|id| self.link(PairId(id)))
     }

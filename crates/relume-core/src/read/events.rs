@@ -10,8 +10,8 @@ use super::names::{ElementName, name_of};
 
 pub use crate::pair::EventKind;
 
-/// Something that happened to a link: one of the paper's three edits, or that two elements came to face
-/// each other or no longer do.
+/// Change of a link: promoted, demoted or occluded (Forsyth et al. 1995), or that two elements came to face each other or no
+/// longer do.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
     /// What happened.
@@ -22,7 +22,7 @@ pub struct Event {
     pub source: ElementName,
     /// Exchange area without occlusion (m2) and visibility before; `None` where there was no link.
     pub before: Option<(f32, f32)>,
-    /// The same after.
+    /// Exchange area without occlusion (m2) and visibility after; `None` where there is no link.
     pub after: Option<(f32, f32)>,
 }
 

@@ -16,7 +16,7 @@ use super::sensors;
 use super::snapshot::{self, Snapshot};
 use super::{accuracy, reconstruct};
 
-/// The solution of a world, until the session goes on.
+/// Solution of a world, readable until the session changes.
 #[derive(Clone, Copy)]
 pub struct Frame<'a> {
     solved: &'a Solved,
@@ -36,6 +36,7 @@ impl std::fmt::Display for Hash {
 
 /// The leaves of a solution as flat arrays, in the world: one entry for each leaf.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Mesh {
     /// Corners, metres, counter-clockwise seen from the front; a triangle repeats its last.
     pub corners: Vec<[[f32; 3]; 4]>,
@@ -76,12 +77,13 @@ impl<'a> Frame<'a> {
         sensors::irradiances_at(self.solved, sensors)
     }
 
-    /// Errors of what the mesh says, estimated at so many points along rays; each point costs some 2,000 rays.
+    /// Errors of the mesh's irradiance, estimated at `points` points by walks along rays. Cost: some 2,000 rays a point.
     pub fn accuracy(&self, points: usize) -> Accuracy {
         accuracy::accuracy(self.solved, points)
     }
 
-    /// Errors of what sensors read, estimated at each of them as by [`Frame::accuracy`]; where no light arrives, there is none.
+    /// Errors of the irradiance at sensors, estimated at each of them as by [`Frame::accuracy`]; where no light arrives, there is
+    /// none.
     pub fn accuracy_at(&self, sensors: &[Sensor]) -> Accuracy {
         accuracy::accuracy_at(self.solved, sensors)
     }
@@ -112,7 +114,7 @@ impl<'a> Frame<'a> {
         fluxes::fluxes(self.solved, grouping)
     }
 
-    /// Sums of the form factors from every leaf element, in no order of meaning: 1 in a closed scene, up to the links'
+    /// Sums of the form factors from every leaf element, in no particular order: 1 in a closed scene, up to the links'
     /// errors. Elements of absent bodies are among them.
     pub fn row_sums(&self) -> Vec<f64> {
         row_sums_of(self.solved).into_iter().map(|(_, sum)| sum).collect()
@@ -124,15 +126,15 @@ impl<'a> Frame<'a> {
         row_sums_of(self.solved)
     }
 
-    /// The solution as pictures and exports read it, with the bends that links leave out. Cost: a pass over all links, some
-    /// 90 ns each.
+    /// The solution as pictures and exports read it, with the second order (bends), which links, keeping means and gradients,
+    /// leave out. Cost: a pass over all links, some 90 ns each.
     pub fn solution(&self) -> Snapshot {
         snapshot::take(self.solved, &self.solved.links, &self.solved.radiosity)
     }
 
-    /// The same with the light of every element found anew from links of every leaf's own in place of those above it: along
-    /// edges between surfaces, where leaves of [`Frame::solution`] inherit lines and parabolas through steep curves, some
-    /// thirty times as accurate. The solution itself stays as it is.
+    /// The solution as [`Frame::solution`] reads it, with the light of every element gathered again over links of each leaf's own
+    /// in place of links of its ancestors: along edges between surfaces, where leaves of [`Frame::solution`] inherit lines and
+    /// parabolas through steep curves, some thirty times as accurate. The solution itself stays as it is.
     ///
     /// Error: at the default tolerance leaves of a uniform closed scene are within 1e-3, relative
     /// (docs/tolerance.md). Cost: some ten times that of a frame with a moving light.

@@ -9,7 +9,7 @@ use crate::element::{ElementId, Kind};
 use crate::scene::{PatchId, Scene, World};
 
 use crate::solver::{Links, Radiosity, Surfaces};
-use crate::space::{Solved, SpaceState};
+use crate::space::{LitForest, Solved, SpaceState};
 
 use super::bends::Bends;
 use super::tuning::VISIBLE;
@@ -22,8 +22,8 @@ pub struct Snapshot {
     pub scene: Arc<Scene>,
     /// Time in the animation, seconds.
     pub time_s: f64,
-    /// What radiosities may be off by where little light arrives, W/m2: a share of the tolerance times the mean irradiance,
-    /// rough. Pictures show nothing darker than this.
+    /// Error of radiosities where little light arrives, W/m2, roughly: a share of the tolerance times the mean irradiance.
+    /// Pictures show nothing darker than this.
     pub error_w_m2: f64,
     /// Poses, materials and lights as they were.
     pub world: World,
@@ -33,12 +33,12 @@ pub struct Snapshot {
     pub leaf_offsets: Vec<u32>,
 }
 
-/// A leaf of the element forest: a convex piece of a patch with constant radiosity.
+/// A leaf of the element forest: a convex piece of a patch, over which irradiance is linear.
 #[derive(Clone, Copy, Debug)]
 pub struct Leaf {
-    /// Which of the facets of its patch it is a part of, from 0: triangles and quadrilaterals are one.
+    /// Index of its facet in its patch, from 0: triangles and quadrilaterals are one.
     pub facet: u32,
-    /// Where it is in its facet: a one bit, then two bits for each time that it was quartered. The same in every solution.
+    /// Place in its facet: a one bit, then two bits for each quartering. The same in every solution.
     pub path: u32,
     /// Corners in the patch's frame, counter-clockwise, metres; a triangle repeats its last corner.
     pub corners: [DVec2; 4],
@@ -51,7 +51,7 @@ pub struct Leaf {
 }
 
 impl Leaf {
-    /// How often its facet was quartered for it.
+    /// Number of quarterings from its facet down to it.
     pub fn level(&self) -> u32 {
         self.path.max(1).ilog2() / 2
     }
@@ -79,12 +79,12 @@ impl Leaf {
 }
 
 impl Snapshot {
-    /// Irradiance that the mesh says is at a point of a surface, W/m2, linear RGB: on the nearest
-    /// patch that faces along `normal` (to within 25 degrees) and has the point on it, no further
-    /// than a 1/1000 of the scene's diagonal away; `None` where there is none.
+    /// Irradiance of the mesh at a point of a surface, W/m2, linear RGB: on the nearest patch that faces along `normal` (to
+    /// within 25 degrees) and has the point on it, no further than a 1/1000 of the scene's diagonal away; `None` where there is
+    /// none.
     ///
     /// Linear over a leaf, with jumps between leaves: across the edge of a shadow it is right in the
-    /// mean and wrong on either side. [`super::Frame::irradiance_at`] has no such limit.
+    /// mean and wrong on either side. [`Frame::irradiance_at`](super::Frame::irradiance_at) has no such limit.
     pub fn irradiance_at(&self, point: DVec3, normal: DVec3) -> Option<[f64; 3]> {
         let near_m = 1e-3 * self.scene.bounds_in(&self.world)?.diagonal();
         let mut found: Vec<(f64, PatchId, DVec2)> = Vec::new();
@@ -115,52 +115,12 @@ impl Snapshot {
 }
 
 /// The leaves of a solved forest with a solution over it.
-// Over 60 lines: two closures over one state, and the offsets of what they find.
 pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Snapshot {
-    let SpaceState { scene, forest, .. } = &solved.space;
-    let surfaces = solved.space.surfaces();
+    let scene = &solved.space.scene;
     let bends = Bends { solved, links, radiosity };
-    let of_facet = |number: u32, facet: ElementId, out: &mut Vec<Leaf>| {
-        let material = surfaces.material(facet.0);
-        let mut bent = bends.of_leaves(facet.0).into_iter();
-        radiosity.irradiances(&surfaces, facet.0, &mut |id, h| {
-            // Of what is exposed; a leaf is read about its own centroid.
-            let extent = forest.extent(ElementId(id));
-            let h = h.moved(&surfaces.place(id), [extent.centroid.x, extent.centroid.y]);
-            let h = h.plus(&bent.next().expect("the same leaves"));
-            let irradiance = h.mean.map(|x| x.max(0.0));
-            out.push(Leaf {
-                facet: number,
-                path: forest.key(ElementId(id)).path,
-                corners: forest.shape(ElementId(id)).corners,
-                irradiance,
-                irradiance_gradient: h.gradient,
-                radiosity: std::array::from_fn(|c| {
-                    material.exitance[c] + material.reflectance[c] * irradiance[c]
-                }),
-            });
-        });
-    };
-    let of_patch = |k: usize| {
-        let mut out = Vec::new();
-        let mut stack = vec![forest.patch_root(PatchId(k as u32))];
-        let mut facets = 0;
-        let body = scene.patches[k].body;
-        if !solved.space.view.is_present(body) || scene.is_distant(body) {
-            stack.clear();
-        }
-        while let Some(id) = stack.pop() {
-            match forest.kind(id) {
-                Kind::Polygon => stack.extend(forest.children(id).rev().map(ElementId)),
-                _ => {
-                    of_facet(facets, id, &mut out);
-                    facets += 1;
-                }
-            }
-        }
-        out
-    };
-    let by_patch: Vec<Vec<Leaf>> = (0..scene.patches.len()).into_par_iter().map(of_patch).collect();
+    let reader = Reader { solved, surfaces: solved.space.surfaces(), radiosity, bends };
+    let patches = (0..scene.patches.len()).into_par_iter();
+    let by_patch: Vec<Vec<Leaf>> = patches.map(|k| reader.of_patch(PatchId(k as u32))).collect();
     let mut leaf_offsets = vec![0];
     let mut end = 0;
     leaf_offsets.extend(by_patch.iter().map(|leaves| {
@@ -176,6 +136,62 @@ pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Sna
         world: solved.space.world.clone(),
         leaves,
         leaf_offsets,
+    }
+}
+
+/// Reads leaves of a solved forest.
+struct Reader<'a> {
+    solved: &'a Solved,
+    surfaces: LitForest<'a>,
+    radiosity: &'a Radiosity,
+    bends: Bends<'a>,
+}
+
+impl Reader<'_> {
+    /// Leaves of all facets of a patch; none where it is absent or distant.
+    fn of_patch(&self, patch: PatchId) -> Vec<Leaf> {
+        let SpaceState { scene, forest, view, .. } = &self.solved.space;
+        let body = scene.patches[patch.0 as usize].body;
+        let mut out = Vec::new();
+        if !view.is_present(body) || scene.is_distant(body) {
+            return out;
+        }
+        let mut stack = vec![forest.patch_root(patch)];
+        let mut facets = 0;
+        while let Some(id) = stack.pop() {
+            match forest.kind(id) {
+                Kind::Polygon => stack.extend(forest.children(id).rev().map(ElementId)),
+                _ => {
+                    self.of_facet(facets, id, &mut out);
+                    facets += 1;
+                }
+            }
+        }
+        out
+    }
+
+    /// Adds the leaves of a facet; `number` counts those of its patch.
+    fn of_facet(&self, number: u32, facet: ElementId, out: &mut Vec<Leaf>) {
+        let forest = &self.solved.space.forest;
+        let material = self.surfaces.material(facet.0);
+        let mut bent = self.bends.of_leaves(facet.0).into_iter();
+        self.radiosity.irradiances(&self.surfaces, facet.0, &mut |id, h| {
+            // Of what is exposed; a leaf is read about its own centroid.
+            let extent = forest.extent(ElementId(id));
+            let h = h.moved(&self.surfaces.place(id), [extent.centroid.x, extent.centroid.y]);
+            let h = h.plus(&bent.next().expect("the same leaves"));
+            let irradiance = h.mean.map(|x| x.max(0.0));
+            out.push(Leaf {
+                facet: number,
+                path: forest.key(ElementId(id)).path,
+                corners: forest.shape(ElementId(id)).corners,
+                irradiance,
+                irradiance_gradient: h.gradient,
+                radiosity: std::array::from_fn(|c| {
+                    material.exitance[c] + material.reflectance[c] * irradiance[c]
+                }),
+            });
+        });
     }
 }
 

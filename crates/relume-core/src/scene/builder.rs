@@ -21,9 +21,8 @@ use super::{
 /// returned by [`SceneBuilder::build`], the first one first.
 ///
 /// ```
-/// use glam::{DQuat, DVec3};
-/// use relume_core::scene::SceneBuilder;
-///
+/// # use glam::{DQuat, DVec3};
+/// # use relume_core::scene::SceneBuilder;
 /// let mut b = SceneBuilder::new("furnace");
 /// let wall = b.material("wall", [0.5; 3], [1.0; 3]);
 /// let room = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
@@ -96,8 +95,7 @@ impl SceneBuilder {
         NodeId(self.draft.nodes.len() as u32 - 1)
     }
 
-    /// Adds a body at the origin of the world: what moves as one, by hand ([`Scene::at_but`]) or not at all. Its id is
-    /// the one that it has in the scene.
+    /// Adds a body at the origin of the world: to be moved by commands, if at all. Its id is the one that it has in the scene.
     pub fn body(&mut self, name: &str) -> BodyId {
         let number = self.draft.nodes.iter().filter(|n| n.body.is_some()).count() as u32;
         let mut node = DraftNode::still(name, None, DVec3::ZERO, DQuat::IDENTITY);

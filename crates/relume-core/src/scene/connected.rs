@@ -7,7 +7,7 @@ impl Scene {
     /// Area of the patches that are connected with each patch by common corners, itself among them, m2. Bodies that never move
     /// are connected with each other, a body that moves or was inserted only within itself. Exact up to rounding; both sides of a double-sided
     /// polygon count.
-    pub fn connected_areas_m2(&self) -> Vec<f64> {
+    pub(crate) fn connected_areas_m2(&self) -> Vec<f64> {
         let mut out = vec![0.0; self.patches.len()];
         let bodies = (0..self.bodies.len() as u32).map(BodyId);
         let (moving, at_rest): (Vec<BodyId>, Vec<BodyId>) =

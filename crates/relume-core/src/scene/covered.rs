@@ -5,7 +5,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::gap::{Gap, between, open_sides, widest_m};
+use super::gap::{Gap, between, gap_reach, open_sides};
 use super::placed::{IN_PLANE, Placed};
 use super::topology::{Polygon, components, matched, sides_of};
 use super::weld::Weld;
@@ -56,7 +56,11 @@ impl Scene {
     /// count, all wound alike, and without lamps in it; and what lies in narrow gaps (`scene/gap.rs`). Bodies that never move cover each other, a body that moves only itself.
     /// Exact to a millionth of the largest coordinate. Of patches that are covered by more than 0.999 by one thing only that is said.
     /// Those that `is_displaced` names are not where the file has them: they cover themselves alone, as if they moved.
-    pub fn covered(&self, solids: &Solids, is_displaced: &dyn Fn(BodyId) -> bool) -> Vec<Covered> {
+    pub(crate) fn covered(
+        &self,
+        solids: &Solids,
+        is_displaced: &dyn Fn(BodyId) -> bool,
+    ) -> Vec<Covered> {
         let mut out = vec![Covered::default(); self.patches.len()];
         let bodies = (0..self.bodies.len() as u32).map(BodyId);
         let (moving, at_rest): (Vec<BodyId>, Vec<BodyId>) = bodies
@@ -219,23 +223,15 @@ impl Group {
     /// What of patches lies in narrow gaps; their numbers are in the order of their lowest coordinates.
     fn narrow(&self, scene: &Scene, order: &[usize], out: &mut [Covered], left: &mut usize) {
         let open = open_sides(&self.placed);
+        let face = |k: usize| Face { placed: &self.placed[k], open: open[k] };
         for (at, &one) in order.iter().enumerate() {
-            let p = &self.placed[one];
-            let reach = p.bounds.grown(widest_m((p.bounds.hi - p.bounds.lo).max_element()));
-            let may_be = |q: &&usize| self.placed[**q].bounds.lo.x <= reach.hi.x;
-            for &other in order[at + 1..].iter().take_while(may_be) {
-                let q = &self.placed[other];
-                if !reach.meets(&q.bounds) {
-                    continue;
-                }
-                let Some(gap) = between([p, q], [open[one], open[other]], self.slack_m) else {
-                    continue;
-                };
-                if !self.lamps.may_be_at(&gap.bounds.grown(2.0 * self.slack_m)) {
-                    let [on_p, on_q] = hide_gap([p, q], gap, self.is_own);
-                    on_p.add_to(scene, &mut out[p.id.0 as usize], left);
-                    on_q.add_to(scene, &mut out[q.id.0 as usize], left);
-                }
+            let hi_x = gap_reach(&self.placed[one].bounds).hi.x;
+            let may_be = |q: &usize| self.placed[*q].bounds.lo.x <= hi_x;
+            let others = order[at + 1..].iter().copied().take_while(may_be).map(face);
+            let may_hold_lamp = |bounds: &Aabb| self.lamps.may_be_at(bounds);
+            for part in dark_in_gaps(face(one), others, self.slack_m, self.is_own, may_hold_lamp) {
+                let covered = &mut out[part.patch.0 as usize];
+                part.add_to(scene, covered, left);
             }
         }
     }
@@ -355,8 +351,35 @@ impl InGap {
     }
 }
 
+/// A face, and which of its sides are open, from the lowest bit up.
+#[derive(Clone, Copy)]
+pub(super) struct Face<'a> {
+    pub(super) placed: &'a Placed,
+    pub(super) open: u64,
+}
+
+/// Parts of a face and of others that lie in narrow gaps between it and them; none of gaps that may hold a lamp.
+pub(super) fn dark_in_gaps<'a>(
+    face: Face<'a>,
+    others: impl Iterator<Item = Face<'a>>,
+    slack_m: f64,
+    is_own: bool,
+    mut may_hold_lamp: impl FnMut(&Aabb) -> bool,
+) -> Vec<InGap> {
+    let reach = gap_reach(&face.placed.bounds);
+    let mut found = Vec::new();
+    for other in others.filter(|other| reach.meets(&other.placed.bounds)) {
+        let faces = [face.placed, other.placed];
+        let Some(gap) = between(faces, [face.open, other.open], slack_m) else { continue };
+        if !may_hold_lamp(&gap.bounds.grown(2.0 * slack_m)) {
+            found.extend(hide_gap(faces, gap, is_own));
+        }
+    }
+    found
+}
+
 /// What a gap hides of the two faces that it is between.
-pub(super) fn hide_gap(faces: [&Placed; 2], gap: Gap, is_own: bool) -> [InGap; 2] {
+fn hide_gap(faces: [&Placed; 2], gap: Gap, is_own: bool) -> [InGap; 2] {
     // No body has such a number.
     let of = (BodyId(faces[0].id.0 | 1 << 31), faces[1].id.0);
     let [p, q] = gap.outlines;

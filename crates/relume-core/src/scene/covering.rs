@@ -7,8 +7,8 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use super::covered::{Hull, hide_gap, hulls_of, reach_m, stand};
-use super::gap::{between, open_sides, widest_m};
+use super::covered::{Face, Hull, dark_in_gaps, hulls_of, reach_m, stand};
+use super::gap::{open_sides, widest_m};
 use super::placed::{IN_PLANE, Placed};
 use super::{BodyId, Covered, Patch, PatchId, Scene};
 use crate::geometry::{Aabb, Pose};
@@ -87,7 +87,7 @@ impl Covering {
     }
 
     /// What of patches is covered at an instant, with what is always covered of them (`rest`, by patch): of a moving body by others, of
-    /// others by it. By the rules of [`Scene::covered`], with lamps where they are now.
+    /// others by it. By the rules of `Scene::covered`, with lamps where they are now.
     pub fn at(
         &self,
         scene: &Scene,
@@ -233,23 +233,20 @@ fn narrow(
             if of_one.len() * of_other.len() > GAP_PAIRS_MAX {
                 continue;
             }
+            let open = |of: &Present, at: usize| known.open[of.body.0 as usize][at];
+            let mut may_hold_lamp = |bounds: &Aabb| {
+                let lamps = lamps.get_or_insert_with(|| lamps_of(scene, now, present));
+                now.lights.iter().chain(&*lamps).any(|lamp| lamp.meets(bounds))
+            };
             for (i, p) in &of_one {
-                let reach = p.bounds.grown(widest_m((p.bounds.hi - p.bounds.lo).max_element()));
-                for (j, q) in of_other.iter().filter(|(_, q)| reach.meets(&q.bounds)) {
-                    let open = [(one, *i), (other, *j)];
-                    let open = open.map(|(of, at)| known.open[of.body.0 as usize][at]);
-                    let Some(gap) = between([p, q], open, slack_m) else { continue };
-                    let lamps = lamps.get_or_insert_with(|| lamps_of(scene, now, present));
-                    let bounds = gap.bounds.grown(2.0 * slack_m);
-                    if now.lights.iter().chain(&*lamps).any(|lamp| lamp.meets(&bounds)) {
-                        continue;
-                    }
-                    for part in hide_gap([p, q], gap, false) {
-                        let covered = out
-                            .entry(part.patch)
-                            .or_insert_with(|| rest[part.patch.0 as usize].clone());
-                        part.add_to(scene, covered, left);
-                    }
+                let face = Face { placed: p, open: open(one, *i) };
+                let others =
+                    of_other.iter().map(|(j, q)| Face { placed: q, open: open(other, *j) });
+                for part in dark_in_gaps(face, others, slack_m, false, &mut may_hold_lamp) {
+                    let covered = out
+                        .entry(part.patch)
+                        .or_insert_with(|| rest[part.patch.0 as usize].clone());
+                    part.add_to(scene, covered, left);
                 }
             }
         }

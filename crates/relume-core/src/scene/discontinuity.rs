@@ -17,7 +17,7 @@ impl Scene {
     /// moves or was inserted itself; edges that stay in place while their body turns about them (hinges) meet what never moves.
     /// Other lines of contact that move are not found. Outer edges of the patch are left out. In the patch's frame, metres;
     /// exact to a millionth of the largest coordinate. Cost: pairs of patches whose boxes meet along x.
-    pub fn discontinuities(&self) -> Vec<Vec<Segment>> {
+    pub(crate) fn discontinuities(&self) -> Vec<Vec<Segment>> {
         let mut out = vec![Vec::new(); self.patches.len()];
         let bodies = (0..self.bodies.len() as u32).map(BodyId);
         let alone = |body: &BodyId| self.moves(*body) || self.is_inserted(*body);

@@ -35,7 +35,7 @@ const ROUNDING: f64 = 1e-12;
 impl Scene {
     /// Where the points of a body can get between two times, `from_s <= to_s`. Says nothing about its
     /// presence.
-    pub fn drift(&self, body: BodyId, [from_s, to_s]: [f64; 2]) -> Drift {
+    pub(crate) fn drift(&self, body: BodyId, [from_s, to_s]: [f64; 2]) -> Drift {
         if !self.moves(body) {
             return Drift::Rests;
         }
@@ -46,7 +46,7 @@ impl Scene {
 
     /// The first time after `time_s` at which a body or a light appears or vanishes; infinite if none
     /// does any more.
-    pub fn next_presence_change_s(&self, time_s: f64) -> f64 {
+    pub(crate) fn next_presence_change_s(&self, time_s: f64) -> f64 {
         let changes = self.motion.nodes.iter().flat_map(|n| &n.presence).map(|key| key.0);
         changes.filter(|&t| t > time_s).fold(f64::INFINITY, f64::min)
     }

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::{BodyId, Scene};
 
-/// Bodies that came into a scene or left it after it was made ([`Scene::with_body`], [`Scene::without_body`]).
+/// Bodies that came into a scene or left it after it was made (`Scene::with_body`, `Scene::without_body`).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Edited {
     /// Names for the parts of each body that was inserted, also where it left again and its id is reserved.
@@ -65,7 +65,7 @@ impl Scene {
     }
 
     /// Whether there is a body of this id with patches, at some time or by hand.
-    pub fn has_body(&self, body: BodyId) -> bool {
+    pub(crate) fn has_body(&self, body: BodyId) -> bool {
         let found = self.bodies.get(body.0 as usize);
         found.is_some_and(|found| !found.patches.is_empty()) && !self.is_removed(body)
     }

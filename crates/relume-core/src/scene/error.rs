@@ -12,7 +12,7 @@ pub enum SceneError {
     Read {
         /// The file, as the user or the glTF file named it.
         file: String,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
         /// What to do.
         remedy: String,
@@ -27,7 +27,7 @@ pub enum SceneError {
         /// What to do.
         remedy: String,
     },
-    /// The file refers to what is not beside it or below.
+    /// The file refers to another one outside of its own folder.
     #[error("`{file}`: {what}; {remedy}")]
     Outside {
         /// The file.
@@ -53,7 +53,7 @@ pub enum SceneError {
         /// What to do.
         remedy: String,
     },
-    /// A line of a file of View3D says nothing that makes sense, or what is not supported.
+    /// A line of a View3D file is malformed or not supported.
     #[error("`{file}`{at}: {what}; {remedy}", at = at(*line))]
     View3d {
         /// The file.
@@ -127,7 +127,7 @@ pub enum SceneError {
         /// What to do.
         remedy: String,
     },
-    /// A change that was asked for concerns nothing that the scene has.
+    /// An edit names something that the scene does not have.
     #[error("{what}; {remedy}")]
     Edit {
         /// What is not there, and what is.

@@ -28,6 +28,11 @@ pub(super) fn widest_m(size_m: f64) -> f64 {
     h * size_m
 }
 
+/// Box around a face within which whatever it has a gap with lies, at least in part.
+pub(super) fn gap_reach(face: &Aabb) -> Aabb {
+    face.grown(widest_m((face.hi - face.lo).max_element()))
+}
+
 /// The gap between two faces that look at each other; of each of their sides whether it is `open`, from the lowest bit up.
 ///
 /// It ends a strip before open sides that is some widths of the gap wide: as wide as the light is that gets in, if the strip is lit as

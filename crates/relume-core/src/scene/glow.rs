@@ -71,7 +71,7 @@ impl Material {
         self.glow.as_ref().map_or(self.exitance, |glow| glow.at(time_s))
     }
 
-    /// The most that its exitance is at any time, W/m2; a bound.
+    /// Upper bound of the exitance over all time, W/m2.
     pub fn most_exitance(&self) -> [f64; 3] {
         self.glow.as_ref().map_or(self.exitance, Glow::most)
     }
@@ -88,7 +88,7 @@ impl Light {
         self.glow.as_ref().map_or(self.intensity, |glow| glow.at(time_s))
     }
 
-    /// The most that its intensity is at any time; a bound.
+    /// Upper bound of the intensity over all time, in the unit of [`Light::intensity`].
     pub fn most_intensity(&self) -> [f64; 3] {
         self.glow.as_ref().map_or(self.intensity, Glow::most)
     }

@@ -84,8 +84,8 @@ impl NewBody {
         &self.name
     }
 
-    /// The same body with a mesh more: positions in the body's frame, metres, triangles counter-clockwise seen from
-    /// the front, a material of the scene that it will be inserted into. See [`SceneBuilder::mesh`].
+    /// Adds a mesh: positions in the body's frame, metres, triangles counter-clockwise seen from the front, a material of the
+    /// scene that it will be inserted into. See [`SceneBuilder::mesh`].
     pub fn with_mesh(
         mut self,
         surface_name: &str,
@@ -114,7 +114,7 @@ impl Scene {
     ///
     /// # Errors
     /// What [`SceneBuilder::build`] would say of the body.
-    pub fn with_body(&self, new: &NewBody) -> Result<(Scene, BodyId), SceneError> {
+    pub(crate) fn with_body(&self, new: &NewBody) -> Result<(Scene, BodyId), SceneError> {
         let mut alone = SceneBuilder::new(&self.name);
         for Material { name, reflectance, exitance, double_sided, .. } in &self.materials {
             if *double_sided {
@@ -166,7 +166,7 @@ impl Scene {
 
     /// The same scene without a body, and that body. One that the scene was made with stays in it, absent; the id of one that
     /// was inserted stays reserved, unless it was the last one.
-    pub fn without_body(&self, id: BodyId) -> (Scene, TakenBody) {
+    pub(crate) fn without_body(&self, id: BodyId) -> (Scene, TakenBody) {
         let mut scene = self.clone();
         if !self.is_inserted(id) {
             scene.edited.set_removed(id, true);
@@ -198,7 +198,7 @@ impl Scene {
     }
 
     /// Whether a body can be put back under an id: nothing is there.
-    pub fn has_room_for(&self, id: BodyId, taken: &TakenBody) -> bool {
+    pub(crate) fn has_room_for(&self, id: BodyId, taken: &TakenBody) -> bool {
         let last = match &taken.0 {
             Taken::Made => return self.is_removed(id),
             Taken::Inserted(inserted) => inserted.ends.is_some(),
@@ -210,7 +210,7 @@ impl Scene {
     }
 
     /// The same scene with a body put back, where [`Scene::has_room_for`] it.
-    pub fn with_body_back(&self, id: BodyId, taken: &TakenBody) -> Scene {
+    pub(crate) fn with_body_back(&self, id: BodyId, taken: &TakenBody) -> Scene {
         let mut scene = self.clone();
         let Taken::Inserted(taken) = &taken.0 else {
             scene.edited.set_removed(id, false);

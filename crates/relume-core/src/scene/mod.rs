@@ -125,7 +125,7 @@ pub struct Scene {
     pub origin: DVec3,
     /// The light from outside that distant bodies stand for ([`Scene::with_outside`]).
     pub outside: Option<Arc<outside::Outside>>,
-    /// How far away these bodies are, metres; 0 where there are none.
+    /// Distance of distant bodies, metres; 0 where there are none.
     pub outside_m: f64,
     /// Radiance from all directions that the file carries: it lights the scene where [`Scene::with_outside`] takes it as its sky.
     pub environment: Option<Arc<outside::Environment>>,
@@ -146,11 +146,11 @@ pub struct Body {
     pub node: NodeId,
     /// The patches of this body, a range of [`Scene::patches`].
     pub patches: std::ops::Range<u32>,
-    /// It stands for light from outside, the sky or the sun: so far away that it has no place in the scene. It shines,
-    /// and what reaches it has escaped; it has no share in the scene's extent and area, hides nothing, is lit by nothing.
+    /// Whether the body is a part of the sky or the sun, at no place in the scene: it shines, and what reaches it has escaped; it
+    /// has no share in the scene's extent and area, hides nothing, is lit by nothing.
     pub distant: bool,
-    /// It is another shape of what is there as a body of its own at other times, and has no share in the scale that sizes are
-    /// measured by.
+    /// Whether the body is one of the shapes, one after the other, of a mesh that deforms; it does not count in the scale that
+    /// sizes are measured by.
     pub again: bool,
 }
 
@@ -180,7 +180,7 @@ pub struct Patch {
     pub surface: SurfaceId,
     /// Its material.
     pub material: MaterialId,
-    /// Where its reflectance or emission differ from the material's, what they are.
+    /// Reflectance and share of the exitance of its own, where textures or vertex colours vary them.
     pub tint: Option<TintId>,
     /// Images that vary over it, if they were kept for pictures.
     pub print: Option<Arc<Print>>,
@@ -222,7 +222,7 @@ pub struct Material {
     pub reflectance: [f64; 3],
     /// Exitance M = pi x emitted radiance, W/m2; at time 0 where it changes.
     pub exitance: [f64; 3],
-    /// How it changes, if it does.
+    /// Keyframes of the exitance, if it changes.
     pub glow: Option<Glow>,
     /// Whether both sides of its polygons reflect and emit.
     pub double_sided: bool,
@@ -235,14 +235,14 @@ pub struct Light {
     pub name: String,
     /// The node it hangs on; it shines along the node's -Z axis.
     pub node: NodeId,
-    /// What it is.
+    /// Point, spot or directional, with its shape.
     pub kind: LightKind,
     /// Point and spot: radiant intensity, W/sr. Directional: irradiance at normal incidence, W/m2.
     /// Linear RGB; at time 0 where it changes.
     pub intensity: [f64; 3],
-    /// How it changes, if it does.
+    /// Keyframes of the intensity, if it changes.
     pub glow: Option<Glow>,
-    /// The statement of what the file said and how it was converted, for `info`.
+    /// Text: the value in the file and how it was converted.
     pub conversion: String,
 }
 
@@ -294,7 +294,7 @@ pub enum Projection {
     },
 }
 
-/// Something worth telling about the input.
+/// Finding about the input.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Note {
     /// How serious it is.
@@ -340,12 +340,12 @@ impl Scene {
         self.bounds_of(|body| self.pose(body, time_s))
     }
 
-    /// The same at time 0 of the bodies that the scene was made with, removed ones among them.
-    pub fn made_bounds(&self) -> Option<Aabb> {
+    /// Smallest box at time 0 around the bodies that the scene was made with, removed ones among them, distant ones aside.
+    pub(crate) fn made_bounds(&self) -> Option<Aabb> {
         self.bounds_of(|body| self.pose(body, 0.0).filter(|_| !self.is_inserted(body)))
     }
 
-    /// The same of those that are present in a world.
+    /// Smallest box around all patches present in a world, distant ones aside; `None` while none is.
     pub fn bounds_in(&self, now: &World) -> Option<Aabb> {
         self.bounds_of(|body| now.pose(body))
     }
@@ -401,8 +401,8 @@ impl Scene {
         near.map(Patch::area_m2).sum()
     }
 
-    /// The same of the bodies that the scene was made with, removed ones among them, m2: the scale that sizes are measured
-    /// by, so that none of them changes when a body comes or goes.
+    /// Sum of the areas of the bodies that the scene was made with, removed ones among them, m2: the scale that sizes are
+    /// measured by, which no body changes that comes or goes.
     pub fn made_area_m2(&self) -> f64 {
         let is_again = |p: &Patch| self.bodies[p.body.0 as usize].again;
         let is_made =

@@ -72,7 +72,7 @@ const THICK: f64 = 16.0;
 impl Scene {
     /// Its convex solids: closed, convex groups of one-sided patches of one body that look outwards
     /// and meet along whole sides.
-    pub fn solids(&self) -> Solids {
+    pub(crate) fn solids(&self) -> Solids {
         let mut out = Solids {
             enclosures: vec![Enclosure::Open; self.patches.len()],
             of_patch: vec![None; self.patches.len()],

@@ -25,7 +25,7 @@ impl Scene {
         self.emission(patch, self.material(patch).exitance_at(time_s))
     }
 
-    /// The most that the exitance of a patch is at any time, W/m2; a bound.
+    /// Upper bound of the exitance of a patch over all time, W/m2.
     pub fn most_exitance(&self, patch: &Patch) -> [f64; 3] {
         self.emission(patch, self.material(patch).most_exitance())
     }

@@ -33,7 +33,7 @@ struct LightNow {
     intensity: [f64; 3],
 }
 
-/// What is held by hand, whatever the clip says of it: nothing at first.
+/// Values set by commands in place of the clip's; none at first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Held {
     /// World poses of bodies; the punctual lights on a body move with it.
@@ -176,19 +176,19 @@ impl World {
         self.lights[light.0 as usize].intensity
     }
 
-    /// Whether a material looks otherwise than in another world: emits or reflects otherwise.
+    /// Whether exitance or reflectance of a material differ from those in another world.
     pub fn is_relit(&self, other: &World, material: MaterialId) -> bool {
         let k = material.0 as usize;
         self.materials[k] != other.materials[k]
     }
 
-    /// Whether any punctual light is of another intensity than in another world.
+    /// Whether the intensity of any punctual light differs from that in another world.
     pub fn lights_differ(&self, other: &World) -> bool {
         let intensities = self.lights.iter().zip(&other.lights);
         intensities.into_iter().any(|(one, two)| one.intensity != two.intensity)
     }
 
-    /// Whether any material or light shines, or any material reflects, otherwise than in another world.
+    /// Whether any exitance, reflectance or intensity differs from that in another world.
     pub fn any_relit(&self, other: &World) -> bool {
         self.materials != other.materials || self.lights_differ(other)
     }
@@ -196,7 +196,7 @@ impl World {
 
 impl Held {
     /// Whether bodies move as they do with this in hand.
-    pub fn promises_as(&self, other: &Held) -> bool {
+    pub(crate) fn promises_as(&self, other: &Held) -> bool {
         self.poses == other.poses && self.presence == other.presence
     }
 }

@@ -48,8 +48,8 @@ pub struct Removed {
 }
 
 impl Command {
-    /// Places a body in the world. Of a body that moves in the clip of a file, the pose is that of its node; of one
-    /// that does not, the pose from where it is in the file.
+    /// Places a body in the world. For a body that moves in the clip, `pose` is the world pose of its node; for a body at rest,
+    /// the displacement from where the file has the body.
     pub fn set_pose(body: BodyId, pose: Pose) -> Command {
         Command::SetPose(body, Some(pose))
     }
@@ -80,7 +80,7 @@ impl Command {
     }
 }
 
-/// Why a command was refused. Nothing has changed then.
+/// Error of a command that was refused; the world is unchanged.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CommandError {
@@ -104,7 +104,7 @@ pub enum CommandError {
         /// The remedy.
         remedy: String,
     },
-    /// The new body is none.
+    /// The new body cannot be made.
     #[error(transparent)]
     Body(#[from] SceneError),
 }
@@ -115,12 +115,11 @@ const ORTHONORMAL: f64 = 1e-6;
 impl Session {
     /// Changes the world of the next solve; returns the inverse command.
     ///
-    /// The law: any commands followed by their inverses in reverse order lead to the state of the start, and the state
+    /// Any commands followed by their inverses in reverse order lead to the state of the start, and the state
     /// after any commands equals that of a session that was given the same world at once, links bit for bit.
     ///
     /// Cost: of the command itself little; of the next solve, what the change changes, and some passes over all pairs where a
-    /// body comes or leaves. It is a cold build where a material comes to emit that never does in the clip, and, in a scene
-    /// with groups of patches, where a body that rests is taken from its place, or put back there.
+    /// body comes or leaves. Where a material comes to emit that never does in the clip, the next solve is a cold build.
     ///
     /// # Errors
     /// [`CommandError`]; nothing has changed then.

@@ -38,7 +38,7 @@ use replant::{Edited, Start};
 pub enum SessionError {
     /// The links of this tolerance do not fit into the memory allowed.
     #[error(
-        "frame {frame} at tolerance {tolerance} needs more than the {limit_bytes} bytes of memory allowed ({links} pairs so far): raise --max-memory or the tolerance (with the form-factor oracle its EPS; where the scene has very many polygons, use fewer)"
+        "frame {frame} at tolerance {tolerance} needs more than the {limit_bytes} bytes of memory allowed ({pairs} pairs so far): raise `Options::max_memory_bytes` or the tolerance (with the form-factor oracle its epsilon; where the scene has very many polygons, use fewer)"
     )]
     OutOfMemory {
         /// The frame being computed.
@@ -48,7 +48,7 @@ pub enum SessionError {
         /// The limit, bytes.
         limit_bytes: u64,
         /// Pairs made when the limit was met.
-        links: u64,
+        pairs: u64,
     },
     /// The step was called off by [`Watch::cancel`].
     #[error("frame {frame} was called off")]
@@ -76,7 +76,7 @@ pub enum SessionError {
     Unbalanced {
         /// The frame being computed.
         frame: u32,
-        /// Share of what is emitted.
+        /// Difference as a share of the emitted flux, 1.
         share: f64,
         /// Names of the surfaces whose rows exceed 1 by most.
         surfaces: Vec<String>,
@@ -216,7 +216,7 @@ impl Session {
         }
     }
 
-    /// Says at which time the frame before the next step was, where that is not the last step:
+    /// Sets the time of the frame before the next step, where that is not the last step:
     /// [`FrameReport::moved`] and [`Work::dynamic_links`](crate::pair::Work::dynamic_links) count from there. Nothing else
     /// depends on it.
     #[doc(hidden)]
@@ -298,7 +298,7 @@ impl Session {
                 frame,
                 tolerance: self.options.tolerance,
                 limit_bytes: self.options.max_memory_bytes.unwrap_or(u64::MAX),
-                links: failed.pairs(),
+                pairs: failed.pairs(),
             },
             Why::Unsettled { residual, surfaces } => {
                 SessionError::Unsettled { frame, residual, surfaces }

@@ -41,11 +41,12 @@ impl Default for Options {
 
 /// Oracle: the criterion by which a pair becomes a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Oracle {
-    /// The default: an estimate of the irradiance error that the link causes on its receivers.
+    /// Estimated irradiance error that a link causes on its receivers: the default.
     Error,
-    /// The paper's: a link where the form factor is below `epsilon`, elements never smaller than
-    /// `min_area_m2`.
+    /// Form factor, as in Forsyth, Yang and Teo 1995: a pair becomes a link where its form factor is below `epsilon`; elements
+    /// are never smaller than `min_area_m2`.
     FormFactor {
         /// Largest form factor of a link.
         epsilon: f64,

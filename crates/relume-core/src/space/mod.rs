@@ -19,7 +19,7 @@ pub(crate) use groups::{Before, group_links, replanted_links};
 pub(crate) use phases::Goal;
 pub use state::SpaceState;
 pub(crate) use state::Tuning;
-pub(crate) use surfaces::place_of;
+pub(crate) use surfaces::{LitForest, place_of};
 pub(crate) use tally::row_sums_of;
 
 /// A solved state of a scene.

@@ -1,5 +1,7 @@
 //! The laws that hold at every instant (design: invariants), checked on a solved session.
 
+use std::collections::BTreeSet;
+
 use relume_core::element::{ElementId, Forest, Kind};
 use relume_core::pair::{PairId, PairTree, State};
 use relume_core::session::Session;
@@ -34,7 +36,8 @@ pub(crate) fn audit(session: &Session) -> Audit {
         exchange_min: f64::INFINITY,
         ..Audit::default()
     };
-    cover(tree, forest, &mut out);
+    let refined_on = cover(tree, forest, &mut out);
+    has_no_other_children(forest, &refined_on);
     let (mut squares, mut area) = (0.0, 0.0);
     for id in (0..forest.len() as u32).map(ElementId) {
         let children = forest.children(id);
@@ -70,10 +73,24 @@ fn weight(tree: &PairTree, forest: &Forest, id: PairId) -> f64 {
     if a == b { product } else { 2.0 * product }
 }
 
-/// Every pair of points is covered exactly once, globally and below every refined pair.
-fn cover(tree: &PairTree, forest: &Forest, out: &mut Audit) {
+/// An element has children exactly where a pair is refined on it, or above the coarse elements.
+fn has_no_other_children(forest: &Forest, refined_on: &BTreeSet<ElementId>) {
+    let ids = || (0..forest.len() as u32).map(ElementId);
+    let has_coarse = ids().any(|id| forest.coarse(id).is_some());
+    for id in ids().filter(|&id| forest.kind(id) == Kind::Element) {
+        let is_above = has_coarse && forest.coarse(id).is_none();
+        if !is_above {
+            let has_children = !forest.children(id).is_empty();
+            assert_eq!(has_children, refined_on.contains(&id), "{id:?}: children, refined on");
+        }
+    }
+}
+
+/// Every pair of points is covered exactly once, globally and below every refined pair. Returns the elements on which pairs are
+/// refined.
+fn cover(tree: &PairTree, forest: &Forest, out: &mut Audit) -> BTreeSet<ElementId> {
     let root = weight(tree, forest, PairTree::ROOT);
-    let mut seen = std::collections::BTreeSet::new();
+    let (mut seen, mut refined_on) = (BTreeSet::new(), BTreeSet::new());
     let mut covered = 0.0;
     let mut stack = vec![PairTree::ROOT];
     while let Some(id) = stack.pop() {
@@ -90,10 +107,16 @@ fn cover(tree: &PairTree, forest: &Forest, out: &mut Audit) {
         if own > 0.0 {
             out.local_coverage = out.local_coverage.max((sum / own - 1.0).abs());
         }
+        let (a, b) = tree.ends(id);
+        for end in children.clone().map(|child| tree.ends(child)).flat_map(|(c, d)| [c, d]) {
+            refined_on
+                .extend(forest.parent(end).filter(|&p| end != a && end != b && (p == a || p == b)));
+        }
         stack.extend(children);
     }
     assert_eq!(seen.len(), tree.len(), "pairs that no parent knows");
     out.coverage = (covered / root - 1.0).abs();
+    refined_on
 }
 
 impl Audit {

@@ -105,7 +105,6 @@ fn check(name: &str, seeds: std::ops::Range<u64>) {
 macro_rules! a_few {
     ($($test:ident: $kind:literal, $seeds:expr;)*) => {
         $(#[test]
-        // Over 60 lines: as the list of kinds below is counted with it.
         fn $test() {
             check($kind, $seeds);
         })*

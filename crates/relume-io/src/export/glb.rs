@@ -29,7 +29,7 @@ pub(super) const UNSIGNED_INT: u32 = 5125;
 pub(super) const ARRAY_BUFFER: u32 = 34962;
 pub(super) const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// Why a scene could not be written.
+/// Error of writing a scene.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The file could not be written.

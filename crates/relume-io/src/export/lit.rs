@@ -35,7 +35,7 @@ pub struct LitPart {
     pub reflectance: [f64; 3],
 }
 
-/// How a radiosity becomes a colour: linear display values in [0, 1] of a radiance in display values that may be above 1.
+/// Tone curve: linear display values in [0, 1] of a radiance in display values that may be above 1.
 pub type Tone<'a> = &'a dyn Fn(f64) -> f64;
 
 impl Lit {
@@ -59,7 +59,7 @@ impl Lit {
         self.parts.iter().map(|part| part.points.len()).sum()
     }
 
-    /// The same with the light of every `step`-th instant and of the last one alone.
+    /// The scene with the light of every `step`-th instant and of the last one alone.
     pub fn every(mut self, step: usize) -> Lit {
         let last = self.times_s.len() - 1;
         fn keep<T>(values: &mut Vec<T>, step: usize, last: usize) {

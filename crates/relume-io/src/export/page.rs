@@ -4,6 +4,8 @@
 
 use std::io::{self, Write};
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use glam::{DQuat, DVec3};
@@ -11,7 +13,6 @@ use relume_core::scene::BodyId;
 use serde_json::{Value, json};
 
 use super::lit::{Lit, LitPart};
-use crate::base64;
 
 const PLAYER: &str = include_str!("player.html");
 
@@ -19,14 +20,14 @@ const PLAYER: &str = include_str!("player.html");
 /// at a hundredth of that 1/200.
 const STEPS: f64 = 4095.0;
 
-/// Where a page looks from at first.
+/// First view of a page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PageView {
     /// Where from, metres.
     pub eye: DVec3,
-    /// At what, metres: the view turns about it.
+    /// Point in the middle of the view, metres: the view turns about it.
     pub target: DVec3,
-    /// Which way is up.
+    /// Direction that is up in the view.
     pub up: DVec3,
     /// Vertical field of view, radians.
     pub yfov: f64,
@@ -59,7 +60,7 @@ pub fn page(lit: &Lit, view: PageView, exposure_ev: f64) -> io::Result<String> {
     });
     let mut packer = ZlibEncoder::new(Vec::new(), Compression::best());
     packer.write_all(&data)?;
-    let light = base64::encode(&packer.finish()?);
+    let light = STANDARD.encode(packer.finish()?);
     // No name may end the element that it stands in.
     let scene = scene.to_string().replace('<', "\\u003c");
     Ok(PLAYER.replace("{{light}}", &light).replace("{{scene}}", &scene))

@@ -20,7 +20,7 @@ use super::size::{self, SEGMENTS_MAX};
 use relume_core::flat::{FlatScene, Key, Material, Motion, SceneError, Segment};
 use relume_core::scene::limits::{COORDINATE_MAX_M, is_place};
 
-/// What is wrong with a text, and where.
+/// Error in the text of a scene, with its line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("line {line}: {what}")]
 pub struct TextError {

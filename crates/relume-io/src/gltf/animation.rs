@@ -259,14 +259,16 @@ impl Reader<'_> {
         }
         let keys = self.keys(channel, &name)?;
         played.end_s = played.end_s.max(keys.end_s());
-        self.property(self.sampler(channel)?.output, (path, &name, keys), of_node, notes)
+        self.property(self.sampler(channel)?.output, path, &name, keys, of_node, notes)
     }
 
     /// Reads the keys of a translation, rotation or scale.
     fn property(
         &self,
         output: usize,
-        (path, name, keys): (&str, &str, Keys),
+        path: &str,
+        name: &str,
+        keys: Keys,
         of_node: &mut Moves,
         notes: &mut Vec<Note>,
     ) -> Result<(), SceneError> {
@@ -325,7 +327,7 @@ impl Reader<'_> {
     ) -> Result<(), SceneError> {
         let pointer = channel.target.extensions.pointer.as_ref().map_or("", |p| p.pointer.as_str());
         if let Some((of, property)) = emission(pointer) {
-            return self.emission(channel, (pointer, of, property), played, notes);
+            return self.emission(channel, pointer, of, property, played, notes);
         }
         let of_node = pointer
             .strip_prefix("/nodes/")
@@ -359,7 +361,9 @@ impl Reader<'_> {
     fn emission(
         &self,
         channel: &json::Channel,
-        (pointer, of, property): (&str, Emitter, Property),
+        pointer: &str,
+        of: Emitter,
+        property: Property,
         played: &mut Played,
         notes: &mut Vec<Note>,
     ) -> Result<(), SceneError> {

@@ -8,7 +8,7 @@ use std::path::Path;
 use super::json;
 use super::streams::Streams;
 use crate::ImportOptions;
-use crate::base64;
+use crate::data_uri;
 use crate::folder::{Folder, read_scene};
 use crate::regular::unless_fits;
 use relume_core::scene::SceneError;
@@ -203,7 +203,7 @@ impl Document {
     ) -> Result<Vec<u8>, SceneError> {
         if let Some(data) = uri.strip_prefix("data:") {
             let encoded = data.split_once(";base64,").map(|(_, e)| e);
-            let bytes = encoded.and_then(base64::decode);
+            let bytes = encoded.and_then(data_uri::decode);
             return bytes.ok_or_else(|| {
                 self.malformed(format!("the data embedded in {owner} is not valid base64"))
             });

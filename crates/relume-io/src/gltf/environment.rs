@@ -67,9 +67,8 @@ pub(super) fn of_scene(
         Environment::new(&document.file, size, pixels).map_err(|error| error.to_string())
     }) {
         Ok(environment) => {
-            let what = format!(
-                "({NAME}) lights the scene where no other light from outside is asked for; --sky none leaves it out"
-            );
+            let what =
+                format!("({NAME}) lights the scene where no other light from outside is asked for");
             say(document, notes, Severity::Info, &what);
             Ok(Some(Arc::new(environment)))
         }
@@ -77,7 +76,7 @@ pub(super) fn of_scene(
     }
 }
 
-const REMEDY: &str = "give a picture of all directions with --environment FILE";
+const REMEDY: &str = "give a picture of all directions as the sky: `Sky::Environment`";
 
 fn say(document: &Document, notes: &mut Vec<Note>, severity: Severity, what: &str) {
     notes.push(note(severity, "environment", &document.file, 1, format!("its environment {what}")));

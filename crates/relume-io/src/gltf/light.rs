@@ -81,10 +81,7 @@ pub(super) fn projection(
     let camera =
         document.root.cameras.get(index).ok_or_else(|| document.out_of_range("camera", index))?;
     let left_out = |what: String| {
-        Ok((
-            None,
-            Some(format!("{what}: the camera is left out; repair it or choose a view with --eye")),
-        ))
+        Ok((None, Some(format!("{what}: the camera is left out; repair it or choose a view"))))
     };
     let sensible = |x: f64| x.is_finite() && x > 0.0;
     match (camera.kind.as_str(), &camera.perspective, &camera.orthographic) {

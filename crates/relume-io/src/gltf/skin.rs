@@ -124,8 +124,8 @@ impl Tree<'_> {
             format!(" and moves as `{}` does", self.draft.nodes[c].name)
         });
         let message = format!(
-            "{bent} of its triangles hang on several joints and would bend: it is held in its pose at the start{on}; --deform \
-             rebuild bends it"
+            "{bent} of its triangles hang on several joints and would bend: it is held in its pose at the start{on}; `ImportOptions::rebuild` \
+             bends it"
         );
         self.note(Severity::Warning, "skin", skinned.index, message);
         Ok(Ok(()))

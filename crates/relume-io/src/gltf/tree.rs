@@ -207,7 +207,7 @@ impl Tree<'_> {
         let is_still = morphs.is_empty();
         let is_rebuilt = self.is_rebuilt() && node.extensions.instancing.is_none();
         if !is_still && !is_rebuilt {
-            let message = "its morph target animation is ignored: it keeps its shape at rest; --deform rebuild plays it";
+            let message = "its morph target animation is ignored: it keeps its shape at rest; `ImportOptions::rebuild` plays it";
             self.note(Severity::Warning, "morph", index, message.to_owned());
         }
         match (node.skin, &node.extensions.instancing) {

@@ -137,7 +137,7 @@ fn used_or_defined(
     if !undefined.is_empty() {
         let message = format!(
             "no file defines these materials, which are grey (reflectance {}): {}; put the .mtl file beside it, or change them with \
-             --reflect and --emit",
+             `ImportOptions::edits`",
             REFLECTANCE_OF_NONE,
             undefined.join(", ")
         );

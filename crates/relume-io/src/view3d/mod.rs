@@ -213,9 +213,7 @@ fn notes_of(file: &File) -> Vec<Note> {
                 Severity::Info,
                 "view3d-enclosure",
                 "encl",
-                "View3D adjusts the factors of an enclosure; here that is `relume factors --closure \
-                 reciprocal`"
-                    .into(),
+                "View3D adjusts the factors of an enclosure; here that is `Factors::close`".into(),
             )),
             "emit" if on => notes.push(note(
                 Severity::Warning,
@@ -235,7 +233,7 @@ fn notes_of(file: &File) -> Vec<Note> {
         }
     }
     if !ignored.is_empty() {
-        let message = "for View3D's own method; accuracy here is --tolerance".to_owned();
+        let message = "for View3D's own method; accuracy here is `Options::tolerance`".to_owned();
         notes.push(note(Severity::Info, "view3d-control", &ignored.join(" "), message));
     }
     if !file.title.is_empty() {

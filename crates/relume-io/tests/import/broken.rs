@@ -284,7 +284,10 @@ fn what_lies_outside_the_scenes_folder_is_opened_only_if_asked_for() {
         ["../cube.bin", "%2e%2e/cube.bin", "%2E%2E%2Fcube.bin", "x/../../cube.bin", &absolute]
     {
         let file = g.write_json(&folder, "s", json!(uri));
-        says(&read(&file).unwrap_err().to_string(), &["buffer 0", "outside", "--allow-outside"]);
+        says(
+            &read(&file).unwrap_err().to_string(),
+            &["buffer 0", "outside", "`ImportOptions::allow_outside`"],
+        );
     }
     let anywhere = ImportOptions { allow_outside: true, ..ImportOptions::default() };
     for uri in ["../cube.bin", &absolute] {
@@ -300,7 +303,10 @@ fn what_lies_outside_the_scenes_folder_is_opened_only_if_asked_for() {
     g.json["images"] = json!([{"uri": "../wood.png"}]);
     g.json["textures"] = json!([{"source": 0}]);
     g.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
-    says(&scene_of(&g).unwrap_err().to_string(), &["image 0", "wood.png", "--allow-outside"]);
+    says(
+        &scene_of(&g).unwrap_err().to_string(),
+        &["image 0", "wood.png", "`ImportOptions::allow_outside`"],
+    );
 }
 
 #[cfg(unix)]
@@ -443,6 +449,6 @@ fn cameras_that_make_no_picture_are_left_out_or_mended() {
     ] {
         let (seen, said) = camera(broken);
         assert_eq!(seen, None);
-        says(&said, &["left out", "--eye"]);
+        says(&said, &["left out", "choose a view"]);
     }
 }

@@ -146,7 +146,7 @@ fn what_is_wrong_with_it_is_said_and_leaves_the_scene_as_it_is() {
         let scene = scene_of(&g).unwrap();
         assert!(scene.environment.is_none(), "{at}");
         let message = &with_code(&scene.notes, "environment")[0].message;
-        assert!(message.contains(why) && message.contains("--environment FILE"), "{message}");
+        assert!(message.contains(why) && message.contains("`Sky::Environment`"), "{message}");
     }
     let mut missing = lit(&faces, 1.0, json!({}));
     missing.json["extensions"]["EXT_lights_image_based"]["lights"][0]["specularImages"] =

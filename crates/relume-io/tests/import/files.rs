@@ -1,8 +1,10 @@
 //! The same cube in every form that a file may take.
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::json;
 
-use super::gltf::{Gltf, base64, cube_indices, cube_positions};
+use super::gltf::{Gltf, cube_indices, cube_positions};
 use super::{read, scene_of, with_code};
 use relume_core::scene::Scene;
 
@@ -27,7 +29,7 @@ fn external_embedded_and_binary_buffers() {
     let g = Gltf::cube();
     let external = read(&g.write(folder.path(), "a")).unwrap();
     is_the_cube(&external);
-    let uri = format!("data:application/octet-stream;base64,{}", base64(&g.bin));
+    let uri = format!("data:application/octet-stream;base64,{}", STANDARD.encode(&g.bin));
     let embedded = read(&g.write_json(folder.path(), "b", json!(uri))).unwrap();
     std::fs::write(folder.path().join("with space.bin"), &g.bin).unwrap();
     let escaped = read(&g.write_json(folder.path(), "c", json!("with%20space.bin"))).unwrap();
@@ -125,7 +127,7 @@ fn environments_of_files_are_named() {
     assert!(with_code(&scene_of(&g).unwrap().notes, "environment").is_empty());
     g.json["extensionsUsed"] = json!(["KHR_lights_environment"]);
     let scene = scene_of(&g).unwrap();
-    assert!(with_code(&scene.notes, "environment")[0].message.contains("--environment FILE"));
+    assert!(with_code(&scene.notes, "environment")[0].message.contains("`Sky::Environment`"));
 }
 
 #[test]

@@ -166,18 +166,3 @@ pub(crate) fn cube_positions() -> Vec<f32> {
 pub(crate) fn cube_indices() -> Vec<u16> {
     (0..6).flat_map(|s| [0, 1, 2, 0, 2, 3].map(|k| 4 * s + k)).collect()
 }
-
-/// The bytes in base64.
-pub(crate) fn base64(bytes: &[u8]) -> String {
-    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut out = String::new();
-    for chunk in bytes.chunks(3) {
-        let word =
-            chunk.iter().fold(0u32, |w, &b| w << 8 | u32::from(b)) << (8 * (3 - chunk.len()));
-        for k in 0..4 {
-            let letter = LETTERS[(word >> (18 - 6 * k) & 63) as usize] as char;
-            out.push(if k <= chunk.len() { letter } else { '=' });
-        }
-    }
-    out
-}

@@ -7,7 +7,6 @@ use std::sync::Arc;
 
 use crate::picture::Image;
 
-mod base64;
 mod letters;
 mod palette;
 mod pixels;

@@ -2,7 +2,10 @@
 
 use std::fmt::Write;
 
-use super::{Colour, Drawing, Shape, base64};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
+use super::{Colour, Drawing, Shape};
 
 impl Drawing {
     /// The text of an SVG file.
@@ -26,7 +29,7 @@ impl Drawing {
                          href=\"data:image/png;base64,"
                     );
                     // A picture that cannot be encoded has no pixels.
-                    base64::push(&image.to_png().unwrap_or_default(), &mut out);
+                    STANDARD.encode_string(image.to_png().unwrap_or_default(), &mut out);
                     out.push_str("\"/>\n");
                 }
                 Shape::Stroke { from, to, width, colour, opacity } => {

@@ -21,16 +21,16 @@ use sum::{Buffers, Fixed, Sign, mirrored, plus};
 /// What is done to form factors so that rows sum to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Closure {
-    /// Nothing: they are as the links have them.
+    /// Nothing: form factors stay as the links have them.
     None,
-    /// Each row is divided by its sum. Reciprocity is lost by as much as sums differed.
+    /// Each row is divided by its sum; reciprocity no longer holds, by as much as the sums differed.
     Rows,
     /// Exchange areas are scaled by a factor for each of their two ends until every row sums to 1:
     /// reciprocity is kept.
     Reciprocal,
 }
 
-/// A row whose sum is further from 1 than links err: the scene is open.
+/// Error: a row sum differs from 1 by more than links err; closure needs a closed scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Open {
     /// The row furthest from 1.
@@ -94,9 +94,8 @@ impl Factors {
         self.row(from).fold(0.0, |sum, (_, factor)| sum + factor)
     }
 
-    /// What escapes from a group, 1 minus its row sum: into the open, onto black backs of
-    /// single-sided polygons, and onto patches of no group. Off by as much as the row sum is, and
-    /// so perhaps below 0. `None` while the group is absent.
+    /// Share of a group's flux that escapes, 1 minus its row sum: into the open, onto black backs of single-sided polygons, and
+    /// onto patches of no group. Off by as much as the row sum is, and so perhaps below 0. `None` while the group is absent.
     pub fn escapes(&self, from: u32) -> Option<f64> {
         (self.area_m2[from as usize] > 0.0).then(|| 1.0 - self.row_sum(from))
     }

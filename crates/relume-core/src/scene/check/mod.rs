@@ -77,7 +77,7 @@ fn emission(scene: &Scene, notes: &mut Vec<Note>) {
     if !glows && !shines {
         let message = "nothing emits light, so every picture is black; give a material an emission \
                        (emissiveFactor) or add a point, spot or sun light (area lights are not exported to glTF: \
-                       use an emitting polygon), or light it from outside (--sky uniform=1, --sun 135,40)";
+                       use an emitting polygon), or light it from outside (`Scene::with_outside`)";
         notes.push(note(Severity::Error, "nothing-emits", &scene.name, 0, message.to_owned()));
     }
 }

@@ -27,7 +27,7 @@ impl std::fmt::Debug for Environment {
 }
 
 impl Environment {
-    /// Of pixels, row by row from the top: W/m2/sr, linear RGB.
+    /// Environment of pixels, row by row from the top: W/m2/sr, linear RGB.
     ///
     /// # Errors
     /// As many pixels as `width` times `height`, finite and not negative, or the error names `name`.
@@ -54,14 +54,14 @@ impl Environment {
         Ok(Environment { name: name.to_owned(), width, height, pixels, turned: [0.0, 1.0] })
     }
 
-    /// The same turned about the vertical, counter-clockwise seen from above, degrees.
+    /// The environment turned about the vertical, counter-clockwise seen from above, degrees.
     pub fn turned(mut self, degrees: f64) -> Environment {
         let angle = degrees.to_radians();
         self.turned = [libm::sin(angle), libm::cos(angle)];
         self
     }
 
-    /// What it is called: the file.
+    /// Name: that of its file.
     pub fn name(&self) -> &str {
         &self.name
     }

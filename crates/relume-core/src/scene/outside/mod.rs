@@ -40,8 +40,8 @@ pub struct Outside {
     pub fineness: f64,
 }
 
-/// How the clip's time runs for the sun: it is at its place in the given second of the place's time at the start, and
-/// later (or earlier) by so much at the end.
+/// Time of the sun over a clip: the sun is at its place in the given second of the place's time at the start, and later (or
+/// earlier) by so much at the end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Day {
     /// From the sun's given time to the clip's start, seconds.
@@ -66,7 +66,7 @@ impl Outside {
         self.day.is_some()
     }
 
-    /// What is wrong with it, before anything is made of it.
+    /// Checks all numbers.
     ///
     /// # Errors
     /// Numbers out of their ranges, a sky that needs a sun where there is none, a day without a place on earth.
@@ -96,11 +96,7 @@ impl Outside {
         }
         if self.sky.as_ref().is_some_and(Sky::follows_the_sun) && self.sun.is_none() {
             let what = "how it looks depends on where the sun is".into();
-            return fails(
-                "the sky",
-                what,
-                "give the sun's place: --sun AZIMUTH,ELEVATION or LATITUDE,LONGITUDE,TIME",
-            );
+            return fails("the sky", what, "give the sun's place: `Outside::sun`");
         }
         if let Some(sun) = &self.sun {
             if !(sun.diameter_deg >= 1e-3 && sun.diameter_deg <= 60.0) {
@@ -119,7 +115,7 @@ impl Outside {
             _ => {
                 let what =
                     "the sun moves over the day of a place on earth, and there is none".into();
-                fails("the day", what, "give --sun LATITUDE,LONGITUDE,TIME")
+                fails("the day", what, "give `SunPlace::Earth`")
             }
         }
     }
@@ -201,7 +197,7 @@ impl OutsideNow {
         self.sky_radiance(direction)
     }
 
-    /// The same without the sun's disc.
+    /// Radiance from a direction (a unit vector) without the sun's disc, W/m2/sr, linear RGB.
     pub fn sky_radiance(&self, direction: DVec3) -> [f64; 3] {
         match &self.sky {
             Some(sky) if direction.y > 0.0 || matches!(sky, SkyNow::Picture(_)) => {

@@ -10,7 +10,7 @@ use glam::DVec3;
 use super::environment::Environment;
 use super::perez::{self, Distribution, HORIZON};
 
-/// What the sky looks like, without the sun's disc.
+/// Radiance of the sky, without the sun's disc.
 #[derive(Clone, Debug)]
 pub enum Sky {
     /// The same radiance from everywhere above the horizon, W/m2/sr, linear RGB.
@@ -48,7 +48,7 @@ impl Sky {
         matches!(self, Sky::Clear { .. } | Sky::Turbid { .. } | Sky::AllWeather { .. })
     }
 
-    /// Whether it says what comes from below the horizon.
+    /// Whether it has radiance below the horizon too.
     pub fn is_all_round(&self) -> bool {
         matches!(self, Sky::Environment(_))
     }

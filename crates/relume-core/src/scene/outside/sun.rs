@@ -25,7 +25,7 @@ pub struct Sun {
 /// Apparent diameter of the sun's disc, degrees.
 pub const SUN_DIAMETER_DEG: f64 = 0.533;
 
-/// Where the sun is.
+/// Place of the sun.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SunPlace {
     /// In a direction that does not change, degrees.

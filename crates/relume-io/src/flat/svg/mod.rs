@@ -19,7 +19,7 @@ use super::text::channels;
 use relume_core::flat::{FlatScene, Material, Motion, SceneError, Segment};
 use relume_core::scene::limits::{COORDINATE_MAX_M, is_place};
 
-/// What is wrong with an SVG, where, and what to do about it.
+/// Error in an SVG, with its element and a remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{element}: {what}; {remedy}")]
 pub struct SvgError {

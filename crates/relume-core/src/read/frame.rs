@@ -6,6 +6,7 @@ use crate::element::{ElementId, Forest};
 use crate::follow::{Accuracy, FrameReport};
 use crate::geometry::Pose;
 use crate::pair::PairTree;
+use crate::scene::PatchId;
 use crate::space::{Solved, row_sums_of};
 
 use super::events::{self, Event};
@@ -14,7 +15,7 @@ use super::fluxes::{self, Flux};
 use super::gather::Sensor;
 use super::sensors;
 use super::snapshot::{self, Snapshot};
-use super::{accuracy, reconstruct};
+use super::{accuracy, direct, reconstruct};
 
 /// The solution of a world, until the session goes on.
 #[derive(Clone, Copy)]
@@ -130,6 +131,14 @@ impl<'a> Frame<'a> {
         snapshot::take(self.solved, &self.solved.links, &self.solved.radiosity)
     }
 
+    /// The same with [`Snapshot::indirect`]: the light of leaves without what comes straight from punctual lights and from what some
+    /// patches emit. For who finds that more exactly than the mesh has it. Cost: another sweep over all links.
+    pub fn solution_beside(&self, lamps: &[PatchId]) -> Snapshot {
+        let snapshot = self.solution();
+        let direct = direct::of(self.solved, &self.solved.links, &self.solved.radiosity, lamps);
+        snapshot.beside(&direct)
+    }
+
     /// The same with the light of every element found anew from links of every leaf's own in place of those above it: along
     /// edges between surfaces, where leaves of [`Frame::solution`] inherit lines and parabolas through steep curves, some
     /// thirty times as accurate. The solution itself stays as it is.
@@ -139,6 +148,13 @@ impl<'a> Frame<'a> {
     pub fn reconstruction(&self) -> Snapshot {
         let (links, radiosity) = reconstruct::solve(self.solved);
         snapshot::take(self.solved, &links, &radiosity)
+    }
+
+    /// The same with [`Snapshot::indirect`], as [`Frame::solution_beside`] has it.
+    pub fn reconstruction_beside(&self, lamps: &[PatchId]) -> Snapshot {
+        let (links, radiosity) = reconstruct::solve(self.solved);
+        let direct = direct::of(self.solved, &links, &radiosity, lamps);
+        snapshot::take(self.solved, &links, &radiosity).beside(&direct)
     }
 
     /// The radiosity of all surfaces, as flat arrays.

@@ -26,7 +26,7 @@ pub use crate::follow::{
 pub use crate::pair::Work;
 pub use crate::read::{
     Closure, CoarseQuantity, CoarseValue, Difference, ElementName, Elements, Event, EventKind,
-    Factors, Flux, Frame, Grouping, Hash, Leaf, Mesh, Missed, Open, PartFactors, RadiosityError,
+    Factors, Flux, Frame, Gathered, Grouping, Hash, Leaf, Mesh, Missed, Open, PartFactors, RadiosityError,
     RadiosityGap, Sensor, Snapshot, Which, compare, missed, radiosity_error, radiosity_gap,
 };
 

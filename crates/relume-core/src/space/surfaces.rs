@@ -31,6 +31,17 @@ impl<'a> LitForest<'a> {
         LitForest { forest, patch_materials, places: Vec::new(), groups: None }
     }
 
+    /// Black, and without what some patches emit: by patch, whether it is one that emits.
+    pub(crate) fn emission_of(mut self, emits: &[bool]) -> LitForest<'a> {
+        for (lit, emits) in self.patch_materials.iter_mut().zip(emits) {
+            lit.reflectance = [0.0; 3];
+            if !emits {
+                lit.exitance = [0.0; 3];
+            }
+        }
+        self
+    }
+
     /// With links that end on groups.
     pub(crate) fn with_groups(mut self, groups: &'a GroupLinks) -> LitForest<'a> {
         self.groups = (!groups.is_empty()).then_some(groups);

@@ -14,11 +14,13 @@ use relume_core::scene::Patch;
 use relume_core::scene::outside::OutsideNow;
 use relume_core::session::Snapshot;
 
-use super::assemble::{Drawing, Quantity};
+use super::assemble::{Drawing, Light, Quantity};
 use super::camera::View;
+use super::lit::Lit;
 use super::project::Projector;
 use super::raster::{Fragment, Grid, rasterise};
 use super::render::Settings;
+use super::shading::Shading;
 
 /// What is seen at one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -59,8 +61,9 @@ pub struct Layers {
 pub fn layers(snapshot: &Snapshot, view: &View, settings: &Settings) -> Layers {
     let grid = Grid::new(settings.width, settings.height, settings.samples);
     let projector = Projector::new(view, settings.width, settings.height);
-    let draw =
-        |quantity| Drawing::of(quantity, snapshot, (&projector, &grid), settings.shading, false);
+    let lit = (settings.shading == Shading::Smooth).then(|| Lit::new(snapshot));
+    let light = Light::of(settings.shading, lit.as_ref());
+    let draw = |quantity| Drawing::of(quantity, snapshot, (&projector, &grid), light, false);
     let (drawing, arriving) = (draw(Quantity::Radiosity), draw(Quantity::Irradiance));
     // A sun without a place was refused when the scene was made.
     let outside = snapshot.scene.outside.as_ref().and_then(|o| o.at(snapshot.time_s).ok());
@@ -74,8 +77,8 @@ pub fn layers(snapshot: &Snapshot, view: &View, settings: &Settings) -> Layers {
 
 struct Reader<'a> {
     snapshot: &'a Snapshot,
-    drawing: &'a Drawing,
-    arriving: &'a Drawing,
+    drawing: &'a Drawing<'a>,
+    arriving: &'a Drawing<'a>,
     outside: Option<OutsideNow>,
     projector: Projector,
 }

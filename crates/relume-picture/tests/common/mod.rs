@@ -235,7 +235,7 @@ pub(crate) fn snapshot(
         leaf_offsets.push(leaves.len() as u32);
     }
     let scene = Arc::new(scene.clone());
-    Snapshot { scene, time_s: 0.0, error_w_m2: 0.0, world, leaves, leaf_offsets }
+    Snapshot { scene, time_s: 0.0, error_w_m2: 0.0, world, leaves, leaf_offsets, indirect: Vec::new() }
 }
 
 /// Splits unevenly, so that there are T-vertices everywhere.

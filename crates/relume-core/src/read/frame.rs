@@ -7,6 +7,7 @@ use crate::follow::{Accuracy, FrameReport};
 use crate::geometry::Pose;
 use crate::pair::PairTree;
 use crate::scene::PatchId;
+use crate::solver::{Links, Radiosity};
 use crate::space::{Solved, row_sums_of};
 
 use super::events::{self, Event};
@@ -131,12 +132,10 @@ impl<'a> Frame<'a> {
         snapshot::take(self.solved, &self.solved.links, &self.solved.radiosity)
     }
 
-    /// The same with [`Snapshot::indirect`]: the light of leaves without what comes straight from punctual lights and from what some
-    /// patches emit. For who finds that more exactly than the mesh has it. Cost: another sweep over all links.
+    /// The same with [`Snapshot::indirect`]: the light of leaves without what comes straight from punctual lights and from some
+    /// patches, lamps, emit. For who finds that more exactly than the mesh has it. Cost: another sweep over all links.
     pub fn solution_beside(&self, lamps: &[PatchId]) -> Snapshot {
-        let snapshot = self.solution();
-        let direct = direct::of(self.solved, &self.solved.links, &self.solved.radiosity, lamps);
-        snapshot.beside(&direct)
+        self.beside(&self.solved.links, &self.solved.radiosity, lamps)
     }
 
     /// The same with the light of every element found anew from links of every leaf's own in place of those above it: along
@@ -153,8 +152,13 @@ impl<'a> Frame<'a> {
     /// The same with [`Snapshot::indirect`], as [`Frame::solution_beside`] has it.
     pub fn reconstruction_beside(&self, lamps: &[PatchId]) -> Snapshot {
         let (links, radiosity) = reconstruct::solve(self.solved);
-        let direct = direct::of(self.solved, &links, &radiosity, lamps);
-        snapshot::take(self.solved, &links, &radiosity).beside(&direct)
+        self.beside(&links, &radiosity, lamps)
+    }
+
+    fn beside(&self, links: &Links, radiosity: &Radiosity, lamps: &[PatchId]) -> Snapshot {
+        let lights = direct::lights(self.solved, lamps);
+        let direct = direct::of(self.solved, links, radiosity, &lights);
+        snapshot::take(self.solved, links, radiosity).beside(&direct, lights)
     }
 
     /// The radiosity of all surfaces, as flat arrays.

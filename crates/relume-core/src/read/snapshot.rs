@@ -34,6 +34,17 @@ pub struct Snapshot {
     /// What each leaf receives beside the light of lamps that were named; empty unless asked for
     /// ([`super::Frame::solution_beside`]).
     pub indirect: Vec<Gathered>,
+    /// These lamps, in the order of their patches.
+    pub lamps: Vec<LampLight>,
+}
+
+/// A patch whose emission is told apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LampLight {
+    /// The patch.
+    pub patch: PatchId,
+    /// What it emits, W/m2, linear RGB.
+    pub exitance: [f32; 3],
 }
 
 /// Irradiance of a leaf, or a part of it: a line over the leaf.
@@ -92,7 +103,8 @@ impl Leaf {
 
 impl Snapshot {
     /// The same, knowing what of its light is direct: a snapshot of the same leaves.
-    pub(super) fn beside(mut self, direct: &Snapshot) -> Snapshot {
+    pub(super) fn beside(mut self, direct: &Snapshot, lamps: Vec<LampLight>) -> Snapshot {
+        self.lamps = lamps;
         let rest = |(all, direct): (&Leaf, &Leaf)| Gathered {
             irradiance: [0, 1, 2].map(|c| (all.irradiance[c] - direct.irradiance[c]).max(0.0)),
             gradient: [0, 1].map(|axis| {
@@ -202,6 +214,7 @@ pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Sna
         leaves,
         leaf_offsets,
         indirect: Vec::new(),
+        lamps: Vec::new(),
     }
 }
 

@@ -31,13 +31,10 @@ impl<'a> LitForest<'a> {
         LitForest { forest, patch_materials, places: Vec::new(), groups: None }
     }
 
-    /// Black, and without what some patches emit: by patch, whether it is one that emits.
-    pub(crate) fn emission_of(mut self, emits: &[bool]) -> LitForest<'a> {
-        for (lit, emits) in self.patch_materials.iter_mut().zip(emits) {
-            lit.reflectance = [0.0; 3];
-            if !emits {
-                lit.exitance = [0.0; 3];
-            }
+    /// Black, with other exitances: by patch, W/m2.
+    pub(crate) fn emitting(mut self, exitance: &[[f32; 3]]) -> LitForest<'a> {
+        for (lit, exitance) in self.patch_materials.iter_mut().zip(exitance) {
+            *lit = FacetMaterial { reflectance: [0.0; 3], exitance: *exitance };
         }
         self
     }

@@ -337,9 +337,8 @@ impl PatchDrawing {
         };
         let first = snapshot.leaf_offsets[id.0 as usize];
         let mut pieces: Vec<(Primitive, Fill)> = if let Light::Smooth(_) = light {
-            let lit = |(index, leaf): (u32, &Leaf)| {
-                Some((pen.polygon(&leaf.corners)?, Fill::Lit(index)))
-            };
+            let lit =
+                |(index, leaf): (u32, &Leaf)| Some((pen.polygon(&leaf.corners)?, Fill::Lit(index)));
             (first..).zip(leaves.iter()).filter_map(lit).collect()
         } else if triangles.is_empty() {
             leaves.iter().filter_map(|leaf| pen.leaf(leaf)).collect()

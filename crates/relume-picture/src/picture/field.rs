@@ -20,6 +20,9 @@ const SAME: f64 = 1e-6;
 /// Weight of a leaf that no light arrives at, beside its neighbours: something rests on it, or it would be no brighter beside them.
 const DARK: f64 = 1e-3;
 
+/// How far a leaf may lead outside the range of its neighbours' means, in parts of that range.
+const BEYOND: f64 = 1.0;
+
 /// Light over all patches of a snapshot.
 pub(super) struct Field {
     sheets: Vec<Sheet>,
@@ -49,16 +52,20 @@ impl OnSheet {
 }
 
 /// Leaves of one surface in one plane.
+#[derive(Default)]
 struct Sheet {
     leaves: Vec<Blended>,
     /// Boxes of what leaves have a say in: a heap-shaped tree over the leaves in their order.
     tree: Vec<[DVec2; 2]>,
     /// By leaf: those that have a say somewhere in it.
     beside: Vec<OnceLock<Vec<u32>>>,
+    /// By leaf: its gradients as far as its neighbours bear them out.
+    borne_out: Vec<OnceLock<[DVec2; 3]>>,
 }
 
 /// A leaf as it takes part in the blend.
 struct Blended {
+    corners: [DVec2; 4],
     centroid: DVec2,
     irradiance: [f64; 3],
     gradient: [DVec2; 3],
@@ -92,6 +99,7 @@ impl Blended {
         }
         let is_dark = line.irradiance == [0.0; 3];
         Blended {
+            corners,
             centroid,
             irradiance: line.irradiance.map(f64::from),
             gradient,
@@ -148,7 +156,7 @@ impl Field {
             let found = of_surface.iter().find(is_its).copied();
             let (sheet, first) = found.unwrap_or_else(|| {
                 let fresh = (field.sheets.len() as u32, PatchId(k as u32));
-                field.sheets.push(Sheet { leaves: vec![], tree: vec![], beside: vec![] });
+                field.sheets.push(Sheet { ..Sheet::default() });
                 of_surface.push(fresh);
                 fresh
             });
@@ -195,32 +203,58 @@ impl Sheet {
             self.tree[k] = [a[0].min(b[0]), a[1].max(b[1])];
         }
         self.beside = (0..self.leaves.len()).map(|_| OnceLock::new()).collect();
+        self.borne_out = (0..self.leaves.len()).map(|_| OnceLock::new()).collect();
     }
 
     fn at(&self, leaf: u32, p: DVec2) -> [f64; 3] {
-        let beside = self.beside[leaf as usize].get_or_init(|| self.beside(leaf));
         let (mut sum, mut whole) = ([0.0; 3], 0.0);
-        for &other in beside {
-            let other = &self.leaves[other as usize];
-            let say = other.say(p);
+        for &other in self.beside(leaf) {
+            let say = self.leaves[other as usize].say(p);
             if say > 0.0 {
-                let d = p - other.centroid;
-                for (c, sum) in sum.iter_mut().enumerate() {
-                    *sum += say * (other.irradiance[c] + other.gradient[c].dot(d)).max(0.0);
-                }
+                let value = self.line(other, p);
+                (0..3).for_each(|c| sum[c] += say * value[c]);
                 whole += say;
             }
         }
-        if whole > 0.0 {
-            return sum.map(|s| s / whole);
-        }
+        if whole > 0.0 { sum.map(|s| s / whole) } else { self.line(leaf, p) }
+    }
+
+    /// What the line of a leaf has at a point, never negative.
+    fn line(&self, leaf: u32, p: DVec2) -> [f64; 3] {
         let own = &self.leaves[leaf as usize];
+        let gradient = self.borne_out[leaf as usize].get_or_init(|| self.borne_out(leaf));
         let d = p - own.centroid;
-        [0, 1, 2].map(|c| (own.irradiance[c] + own.gradient[c].dot(d)).max(0.0))
+        [0, 1, 2].map(|c| (own.irradiance[c] + gradient[c].dot(d)).max(0.0))
+    }
+
+    /// The gradients of a leaf, less steep where its corners would be further outside the range of it and its neighbours than
+    /// [`BEYOND`] (after Barth and Jespersen 1989): lines of leaves within which light has an edge lead astray.
+    fn borne_out(&self, leaf: u32) -> [DVec2; 3] {
+        let own = &self.leaves[leaf as usize];
+        let beside = self.beside(leaf);
+        let of_channel = |c: usize| {
+            let mean = own.irradiance[c];
+            let means = beside.iter().map(|&k| self.leaves[k as usize].irradiance[c]);
+            let (low, high) = means.fold((mean, mean), |(l, h), m| (l.min(m), h.max(m)));
+            let more = BEYOND * (high - low);
+            let share = |rise: f64| match rise {
+                r if r > 0.0 => (high + more - mean) / r,
+                r if r < 0.0 => (low - more - mean) / r,
+                _ => 1.0,
+            };
+            let rises = own.corners.iter().map(|&p| own.gradient[c].dot(p - own.centroid));
+            let least = rises.map(share).fold(1.0, f64::min);
+            own.gradient[c] * if beside.len() > 1 { least } else { 1.0 }
+        };
+        [of_channel(0), of_channel(1), of_channel(2)]
     }
 
     /// Leaves that have a say in or right beside a leaf, ascending.
-    fn beside(&self, leaf: u32) -> Vec<u32> {
+    fn beside(&self, leaf: u32) -> &[u32] {
+        self.beside[leaf as usize].get_or_init(|| self.find_beside(leaf))
+    }
+
+    fn find_beside(&self, leaf: u32) -> Vec<u32> {
         let own = &self.leaves[leaf as usize];
         let beyond = (own.high - own.low) * 0.05;
         let (low, high) = (own.low - beyond, own.high + beyond);

@@ -43,7 +43,8 @@ impl<'a> Lit<'a> {
             false => (Field::new(snapshot, &snapshot.indirect), Some(Direct::new(snapshot))),
         };
         let mut lit = Lit { snapshot, field, direct, smooth: Smooth::default() };
-        let of_corner = |patch: PatchId, leaf: usize, at: DVec2| lit.flat(patch, leaf, at).irradiance;
+        let of_corner =
+            |patch: PatchId, leaf: usize, at: DVec2| lit.flat(patch, leaf, at).irradiance;
         lit.smooth = Smooth::lacking(snapshot, &of_corner);
         lit
     }
@@ -68,8 +69,7 @@ impl<'a> Lit<'a> {
 
     /// The same of the flat polygon, whatever it stands for.
     fn flat(&self, patch: PatchId, leaf: usize, p: DVec2) -> Arriving {
-        let mut out =
-            Arriving { irradiance: self.field.at(patch, leaf, p), ..Arriving::default() };
+        let mut out = Arriving { irradiance: self.field.at(patch, leaf, p), ..Arriving::default() };
         if let Some(direct) = &self.direct {
             out.direct = direct.at(self.snapshot, patch, leaf, p);
             (0..3).for_each(|c| out.irradiance[c] += out.direct[c]);

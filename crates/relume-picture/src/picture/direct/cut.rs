@@ -126,9 +126,8 @@ impl Cutter {
                 return at_points(normal, whole, (point, &blockers[k..]), near_m, &self.pieces);
             }
         }
-        let factor = |piece: &ConvexPolygon| {
-            form_factor_from_point(DVec3::ZERO, normal, piece.corners())
-        };
+        let factor =
+            |piece: &ConvexPolygon| form_factor_from_point(DVec3::ZERO, normal, piece.corners());
         self.pieces.iter().map(factor).sum()
     }
 

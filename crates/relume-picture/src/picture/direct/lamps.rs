@@ -5,7 +5,7 @@
 use relume_core::scene::{PatchId, Scene, World};
 
 use crate::picture::tone::luminance;
-use crate::picture::tuning::{BRIGHT_SKY, LAMPS_MAX, LAMP_SHARE, SKY_LAMPS_MAX};
+use crate::picture::tuning::{BRIGHT_SKY, LAMP_SHARE, LAMPS_MAX, SKY_LAMPS_MAX};
 
 /// Patches whose own light a cleaned picture finds exactly, ascending: those that emit more than a thousandth of what all lamps do, the
 /// sun, and parts of the sky that are much brighter than the rest.

@@ -7,7 +7,7 @@
 //! | `cut` | what a point sees of a polygon past others |
 //! | `sight` | what a leaf sees of the lamps |
 //!
-//! A function of the scene, of its world and of the leaves' shapes: no light of the solution enters. Must not know the view.
+//! A function of the scene, of its world, of the leaves' shapes and of what lamps emit. Must not know the view.
 
 mod cut;
 mod lamps;
@@ -21,7 +21,7 @@ use glam::{DVec2, DVec3};
 use relume_core::element::WorldView;
 use relume_core::geometry::{Aabb, Plane};
 use relume_core::scene::{Frame, LightId, PatchId};
-use relume_core::session::Snapshot;
+use relume_core::session::{LampLight, Snapshot};
 
 use cut::{Blocker, Cutter};
 pub use lamps::direct_lamps;
@@ -73,16 +73,16 @@ impl Direct {
             boxes.push(Aabb::of(corners.iter().copied()));
             blockers.push(Blocker { plane: Plane::through(frame.origin, frame.normal), corners });
         }
-        let lamp = |id: PatchId| {
-            let k = id.0 as usize;
+        let lamp = |lamp: &LampLight| {
+            let k = lamp.patch.0 as usize;
             let frame = frames[k].as_ref()?;
             let corners = corners(k, frame);
             Some(Lamp {
-                patch: id,
+                patch: lamp.patch,
                 bounds: Aabb::of(corners.iter().copied()),
                 corners,
                 plane: Plane::through(frame.origin, frame.normal),
-                exitance: world.exitance(scene, &scene.patches[k]),
+                exitance: lamp.exitance.map(f64::from),
             })
         };
         let light = |k: usize| {
@@ -92,7 +92,7 @@ impl Direct {
         };
         Direct {
             around: Surroundings {
-                lamps: direct_lamps(scene, world).into_iter().filter_map(lamp).collect(),
+                lamps: snapshot.lamps.iter().filter_map(lamp).collect(),
                 lights: (0..scene.lights.len()).filter_map(light).collect(),
                 blockers,
                 tree: Tree::new(boxes),

@@ -12,7 +12,7 @@ use super::cut::{Blocker, Cutter, Hides};
 use super::tree::Tree;
 use crate::picture::tuning::{PATCHWORK_FAR, PATCHWORK_LAMPS};
 
-/// A polygon that emits on its front.
+/// A polygon that shines on its front.
 pub(super) struct Lamp {
     pub(super) patch: PatchId,
     pub(super) corners: Vec<DVec3>,
@@ -77,9 +77,8 @@ struct Patchwork {
 impl Patchwork {
     fn at(&self, p: DVec2) -> [f64; 3] {
         let t = (p - self.low) / self.size;
-        let weights = |x: f64| {
-            [2.0 * (x - 0.5) * (x - 1.0), 4.0 * x * (1.0 - x), 2.0 * x * (x - 0.5)]
-        };
+        let weights =
+            |x: f64| [2.0 * (x - 0.5) * (x - 1.0), 4.0 * x * (1.0 - x), 2.0 * x * (x - 0.5)];
         let (wx, wy) = (weights(t.x), weights(t.y));
         let mut out = [0.0; 3];
         for (j, wy) in wy.iter().enumerate() {
@@ -108,8 +107,7 @@ impl Sight {
                 continue;
             }
             around.tree.between(&bounds, &lamp.bounds, &mut found);
-            let blockers =
-                around.between(receiver, &lamp.corners, Some(&lamp.plane), &found);
+            let blockers = around.between(receiver, &lamp.corners, Some(&lamp.plane), &found);
             let hides_all = |blocker: &Blocker| {
                 let hides = |&c: &DVec3| blocker.hides(c, &lamp.corners, around.slack_m);
                 receiver.corners.iter().all(|c| hides(c) == Hides::All)

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 use relume_core::geometry::Pose;
 use relume_core::scene::{PatchId, Projection, Scene};
-use relume_core::session::{Command, Options, Session, Snapshot};
+use relume_core::session::{Command, Gathered, LampLight, Options, Session, Snapshot};
 use relume_judge::path::{Estimate, Site, irradiance};
 use relume_judge::seen::form_factor_from_point;
 use relume_judge::{Polygon, World};
@@ -115,13 +115,42 @@ fn direct_light_of_every_pixel_is_the_exact_formulas() {
     assert!(partly > 20 && most > 1.0, "{partly} {most}");
 }
 
+/// A plate lies on half of a lamp in the floor, in its plane, and a box stands on another part: what they cover does not shine. The floor
+/// around the lamp, larger and in its plane, covers nothing.
+#[test]
+fn what_lies_on_a_lamp_hides_it() {
+    let lit = |on_it: &[&str]| {
+        let mut scene = room(&[]);
+        scene.materials[3].exitance = [0.0; 3];
+        let grey = material(&mut scene, [0.5; 3], 0.0);
+        let glow = material(&mut scene, [0.0; 3], 30.0);
+        let flat = |x: [f64; 2]| side(v(x[0], -1.0, 1.0), v(x[1], 0.0, 3.0), Side::Ceiling);
+        body(&mut scene, &[(flat([1.0, 3.0]), glow)]);
+        if on_it.contains(&"plate") {
+            body(&mut scene, &[(flat([1.0, 2.0]), grey)]);
+        }
+        if on_it.contains(&"box") {
+            solid(&mut scene, v(2.0, 0.0, 1.0), v(3.0, 1e-3, 3.0), grey);
+        }
+        let plain = snapshot(&scene, |_, _, level| level < 2, |_, _, _| [0.0; 3]);
+        let lamps = direct_lamps(&scene, &plain.world);
+        let exitance = [30.0; 3];
+        let snapshot = Snapshot {
+            indirect: vec![Gathered::default(); plain.leaves.len()],
+            lamps: lamps.iter().map(|&patch| LampLight { patch, exitance }).collect(),
+            ..plain
+        };
+        let seen = numbers(&snapshot, &view(), Shading::Smooth, SIZE);
+        // On the left wall, at half height.
+        seen[(15 * SIZE.0 + 1) as usize].direct[0]
+    };
+    let (all, plate, both) = (lit(&[]), lit(&["plate"]), lit(&["plate", "box"]));
+    assert!(all > 1.0 && plate < 0.7 * all && plate > 0.1 * all, "{all} {plate}");
+    assert!(both < 1e-3 * all, "{both}");
+}
+
 /// Root mean squares of what is off, over all pixels and over those in penumbrae, less the reference's own.
-fn errors(
-    session: &Session,
-    snapshot: &Snapshot,
-    shading: Shading,
-    reference: &[(Estimate, bool)],
-) -> [f64; 2] {
+fn errors(snapshot: &Snapshot, shading: Shading, reference: &[(Estimate, bool)]) -> [f64; 2] {
     let mut sums = [(0.0, 0.0); 2];
     for (seen, (reference, partly)) in
         numbers(snapshot, &view(), shading, SIZE).iter().zip(reference)
@@ -162,7 +191,9 @@ fn cleaned_pictures_err_a_third_of_gouraud_ones_and_half_in_penumbrae() {
         estimates.into_iter().zip(&sites).map(|(e, site)| (e, partly(site))).collect();
     let before = errors(&plain, Shading::Gouraud, &reference);
     let after = errors(&cleaned(&session), Shading::Smooth, &reference);
-    println!("all, penumbrae: gouraud {before:?}, cleaned {after:?} W/m2");
+    let sum = |(e, _): &(Estimate, bool)| e.irradiance.iter().sum::<f64>();
+    let mean = reference.iter().map(sum).sum::<f64>() / reference.len() as f64;
+    println!("all, penumbrae: gouraud {before:?}, cleaned {after:?} of {mean} W/m2");
     // In penumbrae what is left is light between block and floor, which is the mesh's.
     assert!(after[0] < before[0] / 3.0 && after[1] < before[1] / 2.0, "{after:?} {before:?}");
 }

@@ -25,7 +25,7 @@ use relume_core::session::{LampLight, Snapshot};
 
 use cut::{Blocker, Cutter};
 pub use lamps::direct_lamps;
-use sight::{Lamp, Punctual, Receiver, Sight, Surroundings};
+use sight::{Known, Lamp, Punctual, Receiver, Sight, Surroundings};
 use tree::Tree;
 
 /// What is no further above a surface hides nothing, in diagonals of the scene: what files with six digits hold.
@@ -61,7 +61,7 @@ impl Direct {
             scene.patches[k].corners.iter().map(|&c| frame.point(c)).collect()
         };
         let diagonal_m = scene.bounds_in(world).map_or(1.0, |bounds| bounds.diagonal());
-        let (mut blockers, mut boxes) = (Vec::new(), Vec::new());
+        let (mut blockers, mut known, mut boxes) = (Vec::new(), Vec::new(), Vec::new());
         for (k, patch) in scene.patches.iter().enumerate() {
             let Some(frame) = &frames[k] else { continue };
             // Of two sides of one polygon the first stands for both.
@@ -70,6 +70,8 @@ impl Direct {
                 continue;
             }
             let corners = corners(k, frame);
+            let own = PatchId(k as u32);
+            known.push(Known { patch: own, twin: patch.twin, area_m2: patch.area_m2() });
             boxes.push(Aabb::of(corners.iter().copied()));
             blockers.push(Blocker { plane: Plane::through(frame.origin, frame.normal), corners });
         }
@@ -82,6 +84,7 @@ impl Direct {
                 bounds: Aabb::of(corners.iter().copied()),
                 corners,
                 plane: Plane::through(frame.origin, frame.normal),
+                area_m2: scene.patches[k].area_m2(),
                 exitance: lamp.exitance.map(f64::from),
             })
         };
@@ -95,6 +98,7 @@ impl Direct {
                 lamps: snapshot.lamps.iter().filter_map(lamp).collect(),
                 lights: (0..scene.lights.len()).filter_map(light).collect(),
                 blockers,
+                known,
                 tree: Tree::new(boxes),
                 slack_m: ROUNDING * diagonal_m,
                 far_m: 2.0 * diagonal_m,

@@ -20,6 +20,7 @@ pub(super) struct Lamp {
     pub(super) bounds: Aabb,
     /// W/m2.
     pub(super) exitance: [f64; 3],
+    pub(super) area_m2: f64,
 }
 
 /// A punctual light with its intensity, W/sr (directional: W/m2).
@@ -33,10 +34,20 @@ pub(super) struct Surroundings {
     pub(super) lamps: Vec<Lamp>,
     pub(super) lights: Vec<Punctual>,
     pub(super) blockers: Vec<Blocker>,
+    /// What each of them is.
+    pub(super) known: Vec<Known>,
     pub(super) tree: Tree,
     /// What is no further above a surface hides nothing of what it sees, metres.
     pub(super) slack_m: f64,
     pub(super) far_m: f64,
+}
+
+/// What is known of a blocker where it lies in the plane of a lamp.
+#[derive(Clone, Copy)]
+pub(super) struct Known {
+    pub(super) patch: PatchId,
+    pub(super) twin: Option<PatchId>,
+    pub(super) area_m2: f64,
 }
 
 /// A flat piece of a surface.
@@ -107,7 +118,7 @@ impl Sight {
                 continue;
             }
             around.tree.between(&bounds, &lamp.bounds, &mut found);
-            let blockers = around.between(receiver, &lamp.corners, Some(&lamp.plane), &found);
+            let blockers = around.between(receiver, &lamp.corners, Some(lamp), &found);
             let hides_all = |blocker: &Blocker| {
                 let hides = |&c: &DVec3| blocker.hides(c, &lamp.corners, around.slack_m);
                 receiver.corners.iter().all(|c| hides(c) == Hides::All)
@@ -227,20 +238,38 @@ impl Surroundings {
         }
     }
 
+    /// Whether a patch lies on a lamp, in its plane, and hides what it covers: of what faces the same way the smaller does, as in
+    /// the solution, and what faces the lamp and has one side does.
+    fn lies_on(&self, blocker: u32, lamp: &Lamp) -> bool {
+        let (known, of) = (&self.known[blocker as usize], &self.blockers[blocker as usize]);
+        let is_off = |&c: &DVec3| lamp.plane.distance(c).abs() > self.slack_m;
+        let is_its = known.patch == lamp.patch || known.twin == Some(lamp.patch);
+        if is_its || of.corners.iter().any(is_off) {
+            return false;
+        }
+        let is_smaller = known.area_m2 < lamp.area_m2 * (1.0 - 1e-6);
+        is_smaller || (known.twin.is_none() && of.plane.normal.dot(lamp.plane.normal) < 0.0)
+    }
+
     /// What of the patches found stands between a receiver and something convex: the parts before both planes.
     fn between(
         &self,
         receiver: &Receiver<'_>,
         to: &[DVec3],
-        plane: Option<&Plane>,
+        lamp: Option<&Lamp>,
         found: &[u32],
     ) -> Vec<Blocker> {
         let raised = |p: &Plane| Plane { normal: p.normal, offset: p.offset + self.slack_m };
-        let (own, other) = (raised(&receiver.plane), plane.map(raised));
+        let (own, other) = (raised(&receiver.plane), lamp.map(|lamp| raised(&lamp.plane)));
         let mut hull = None;
         let part = |&k: &u32| {
             let Blocker { corners, plane } = &self.blockers[k as usize];
-            let mut corners = corners.clone();
+            let (mut corners, mut plane) = (corners.clone(), *plane);
+            if let Some(lamp) = lamp.filter(|lamp| self.lies_on(k, lamp)) {
+                let lift = lamp.plane.normal * (2.0 * self.slack_m);
+                corners.iter_mut().for_each(|c| *c += lift);
+                plane.offset += plane.normal.dot(lift);
+            }
             for before in [Some(&own), other.as_ref()].into_iter().flatten() {
                 let off = |&c: &DVec3| before.distance(c);
                 if corners.iter().all(|c| off(c) <= 0.0) {
@@ -256,7 +285,7 @@ impl Surroundings {
             let hull = hull.get_or_insert_with(|| hull_planes(receiver.corners, to));
             let outside = |p: &Plane| corners.iter().all(|&c| p.distance(c) <= 0.0);
             let is_between = !hull.iter().any(outside);
-            is_between.then(|| Blocker { corners, plane: *plane })
+            is_between.then_some(Blocker { corners, plane })
         };
         found.iter().filter_map(part).collect()
     }

@@ -319,19 +319,7 @@ impl PatchDrawing {
         let triangles = match light {
             Light::Flat | Light::Smooth(_) => Vec::new(),
             Light::Gouraud => {
-                let at_corners = smooth.of(id).map(|irradiance| {
-                    if quantity == Quantity::Irradiance {
-                        return irradiance.to_vec();
-                    }
-                    let now = &snapshot.world;
-                    let (exitance, reflectance) = (
-                        now.exitance(&snapshot.scene, patch),
-                        now.reflectance(&snapshot.scene, patch),
-                    );
-                    let radiosity =
-                        |h: &[f64; 3]| [0, 1, 2].map(|c| exitance[c] + reflectance[c] * h[c]);
-                    irradiance.iter().map(radiosity).collect::<Vec<_>>()
-                });
+                let at_corners = at_corners(snapshot, patch, smooth.of(id), quantity);
                 gouraud::triangulate(&patch.corners, &leaves, at_corners.as_deref())
             }
         };
@@ -350,6 +338,24 @@ impl PatchDrawing {
         }
         Some(PatchDrawing { plane, pieces })
     }
+}
+
+/// What the corners of a patch are to have, where neighbours have their say: of a quantity, from their irradiance.
+fn at_corners(
+    snapshot: &Snapshot,
+    patch: &Patch,
+    irradiance: Option<&[[f64; 3]]>,
+    quantity: Quantity,
+) -> Option<Vec<[f64; 3]>> {
+    let irradiance = irradiance?;
+    if quantity == Quantity::Irradiance {
+        return Some(irradiance.to_vec());
+    }
+    let now = &snapshot.world;
+    let (exitance, reflectance) =
+        (now.exitance(&snapshot.scene, patch), now.reflectance(&snapshot.scene, patch));
+    let radiosity = |h: &[f64; 3]| [0, 1, 2].map(|c| exitance[c] + reflectance[c] * h[c]);
+    Some(irradiance.iter().map(radiosity).collect())
 }
 
 /// Puts polygons of one plane on the screen.

@@ -620,8 +620,8 @@ pub(crate) struct PictureFlags {
     /// Width x height of the pictures in pixels.
     #[arg(long, value_name = "WxH", default_value = "640x480")]
     pub(crate) size: Size,
-    /// `flat`: one value an element. `gouraud`: interpolated over a Delaunay triangulation in each
-    /// face's own frame [default: gouraud; flat for `demo room`].
+    /// `flat`: one value an element. `gouraud`: interpolated over a Delaunay triangulation in each face's own frame. `smooth`: one
+    /// continuous function over every surface, the same however elements lie [default: smooth].
     #[arg(long, value_enum)]
     pub(crate) shading: Option<Shading>,
     #[command(flatten)]
@@ -638,6 +638,17 @@ pub(crate) struct PictureFlags {
     /// several times the cost of a frame.
     #[arg(long)]
     pub(crate) reconstruct: bool,
+    /// Find the light of lamps, the sun and bright parts of the sky exactly at every pixel, and take from the elements what comes from
+    /// elsewhere: shadows are as sharp as they are, on any mesh [default: yes with smooth shading].
+    #[arg(long, value_name = "yes|no", num_args = 0..=1, require_equals = true, default_missing_value = "yes", value_parser = clap::builder::BoolishValueParser::new())]
+    pub(crate) cleanup: Option<bool>,
+}
+
+impl PictureFlags {
+    /// Whether the light of lamps is found at every pixel.
+    pub(crate) fn cleans(&self, shading: Shading) -> bool {
+        shading == Shading::Smooth && self.cleanup.unwrap_or(true)
+    }
 }
 
 impl Default for PictureFlags {
@@ -649,6 +660,7 @@ impl Default for PictureFlags {
             exposure: ExposureFlag::Auto,
             mesh: false,
             reconstruct: false,
+            cleanup: None,
         }
     }
 }

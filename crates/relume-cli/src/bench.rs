@@ -8,7 +8,7 @@ use relume::export::{probe, write_atomically};
 use relume::session::Session;
 use relume_picture::picture::{self, Exposure};
 
-use crate::args::{BenchArgs, ExposureFlag, PictureFlags, UpdateChoice, UpdateFlag};
+use crate::args::{BenchArgs, ExposureFlag, PictureFlags, Shading, UpdateChoice, UpdateFlag};
 use crate::clip::{self, Clip, fixed};
 use crate::clock::now;
 use crate::failure::Failure;
@@ -263,13 +263,12 @@ impl<'a> Drawing<'a> {
         let view = self.views.at_time(&self.clip.scene, time_s)?;
         let flags = self.flags;
         let automatic =
-            || Exposure::automatic(&clip::snapshot(clip::solved(session), flags), &view);
+            || Exposure::automatic(&clip::snapshot(session, flags, Shading::Flat), &view);
         let exposure = *self.exposure.get_or_insert_with(automatic);
         let shading = self.flags.shading.unwrap_or(self.clip.shading);
         let settings = clip::picture_settings(self.flags, shading, exposure);
         let started = now();
-        let image =
-            picture::render(&clip::snapshot(clip::solved(session), flags), &view, &settings);
+        let image = picture::render(&clip::snapshot(session, flags, shading), &view, &settings);
         let seconds = started.elapsed().as_secs_f64();
         drop(image);
         Ok(seconds)

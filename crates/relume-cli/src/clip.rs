@@ -114,7 +114,7 @@ impl Clip {
             frames,
             threads,
             tolerance,
-            shading: Shading::Gouraud,
+            shading: Shading::Smooth,
             light: flags.outside.describe(),
             flags: flags.clone(),
         })
@@ -271,8 +271,16 @@ pub(crate) fn step_failure(error: SessionError, kept: &str) -> Failure {
 }
 
 /// The solution as pictures are to show it.
-pub(crate) fn snapshot(frame: Frame<'_>, flags: &PictureFlags) -> Snapshot {
-    if flags.reconstruct { frame.reconstruction() } else { frame.solution() }
+pub(crate) fn snapshot(session: &Session, flags: &PictureFlags, shading: Shading) -> Snapshot {
+    let frame = solved(session);
+    if !flags.cleans(shading) {
+        return if flags.reconstruct { frame.reconstruction() } else { frame.solution() };
+    }
+    let lamps = picture::direct_lamps(session.scene(), &session.world());
+    match flags.reconstruct {
+        true => frame.reconstruction_beside(&lamps),
+        false => frame.solution_beside(&lamps),
+    }
 }
 
 /// What a session has solved last.
@@ -292,6 +300,7 @@ pub(crate) fn picture_settings(
         shading: match shading {
             Shading::Flat => picture::Shading::Flat,
             Shading::Gouraud => picture::Shading::Gouraud,
+            Shading::Smooth => picture::Shading::Smooth,
         },
         exposure,
         mesh: flags.mesh,

@@ -68,12 +68,12 @@ pub(crate) fn demo(scene: DemoScene) -> Demo {
     match scene {
         DemoScene::Corridor => Demo {
             name: "corridor",
-            shading: Shading::Gouraud,
+            shading: Shading::Smooth,
             tolerance: CORRIDOR_TOLERANCE,
             build: corridor,
         },
         DemoScene::Room => {
-            Demo { name: "room", shading: Shading::Flat, tolerance: ROOM_TOLERANCE, build: room }
+            Demo { name: "room", shading: Shading::Smooth, tolerance: ROOM_TOLERANCE, build: room }
         }
     }
 }

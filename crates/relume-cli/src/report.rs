@@ -115,6 +115,9 @@ pub(crate) struct PictureOptions {
     /// Whether the light of every element was found anew from all links above it.
     #[serde(default)]
     pub(crate) reconstruct: bool,
+    /// Whether the light of lamps was found exactly at every pixel.
+    #[serde(default)]
+    pub(crate) cleanup: bool,
 }
 
 /// A frame as it is written down.

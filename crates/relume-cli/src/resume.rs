@@ -241,6 +241,7 @@ mod tests {
                 exposure_ev: Some(1.25),
                 mesh: false,
                 reconstruct: false,
+                cleanup: false,
             }),
         };
         Report::new(scene, options)

@@ -57,7 +57,7 @@ pub(crate) fn demo(args: DemoArgs) -> Result<(), Failure> {
         scene: path,
         dir: Some(dir),
         tolerance: demo.tolerance,
-        picture: Some((args.picture.shading.unwrap_or(Shading::Gouraud), args.picture)),
+        picture: Some((args.picture.shading.unwrap_or(Shading::Smooth), args.picture)),
         format: FrameFormat::Png,
         preview: false,
         solve: args.solve,
@@ -73,7 +73,7 @@ pub(crate) fn render(args: RenderArgs) -> Result<(), Failure> {
         scene: args.scene,
         dir: Some(args.output),
         tolerance: PICTURE_TOLERANCE,
-        picture: Some((args.picture.shading.unwrap_or(Shading::Gouraud), args.picture)),
+        picture: Some((args.picture.shading.unwrap_or(Shading::Smooth), args.picture)),
         solve: args.solve,
     };
     job.run()
@@ -310,6 +310,7 @@ impl Job {
             },
             mesh: flags.mesh,
             reconstruct: flags.reconstruct,
+            cleanup: flags.cleans(*shading),
         });
         let flags = &self.solve.clip;
         RunOptions {
@@ -601,8 +602,8 @@ impl Run<'_> {
 
     /// Draws the picture of a frame; the digest of its bytes.
     fn draw(&mut self, frame: u32, path: &Path) -> Result<Option<String>, Failure> {
-        let Some((_, flags)) = &self.job.picture else { return Ok(None) };
-        let snapshot = clip::snapshot(clip::solved(&self.session), flags);
+        let Some((shading, flags)) = &self.job.picture else { return Ok(None) };
+        let snapshot = clip::snapshot(&self.session, flags, *shading);
         if self.exposure_is_open() {
             self.choose_exposure(frame, &snapshot)?;
         }
@@ -661,7 +662,8 @@ impl Run<'_> {
             .step(frame, frames::time_of(frame, fps))
             .map_err(|error| self.session_failure(error))?;
         let Some((_, flags)) = &self.job.picture else { return Ok(()) };
-        let snapshot = clip::snapshot(clip::solved(&session), flags);
+        // Metered over flat elements, whatever the picture shows.
+        let snapshot = clip::snapshot(&session, flags, Shading::Flat);
         self.choose_exposure(frame, &snapshot)
     }
 

@@ -56,7 +56,7 @@ fn a_demonstration_writes_scene_pictures_and_report() {
     let report = report(dir.path());
     assert_eq!(frames_of(&report), [0, 1, 2]);
     assert_eq!(report["options"]["picture"]["size"], "64x48");
-    assert_eq!(report["options"]["picture"]["shading"], "gouraud");
+    assert_eq!(report["options"]["picture"]["shading"], "smooth");
     assert!(report["options"]["picture"]["exposure_ev"].is_f64());
     let png = fs::read(dir.path().join("frame-0001.png")).unwrap();
     assert_eq!(&png[1..4], b"PNG");
@@ -149,7 +149,7 @@ fn resuming_makes_what_is_missing_and_nothing_else() {
     let refused = relume(&[&demo[..], &["0-2", "--shading", "flat"]].concat());
     assert_eq!(refused.status.code(), Some(1));
     let message = String::from_utf8(refused.stderr).unwrap();
-    assert!(message.contains("shading was gouraud and is flat now"), "{message}");
+    assert!(message.contains("shading was smooth and is flat now"), "{message}");
 }
 
 #[test]

@@ -5,3 +5,4 @@
 mod environment;
 mod glb;
 mod import;
+mod origin;

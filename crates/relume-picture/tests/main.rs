@@ -6,3 +6,4 @@ mod gallery;
 mod pictures;
 mod recording;
 mod sky;
+mod smooth;

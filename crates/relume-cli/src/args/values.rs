@@ -121,6 +121,8 @@ pub(crate) enum Shading {
     Flat,
     /// Interpolated over a triangulation.
     Gouraud,
+    /// One continuous function over every surface.
+    Smooth,
 }
 
 /// `render --format`

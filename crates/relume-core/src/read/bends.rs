@@ -60,6 +60,10 @@ impl Bends<'_> {
         let mut sums = [Bend::default(); 3];
         for link in links {
             let source = ElementId(link.source);
+            let sent = self.radiosity.radiosity(link.source);
+            if sent == [0.0; 3] {
+                continue;
+            }
             let bend = match forest.light(source) {
                 Some(light) => match view.light(light) {
                     Some(light) => receiver.light_bend(light),
@@ -67,7 +71,6 @@ impl Bends<'_> {
                 },
                 None => receiver.bend(self.solved.space.tuning.simd, &place(source)),
             };
-            let sent = self.radiosity.radiosity(link.source);
             for (sum, sent) in sums.iter_mut().zip(sent) {
                 let brings = f64::from(link.coupling) * f64::from(sent);
                 sum.iter_mut().zip(bend).for_each(|(sum, bend)| *sum += brings * bend);

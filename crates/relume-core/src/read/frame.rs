@@ -6,6 +6,8 @@ use crate::element::{ElementId, Forest};
 use crate::follow::{Accuracy, FrameReport};
 use crate::geometry::Pose;
 use crate::pair::PairTree;
+use crate::scene::PatchId;
+use crate::solver::{Links, Radiosity};
 use crate::space::{Solved, row_sums_of};
 
 use super::events::{self, Event};
@@ -14,7 +16,7 @@ use super::fluxes::{self, Flux};
 use super::gather::Sensor;
 use super::sensors;
 use super::snapshot::{self, Snapshot};
-use super::{accuracy, reconstruct};
+use super::{accuracy, direct, reconstruct};
 
 /// Solution of a world, readable until the session changes.
 #[derive(Clone, Copy)]
@@ -132,6 +134,12 @@ impl<'a> Frame<'a> {
         snapshot::take(self.solved, &self.solved.links, &self.solved.radiosity)
     }
 
+    /// The same with [`Snapshot::indirect`]: the light of leaves without what comes straight from punctual lights and from some
+    /// patches, lamps, emit. For who finds that more exactly than the mesh has it. Cost: another sweep over all links.
+    pub fn solution_beside(&self, lamps: &[PatchId]) -> Snapshot {
+        self.beside(&self.solved.links, &self.solved.radiosity, lamps)
+    }
+
     /// The solution as [`Frame::solution`] reads it, with the light of every element gathered again over links of each leaf's own
     /// in place of links of its ancestors: along edges between surfaces, where leaves of [`Frame::solution`] inherit lines and
     /// parabolas through steep curves, some thirty times as accurate. The solution itself stays as it is.
@@ -141,6 +149,18 @@ impl<'a> Frame<'a> {
     pub fn reconstruction(&self) -> Snapshot {
         let (links, radiosity) = reconstruct::solve(self.solved);
         snapshot::take(self.solved, &links, &radiosity)
+    }
+
+    /// The same with [`Snapshot::indirect`], as [`Frame::solution_beside`] has it.
+    pub fn reconstruction_beside(&self, lamps: &[PatchId]) -> Snapshot {
+        let (links, radiosity) = reconstruct::solve(self.solved);
+        self.beside(&links, &radiosity, lamps)
+    }
+
+    fn beside(&self, links: &Links, radiosity: &Radiosity, lamps: &[PatchId]) -> Snapshot {
+        let lights = direct::lights(self.solved, lamps);
+        let direct = direct::of(self.solved, links, radiosity, &lights);
+        snapshot::take(self.solved, links, radiosity).beside(&direct, lights)
     }
 
     /// The radiosity of all surfaces, as flat arrays.

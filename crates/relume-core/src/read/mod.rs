@@ -7,6 +7,7 @@ mod bends;
 mod choice;
 mod coarse_values;
 mod compare;
+mod direct;
 mod events;
 mod factors;
 mod fluxes;
@@ -32,7 +33,7 @@ pub use frame::{Frame, Hash, Mesh};
 pub use gather::Sensor;
 pub use lossy::{Missed, RadiosityError, missed, radiosity_error};
 pub use names::ElementName;
-pub use snapshot::{Leaf, Snapshot};
+pub use snapshot::{Gathered, LampLight, Leaf, Snapshot};
 pub use solution::Elements;
 
 // The plane names its events likewise.

@@ -31,6 +31,29 @@ pub struct Snapshot {
     pub leaves: Vec<Leaf>,
     /// For each patch the range of its leaves; indexed by `PatchId`, one entry more than patches.
     pub leaf_offsets: Vec<u32>,
+    /// What each leaf receives beside the light of lamps that were named; empty unless asked for
+    /// ([`super::Frame::solution_beside`]).
+    pub indirect: Vec<Gathered>,
+    /// These lamps, in the order of their patches.
+    pub lamps: Vec<LampLight>,
+}
+
+/// A patch whose emission is told apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LampLight {
+    /// The patch.
+    pub patch: PatchId,
+    /// What it emits, W/m2, linear RGB.
+    pub exitance: [f32; 3],
+}
+
+/// Irradiance of a leaf, or a part of it: a line over the leaf.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gathered {
+    /// Mean, W/m2, linear RGB.
+    pub irradiance: [f32; 3],
+    /// Gradient in the patch's frame, W/m3, linear RGB: along u, then along v.
+    pub gradient: [[f32; 3]; 2],
 }
 
 /// A leaf of the element forest: a convex piece of a patch, over which irradiance is linear.
@@ -79,6 +102,20 @@ impl Leaf {
 }
 
 impl Snapshot {
+    /// The same, knowing what of its light is direct: a snapshot of the same leaves.
+    pub(super) fn beside(mut self, direct: &Snapshot, lamps: Vec<LampLight>) -> Snapshot {
+        self.lamps = lamps;
+        let rest = |(all, direct): (&Leaf, &Leaf)| Gathered {
+            irradiance: [0, 1, 2].map(|c| (all.irradiance[c] - direct.irradiance[c]).max(0.0)),
+            gradient: [0, 1].map(|axis| {
+                let of = |leaf: &Leaf| leaf.irradiance_gradient[axis];
+                [0, 1, 2].map(|c| of(all)[c] - of(direct)[c])
+            }),
+        };
+        self.indirect = self.leaves.iter().zip(&direct.leaves).map(rest).collect();
+        self
+    }
+
     /// Irradiance of the mesh at a point of a surface, W/m2, linear RGB: on the nearest patch that faces along `normal` (to
     /// within 25 degrees) and has the point on it, no further than a 1/1000 of the scene's diagonal away; `None` where there is
     /// none.
@@ -136,6 +173,8 @@ pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Sna
         world: solved.space.world.clone(),
         leaves,
         leaf_offsets,
+        indirect: Vec::new(),
+        lamps: Vec::new(),
     }
 }
 

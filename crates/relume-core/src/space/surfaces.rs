@@ -31,6 +31,14 @@ impl<'a> LitForest<'a> {
         LitForest { forest, patch_materials, places: Vec::new(), groups: None }
     }
 
+    /// Black, with other exitances: by patch, W/m2.
+    pub(crate) fn emitting(mut self, exitance: &[[f32; 3]]) -> LitForest<'a> {
+        for (lit, exitance) in self.patch_materials.iter_mut().zip(exitance) {
+            *lit = FacetMaterial { reflectance: [0.0; 3], exitance: *exitance };
+        }
+        self
+    }
+
     /// With links that end on groups.
     pub(crate) fn with_groups(mut self, groups: &'a GroupLinks) -> LitForest<'a> {
         self.groups = (!groups.is_empty()).then_some(groups);

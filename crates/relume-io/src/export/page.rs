@@ -36,7 +36,7 @@ pub struct PageView {
 /// A lit scene as the text of an HTML page.
 ///
 /// Light is linear between the instants, and so are places; `exposure_ev` is what the page starts with. The page shows
-/// irradiance and radiosity of what is under the pointer. Size: some 3 to 6 bytes for each point and instant where light changes.
+/// irradiance and radiosity of what is under the pointer, at its place in the scene's file. Size: some 3 to 6 bytes for each point and instant where light changes.
 ///
 /// Error: half a step of the square root of irradiance, of which there are 4095 up to the largest of a part.
 ///
@@ -53,7 +53,7 @@ pub fn page(lit: &Lit, view: PageView, exposure_ev: f64) -> io::Result<String> {
         (0..lit.scene.bodies.len()).map(|k| body(lit, BodyId(k as u32))).collect();
     let scene = json!({
         "name": lit.scene.name, "times": lit.times_s, "exposure_ev": exposure_ev, "steps": STEPS,
-        "size": size_m.max(f64::MIN_POSITIVE), "bodies": bodies, "parts": parts,
+        "size": size_m.max(f64::MIN_POSITIVE), "origin": lit.scene.origin.to_array(), "bodies": bodies, "parts": parts,
         "view": {
             "eye": view.eye.to_array(), "target": view.target.to_array(), "up": view.up.to_array(), "yfov": view.yfov
         }

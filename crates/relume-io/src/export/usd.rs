@@ -14,7 +14,7 @@ use super::lit::{Lit, LitPart};
 /// A lit scene as the text of a `.usda` file at so many frames a second.
 ///
 /// `displayColor` of each mesh is radiance (W/m2/sr, linear Rec. 709) times the exposure, not cut off; it goes to the emission of a
-/// material that reflects nothing. Surfaces whose light does not change have one value. `radiosity = colour * pi / exposure`;
+/// material that reflects nothing. A scene that was read near the origin is where its file has it. Surfaces whose light does not change have one value. `radiosity = colour * pi / exposure`;
 /// the exposure stands in `customLayerData`.
 ///
 /// Error: single precision. Size: some 40 bytes for each point and instant where light changes.
@@ -41,6 +41,13 @@ pub fn usda(lit: &Lit, fps: f64) -> String {
         format_args!("    timeCodesPerSecond = {fps}\n    framesPerSecond = {fps}\n)\n"),
     );
     line(&mut text, format_args!("def Xform \"{ROOT}\"\n{{"));
+    let origin = lit.scene.origin;
+    if origin != DVec3::ZERO {
+        // In double precision above all points: those stay near 0.
+        let place = format_args!("({}, {}, {})", origin.x, origin.y, origin.z).to_string();
+        line(&mut text, format_args!("    double3 xformOp:translate = {place}"));
+        line(&mut text, format_args!("    uniform token[] xformOpOrder = [\"xformOp:translate\"]"));
+    }
     text += MATERIAL;
     let mut names = Names::default();
     for body in (0..lit.scene.bodies.len()).map(|k| BodyId(k as u32)) {

@@ -4,11 +4,13 @@
 
 use std::fmt::Write as _;
 
+use glam::DVec3;
 use relume_core::geometry::Pose;
 use relume_core::scene::{Patch, PatchId};
 use relume_core::session::Snapshot;
 
-/// A solution as the bytes of a `.vtp` file: a polygon for each leaf element, in the world, metres.
+/// A solution as the bytes of a `.vtp` file: a polygon for each leaf element, in the world of its file, metres (in
+/// double precision where that was read near the origin and lies far from it).
 ///
 /// Data of cells are the solution's own numbers: `irradiance_W_m2`, `radiosity_W_m2`, `exitance_W_m2` (three channels, linear RGB),
 /// `reflectance`, `level` (how often its polygon was quartered), `body`, `surface` (names), `body_id`, `surface_id`, `patch_id`.
@@ -19,6 +21,7 @@ pub fn vtp(snapshot: &Snapshot) -> Vec<u8> {
     let scene = &snapshot.scene;
     for (k, patch) in scene.patches.iter().enumerate() {
         if let Some(pose) = snapshot.world.pose(patch.body) {
+            let pose = Pose { translation: pose.translation + scene.origin, ..pose };
             cells.add(snapshot, PatchId(k as u32), patch, pose);
         }
     }
@@ -47,7 +50,13 @@ pub fn vtp(snapshot: &Snapshot) -> Vec<u8> {
     xml += &file.texts("body", &names(1, &|k| scene.bodies[k].name.clone()));
     xml += &file.texts("surface", &names(2, &|k| scene.surfaces[k].name.clone()));
     xml += "</CellData>\n<Points>\n";
-    xml += &file.floats("points", 3, &cells.points);
+    // Far from the origin single precision would not do.
+    xml += &match scene.origin == DVec3::ZERO {
+        true => {
+            file.floats("points", 3, &cells.points.iter().map(|&x| x as f32).collect::<Vec<f32>>())
+        }
+        false => file.doubles("points", 3, &cells.points),
+    };
     xml += "</Points>\n<Polys>\n";
     xml += &file.numbers("connectivity", &(0..points as i64).collect::<Vec<i64>>());
     xml += &file.numbers("offsets", &cells.offsets);
@@ -78,7 +87,7 @@ fn escaped(text: &str) -> String {
 /// What is said of the leaves.
 #[derive(Default)]
 struct Cells {
-    points: Vec<f32>,
+    points: Vec<f64>,
     at_points: Vec<f32>,
     /// One past the last point of each.
     offsets: Vec<i64>,
@@ -98,7 +107,7 @@ impl Cells {
             let corners = if leaf.corners[2] == leaf.corners[3] { 3 } else { 4 };
             for &corner in &leaf.corners[..corners] {
                 let at = pose.point(patch.frame.point(corner));
-                self.points.extend(at.as_vec3().to_array());
+                self.points.extend(at.to_array());
                 self.at_points.extend(leaf.irradiance_at(corner));
             }
             self.offsets.push(self.points.len() as i64 / 3);
@@ -131,6 +140,11 @@ impl File {
 
     fn floats(&mut self, name: &str, components: usize, values: &[f32]) -> String {
         let of = format!("type=\"Float32\" NumberOfComponents=\"{components}\"");
+        self.array(name, &of, values.iter().flat_map(|x| x.to_le_bytes()))
+    }
+
+    fn doubles(&mut self, name: &str, components: usize, values: &[f64]) -> String {
+        let of = format!("type=\"Float64\" NumberOfComponents=\"{components}\"");
         self.array(name, &of, values.iter().flat_map(|x| x.to_le_bytes()))
     }
 

@@ -14,9 +14,10 @@ use relume_core::scene::{Patch, PatchId};
 use relume_core::session::{Leaf, Snapshot};
 
 use super::gouraud::{self, Triangle};
+use super::lit::{Arriving, Lit};
 use super::printed::Shown;
 use super::project::{Projector, SeenPlane, clip_to_pixels};
-use super::raster::{Grid, Primitive};
+use super::raster::{Fragment, Grid, Primitive};
 use super::shading::Shading;
 use super::smooth::Smooth;
 
@@ -38,6 +39,30 @@ pub(crate) enum Fill {
     Linear(Linear),
     /// The outline of a leaf that has this radiosity, W/m2.
     Outline([f32; 3]),
+    /// A leaf, by its index in the snapshot, in the light that [`Lit`] finds.
+    Lit(u32),
+}
+
+/// What the light on surfaces is taken from.
+#[derive(Clone, Copy)]
+pub(crate) enum Light<'a> {
+    /// Every leaf has one value.
+    Flat,
+    /// Linear over triangles.
+    Gouraud,
+    /// Found at every point.
+    Smooth(&'a Lit<'a>),
+}
+
+impl<'a> Light<'a> {
+    /// What a way of shading takes it from; smooth light is to be there for the one that shows it.
+    pub(crate) fn of(shading: Shading, lit: Option<&'a Lit<'a>>) -> Light<'a> {
+        match (shading, lit) {
+            (Shading::Flat, _) => Light::Flat,
+            (Shading::Smooth, Some(lit)) => Light::Smooth(lit),
+            (Shading::Gouraud | Shading::Smooth, _) => Light::Gouraud,
+        }
+    }
 }
 
 /// Radiosity `value + along_u du + along_v dv` at plane coordinates `origin + (du, dv)`,
@@ -59,8 +84,7 @@ pub(crate) enum Quantity {
 }
 
 /// Everything that faces the camera, ready to be rasterised.
-#[derive(Debug, Default)]
-pub(crate) struct Drawing {
+pub(crate) struct Drawing<'a> {
     pub(crate) primitives: Vec<Primitive>,
     /// What each primitive shows.
     pub(crate) fills: Vec<Fill>,
@@ -71,36 +95,39 @@ pub(crate) struct Drawing {
     plane_of: Vec<u32>,
     /// Patches with images.
     shown: BTreeMap<PatchId, Shown>,
+    snapshot: &'a Snapshot,
+    lit: Option<&'a Lit<'a>>,
+    quantity: Quantity,
 }
 
-impl Drawing {
+impl<'a> Drawing<'a> {
     /// All leaves of all patches whose front faces the camera; the backs of patches are left out.
     pub(crate) fn new(
-        snapshot: &Snapshot,
+        snapshot: &'a Snapshot,
         projector: &Projector,
         grid: &Grid,
-        shading: Shading,
+        light: Light<'a>,
         outlines: bool,
-    ) -> Drawing {
-        Drawing::of(Quantity::Radiosity, snapshot, (projector, grid), shading, outlines)
+    ) -> Drawing<'a> {
+        Drawing::of(Quantity::Radiosity, snapshot, (projector, grid), light, outlines)
     }
 
     /// The same of a quantity; in [`Drawing::seen`] and [`Drawing::radiosity`] it takes the place of radiosity. The order of things
     /// is the same for all quantities.
     pub(crate) fn of(
         quantity: Quantity,
-        snapshot: &Snapshot,
+        snapshot: &'a Snapshot,
         (projector, grid): (&Projector, &Grid),
-        shading: Shading,
+        light: Light<'a>,
         outlines: bool,
-    ) -> Drawing {
+    ) -> Drawing<'a> {
         let near = NEAR * farthest(snapshot, projector.eye());
         let count = snapshot.scene.patches.len() as u32;
-        let smooth = match shading {
-            Shading::Flat => Smooth::default(),
-            Shading::Gouraud => Smooth::new(snapshot),
+        let smooth = match light {
+            Light::Flat | Light::Smooth(_) => Smooth::default(),
+            Light::Gouraud => Smooth::new(snapshot),
         };
-        let shading = (shading, &smooth, quantity);
+        let shading = (light, &smooth, quantity);
         let of_patches: Vec<Option<PatchDrawing>> = (0..count)
             .into_par_iter()
             .map(|i| {
@@ -115,7 +142,20 @@ impl Drawing {
         // In single precision without its last digits: areas that rounding sets apart are equal.
         let area = |i: usize| (snapshot.scene.patches[i].area_m2() as f32).to_bits() >> 4;
         seen.sort_by_cached_key(|&(i, _)| area(i));
-        let mut drawing = Drawing::default();
+        let mut drawing = Drawing {
+            primitives: Vec::new(),
+            fills: Vec::new(),
+            patches: Vec::new(),
+            planes: Vec::new(),
+            plane_of: Vec::new(),
+            shown: BTreeMap::new(),
+            snapshot,
+            lit: match light {
+                Light::Smooth(lit) => Some(lit),
+                Light::Flat | Light::Gouraud => None,
+            },
+            quantity,
+        };
         for (i, patch) in seen {
             let plane = drawing.planes.len() as u32;
             drawing.planes.push(patch.plane);
@@ -160,12 +200,70 @@ impl Drawing {
     pub(crate) fn radiosity(&self, primitive: usize, pixel: DVec2) -> [f32; 3] {
         match &self.fills[primitive] {
             Fill::Constant(b) | Fill::Outline(b) => *b,
+            Fill::Lit(leaf) => self.lit_at(primitive, *leaf as usize, pixel),
             Fill::Linear(linear) => {
                 let d = self.planes[linear.plane as usize].unproject(pixel) - linear.origin;
                 [0, 1, 2].map(|c| {
                     let [low, high] = linear.range[c];
                     (linear.value[c] + linear.gradient[c].dot(d)).max(low).min(high) as f32
                 })
+            }
+        }
+    }
+}
+
+impl Drawing<'_> {
+    /// What arrives at a primitive at a position in pixels, where its light is found at every point.
+    pub(crate) fn arriving(&self, primitive: usize, pixel: DVec2) -> Option<Arriving> {
+        let (lit, &Fill::Lit(leaf)) = (self.lit?, &self.fills[primitive]) else { return None };
+        let plane = &self.planes[self.plane_of[primitive] as usize];
+        Some(lit.at(self.patches[primitive], leaf as usize, plane.unproject(pixel)))
+    }
+
+    /// Whether something stands between a lamp and a primitive.
+    pub(crate) fn is_shaded(&self, primitive: usize) -> bool {
+        let (Some(lit), Fill::Lit(leaf)) = (self.lit, self.fills[primitive]) else { return false };
+        lit.is_shaded(leaf as usize)
+    }
+
+    fn lit_at(&self, primitive: usize, leaf: usize, pixel: DVec2) -> [f32; 3] {
+        let Some(arriving) = self.arriving(primitive, pixel) else {
+            return self.snapshot.leaves[leaf].radiosity;
+        };
+        self.leaving(primitive, arriving.irradiance)
+    }
+
+    /// What is drawn where this much arrives, W/m2.
+    pub(crate) fn leaving(&self, primitive: usize, irradiance: [f64; 3]) -> [f32; 3] {
+        if self.quantity == Quantity::Irradiance {
+            return irradiance.map(|h| h as f32);
+        }
+        let (scene, now) = (&self.snapshot.scene, &self.snapshot.world);
+        let patch = &scene.patches[self.patches[primitive].0 as usize];
+        let (exitance, reflectance) = (now.exitance(scene, patch), now.reflectance(scene, patch));
+        [0, 1, 2].map(|c| (exitance[c] + reflectance[c] * irradiance[c]) as f32)
+    }
+
+    /// The fragments of a pixel with those that see leaves of one patch put together.
+    pub(crate) fn merged(&self, fragments: &[Fragment], out: &mut Vec<Fragment>) {
+        out.clear();
+        let patch = |fragment: &Fragment| match fragment.primitive {
+            Some(k) if matches!(self.fills[k], Fill::Lit(_)) => Some(self.patches[k]),
+            _ => None,
+        };
+        for fragment in fragments {
+            let own = patch(fragment);
+            let same = out.iter_mut().find(|other| own.is_some() && patch(other) == own);
+            match same {
+                None => out.push(*fragment),
+                Some(other) => {
+                    let (n, m) = (f64::from(other.samples), f64::from(fragment.samples));
+                    other.position = (other.position * n + fragment.position * m) / (n + m);
+                    if fragment.samples > other.samples {
+                        other.primitive = fragment.primitive;
+                    }
+                    other.samples += fragment.samples;
+                }
             }
         }
     }
@@ -196,7 +294,7 @@ impl PatchDrawing {
         projector: &Projector,
         grid: &Grid,
         near: f64,
-        (shading, smooth, quantity): (Shading, &Smooth, Quantity),
+        (light, smooth, quantity): (Light<'_>, &Smooth, Quantity),
         outlines: bool,
     ) -> Option<PatchDrawing> {
         let patch = &snapshot.scene.patches[id.0 as usize];
@@ -218,26 +316,19 @@ impl PatchDrawing {
             }
         };
         let mut pen = Pen { plane: &plane, grid, near, corners: Vec::new() };
-        let triangles = match shading {
-            Shading::Flat => Vec::new(),
-            Shading::Gouraud => {
-                let at_corners = smooth.of(id).map(|irradiance| {
-                    if quantity == Quantity::Irradiance {
-                        return irradiance.to_vec();
-                    }
-                    let now = &snapshot.world;
-                    let (exitance, reflectance) = (
-                        now.exitance(&snapshot.scene, patch),
-                        now.reflectance(&snapshot.scene, patch),
-                    );
-                    let radiosity =
-                        |h: &[f64; 3]| [0, 1, 2].map(|c| exitance[c] + reflectance[c] * h[c]);
-                    irradiance.iter().map(radiosity).collect::<Vec<_>>()
-                });
+        let triangles = match light {
+            Light::Flat | Light::Smooth(_) => Vec::new(),
+            Light::Gouraud => {
+                let at_corners = at_corners(snapshot, patch, smooth.of(id), quantity);
                 gouraud::triangulate(&patch.corners, &leaves, at_corners.as_deref())
             }
         };
-        let mut pieces: Vec<(Primitive, Fill)> = if triangles.is_empty() {
+        let first = snapshot.leaf_offsets[id.0 as usize];
+        let mut pieces: Vec<(Primitive, Fill)> = if let Light::Smooth(_) = light {
+            let lit =
+                |(index, leaf): (u32, &Leaf)| Some((pen.polygon(&leaf.corners)?, Fill::Lit(index)));
+            (first..).zip(leaves.iter()).filter_map(lit).collect()
+        } else if triangles.is_empty() {
             leaves.iter().filter_map(|leaf| pen.leaf(leaf)).collect()
         } else {
             triangles.iter().filter_map(|triangle| pen.triangle(triangle)).collect()
@@ -247,6 +338,24 @@ impl PatchDrawing {
         }
         Some(PatchDrawing { plane, pieces })
     }
+}
+
+/// What the corners of a patch are to have, where neighbours have their say: of a quantity, from their irradiance.
+fn at_corners(
+    snapshot: &Snapshot,
+    patch: &Patch,
+    irradiance: Option<&[[f64; 3]]>,
+    quantity: Quantity,
+) -> Option<Vec<[f64; 3]>> {
+    let irradiance = irradiance?;
+    if quantity == Quantity::Irradiance {
+        return Some(irradiance.to_vec());
+    }
+    let now = &snapshot.world;
+    let (exitance, reflectance) =
+        (now.exitance(&snapshot.scene, patch), now.reflectance(&snapshot.scene, patch));
+    let radiosity = |h: &[f64; 3]| [0, 1, 2].map(|c| exitance[c] + reflectance[c] * h[c]);
+    Some(irradiance.iter().map(radiosity).collect())
 }
 
 /// Puts polygons of one plane on the screen.

@@ -7,11 +7,10 @@ use std::f64::consts::PI;
 use relume_core::scene::PatchId;
 use relume_core::session::Snapshot;
 
-use super::assemble::Drawing;
+use super::assemble::{Drawing, Light};
 use super::camera::View;
 use super::project::Projector;
 use super::raster::{Grid, rasterise};
-use super::shading::Shading;
 use super::tone::luminance;
 use super::tuning::{BRIGHT, MIDDLE, UNTOLD};
 
@@ -106,7 +105,7 @@ fn visible_radiances(snapshot: &Snapshot, view: &View) -> Vec<Option<(f64, bool)
     let (width, height) = ((120.0 * aspect) as u32, 120);
     let grid = Grid::new(width, height, 1);
     let projector = Projector::new(view, width, height);
-    let drawing = Drawing::new(snapshot, &projector, &grid, Shading::Flat, false);
+    let drawing = Drawing::new(snapshot, &projector, &grid, Light::Flat, false);
     let emits = |patch: PatchId| {
         let scene = &snapshot.scene;
         let now = snapshot.world.exitance(scene, &scene.patches[patch.0 as usize]);

@@ -12,6 +12,8 @@ use glam::{DMat2, DVec2};
 use relume_core::session::Leaf;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
+use super::weights::weights;
+
 /// Leaf corners closer to the boundary than this, relative to the patch's extent, lie on it.
 const ON_BOUNDARY: f64 = 1e-7;
 
@@ -124,25 +126,6 @@ fn bend(corners: &[DVec2], at_corners: &[Rgb], points: &[DVec2], values: &mut [R
             value[c] = (value[c] + moved).max(0.0);
         }
     }
-}
-
-/// Wachspress' coordinates of a point in a convex polygon; all zero where they are not determined.
-fn weights(corners: &[DVec2], point: DVec2) -> Vec<f64> {
-    let n = corners.len();
-    let corner = |k: usize| corners[k % n];
-    let twice = |a: DVec2, b: DVec2, c: DVec2| (b - a).perp_dot(c - a).max(0.0);
-    let of_edge: Vec<f64> = (0..n).map(|k| twice(point, corner(k), corner(k + 1))).collect();
-    let most = of_edge.iter().fold(f64::MIN_POSITIVE, |most, &a| most.max(a));
-    let weight = |k: usize| {
-        let before = (k + n - 1) % n;
-        let others = (0..n).filter(|&edge| edge != k && edge != before);
-        let rest: f64 = others.map(|edge| of_edge[edge] / most).product();
-        twice(corner(before), corner(k), corner(k + 1)) * rest
-    };
-    let weights: Vec<f64> = (0..n).map(weight).collect();
-    let whole: f64 = weights.iter().sum();
-    let share = |w: f64| if whole > 0.0 { w / whole } else { 0.0 };
-    weights.into_iter().map(share).collect()
 }
 
 /// A sample point in coordinates scaled to the unit square.

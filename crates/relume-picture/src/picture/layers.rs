@@ -14,11 +14,13 @@ use relume_core::scene::Patch;
 use relume_core::scene::outside::OutsideNow;
 use relume_core::session::Snapshot;
 
-use super::assemble::{Drawing, Quantity};
+use super::assemble::{Drawing, Light, Quantity};
 use super::camera::View;
+use super::lit::Lit;
 use super::project::Projector;
 use super::raster::{Fragment, Grid, rasterise};
 use super::render::Settings;
+use super::shading::Shading;
 
 /// What is seen at one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -29,6 +31,9 @@ pub struct Seen {
     pub coverage: f32,
     /// Irradiance, W/m2, linear RGB: mean over what is seen of surfaces; 0 where none is.
     pub irradiance: [f32; 3],
+    /// The part of it that comes straight from lamps, the sun and bright parts of the sky: where that is found apart
+    /// ([`Snapshot::indirect`]), else 0.
+    pub direct: [f32; 3],
     /// Diffuse reflectance, linear RGB: the same.
     pub reflectance: [f32; 3],
     /// Unit normal in the world of the surface that most of the pixel sees; 0 where none is.
@@ -50,6 +55,8 @@ pub struct Layers {
     pub pixels: Vec<Seen>,
     /// Names of the bodies, in the order of their numbers.
     pub bodies: Vec<String>,
+    /// Whether direct light was found apart.
+    pub is_told_apart: bool,
 }
 
 /// What a view sees of a snapshot, as numbers. Of the settings size, shading and samples count.
@@ -59,8 +66,9 @@ pub struct Layers {
 pub fn layers(snapshot: &Snapshot, view: &View, settings: &Settings) -> Layers {
     let grid = Grid::new(settings.width, settings.height, settings.samples);
     let projector = Projector::new(view, settings.width, settings.height);
-    let draw =
-        |quantity| Drawing::of(quantity, snapshot, (&projector, &grid), settings.shading, false);
+    let lit = (settings.shading == Shading::Smooth).then(|| Lit::new(snapshot));
+    let light = Light::of(settings.shading, lit.as_ref());
+    let draw = |quantity| Drawing::of(quantity, snapshot, (&projector, &grid), light, false);
     let (drawing, arriving) = (draw(Quantity::Radiosity), draw(Quantity::Irradiance));
     // A sun without a place was refused when the scene was made.
     let outside = snapshot.scene.outside.as_ref().and_then(|o| o.at(snapshot.time_s).ok());
@@ -69,13 +77,14 @@ pub fn layers(snapshot: &Snapshot, view: &View, settings: &Settings) -> Layers {
     let pixels =
         rasterise(&grid, &drawing.primitives, |fragments| reader.pixel(fragments, samples));
     let bodies = snapshot.scene.bodies.iter().map(|body| body.name.clone()).collect();
-    Layers { width: settings.width, height: settings.height, pixels, bodies }
+    let is_told_apart = lit.is_some() && !snapshot.indirect.is_empty();
+    Layers { width: settings.width, height: settings.height, pixels, bodies, is_told_apart }
 }
 
 struct Reader<'a> {
     snapshot: &'a Snapshot,
-    drawing: &'a Drawing,
-    arriving: &'a Drawing,
+    drawing: &'a Drawing<'a>,
+    arriving: &'a Drawing<'a>,
     outside: Option<OutsideNow>,
     projector: Projector,
 }
@@ -83,6 +92,7 @@ struct Reader<'a> {
 impl Reader<'_> {
     fn pixel(&self, fragments: &[Fragment], samples: f64) -> Seen {
         let (mut radiance, mut irradiance, mut reflectance) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+        let mut direct = [0.0; 3];
         let mut on_surfaces = 0.0;
         // By how many samples.
         let mut most: Option<(u32, &Patch, f64)> = None;
@@ -102,6 +112,9 @@ impl Reader<'_> {
             let leaving = self.drawing.seen(primitive, at).map(|b| f64::from(b) / PI);
             add(&mut radiance, leaving, weight);
             add(&mut irradiance, self.arriving.radiosity(primitive, at).map(f64::from), weight);
+            if let Some(arriving) = self.drawing.arriving(primitive, at) {
+                add(&mut direct, arriving.direct, weight);
+            }
             add(&mut reflectance, self.drawing.reflectance(primitive, at, mean), weight);
             on_surfaces += weight;
             if most.is_none_or(|(samples, ..)| fragment.samples > samples) {
@@ -117,6 +130,7 @@ impl Reader<'_> {
             radiance: share(radiance, samples),
             coverage: (on_surfaces / samples) as f32,
             irradiance: share(irradiance, on_surfaces),
+            direct: share(direct, on_surfaces),
             reflectance: share(reflectance, on_surfaces),
             normal: normal.unwrap_or(DVec3::ZERO).as_vec3().to_array(),
             depth_m: most.map_or(f32::INFINITY, |(_, _, depth)| depth as f32),
@@ -127,7 +141,7 @@ impl Reader<'_> {
 
 impl Layers {
     /// The bytes of an OpenEXR file: channels R, G, B (W/m2/sr), A (coverage), and layers `irradiance` (R, G, B), `reflectance`
-    /// (R, G, B), `normal` (X, Y, Z), `depth` (Z) and `body` (id, whole numbers), 32 bits each, packed without loss. The attribute `bodies`
+    /// (R, G, B), where they were found apart `direct` and `indirect` (R, G, B, parts of the irradiance), `normal` (X, Y, Z), `depth` (Z) and `body` (id, whole numbers), 32 bits each, packed without loss. The attribute `bodies`
     /// names the bodies, one a line.
     ///
     /// # Errors
@@ -141,6 +155,11 @@ impl Layers {
         for (c, [colour, axis]) in [["R", "X"], ["G", "Y"], ["B", "Z"]].into_iter().enumerate() {
             channels.push(floats(colour, &|seen| seen.radiance[c]));
             channels.push(floats(&format!("irradiance.{colour}"), &|seen| seen.irradiance[c]));
+            if self.is_told_apart {
+                channels.push(floats(&format!("direct.{colour}"), &|seen| seen.direct[c]));
+                let rest = |seen: &Seen| seen.irradiance[c] - seen.direct[c];
+                channels.push(floats(&format!("indirect.{colour}"), &rest));
+            }
             channels.push(floats(&format!("reflectance.{colour}"), &|seen| seen.reflectance[c]));
             channels.push(floats(&format!("normal.{axis}"), &|seen| seen.normal[c]));
         }

@@ -13,6 +13,10 @@
 //! | `outline` | edges of polygons, for line drawings: [`Outlines`] |
 //! | `gouraud` | sample points of a patch, triangulated in the patch's own frame |
 //! | `smooth` | light at the corners of curved bodies, as neighbours have it |
+//! | `field` | light over surfaces as one continuous function, from the lines of leaves |
+//! | `direct` | light straight from lamps, found exactly: [`direct_lamps`] |
+//! | `lit` | both together, and over curved bodies |
+//! | `weights` | how much each corner of a polygon counts at a point |
 //! | `assemble` | a snapshot as an ordered list of things to draw |
 //! | `raster` | which thing each sample of each pixel sees |
 //! | `stitch` | points of neighbours on the edges of patches |
@@ -25,10 +29,13 @@
 
 mod assemble;
 mod camera;
+mod direct;
 mod exposure;
+mod field;
 mod gouraud;
 mod image;
 mod layers;
+mod lit;
 mod outline;
 mod overview;
 mod printed;
@@ -42,8 +49,10 @@ mod smooth;
 mod stitch;
 mod tone;
 mod tuning;
+mod weights;
 
 pub use camera::{View, ViewError, Viewpoint};
+pub use direct::direct_lamps;
 pub use exposure::{Exposure, Metered};
 pub use image::{Image, WriteError, is_whole_png};
 pub use layers::{Layers, Seen, is_whole_exr, layers};

@@ -182,7 +182,16 @@ impl Recorder {
         }
         let (scene, world) = (Arc::clone(scene), world.clone());
         let time_s = self.instants[0].time_s;
-        Snapshot { scene, time_s, error_w_m2: *error_w_m2, world, leaves, leaf_offsets }
+        Snapshot {
+            scene,
+            time_s,
+            error_w_m2: *error_w_m2,
+            world,
+            leaves,
+            leaf_offsets,
+            indirect: Vec::new(),
+            lamps: Vec::new(),
+        }
     }
 
     /// The leaves of a patch at an instant; where it is absent those of the last instant before at which it is there, or of the

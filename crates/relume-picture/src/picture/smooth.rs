@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 
 use super::tuning::{LARGE, SMOOTH};
 use glam::{DVec2, DVec3};
-use relume_core::scene::{BodyId, PatchId};
+use rayon::prelude::*;
+use relume_core::scene::{BodyId, PatchId, Scene};
 use relume_core::session::{Leaf, Snapshot};
 
 /// Cosine above which neighbours lie in one plane: light on a plane is left as it is.
@@ -18,7 +19,7 @@ const SAME: f64 = 1e-6;
 
 type Rgb = [f64; 3];
 
-/// Irradiance at corners of the patches that stand for curved surfaces.
+/// A number at the corners of the patches that stand for curved surfaces.
 #[derive(Default)]
 pub(super) struct Smooth {
     /// By patch as many as it has corners; none for those that are left as they are.
@@ -33,38 +34,72 @@ struct Meeting {
     corner: usize,
     normal: DVec3,
     area_m2: f64,
-    irradiance: Rgb,
 }
 
+/// What a corner has by itself and with its neighbours.
+struct Shared {
+    meeting: Meeting,
+    own: Rgb,
+    mean: Rgb,
+}
+
+/// Irradiance of a patch at its corner, W/m2: by the patch, by the leaf that is nearest (its index in the snapshot) and by the
+/// place of the corner in the patch's frame.
+type OfCorner<'a> = &'a (dyn Fn(PatchId, usize, DVec2) -> Rgb + Sync);
+
 impl Smooth {
-    /// Cost O(n log n) in the number of corners.
+    /// Irradiance at corners, by the nearest leaves. Cost O(n log n) in the number of corners.
     pub(super) fn new(snapshot: &Snapshot) -> Smooth {
+        let of_leaf = |_, leaf: usize, _| snapshot.leaves[leaf].irradiance.map(f64::from);
+        Smooth::of_all(snapshot, &of_leaf, false)
+    }
+
+    /// What corners lack of the irradiance that they have with their neighbours.
+    pub(super) fn lacking(snapshot: &Snapshot, of_corner: OfCorner<'_>) -> Smooth {
+        Smooth::of_all(snapshot, of_corner, true)
+    }
+
+    fn of_all(snapshot: &Snapshot, of_corner: OfCorner<'_>, lacks: bool) -> Smooth {
         let scene = &snapshot.scene;
         let mut smooth = Smooth { corners: vec![Vec::new(); scene.patches.len()] };
         let large_m2 = LARGE * scene.area_m2();
         let step = scene.bounds(snapshot.time_s).map_or(1.0, |bounds| bounds.diagonal());
         let step = (step * SAME).max(f64::MIN_POSITIVE);
         let near = |body: &BodyId| !scene.is_distant(*body);
+        let own = |patch: PatchId, at: DVec2| {
+            nearest(snapshot, patch, at).map_or([0.0; 3], |leaf| of_corner(patch, leaf, at))
+        };
         for body in (0..scene.bodies.len() as u32).map(BodyId).filter(near) {
             let mut places: BTreeMap<[i64; 3], Vec<Meeting>> = BTreeMap::new();
             for (id, patch) in scene.patches_of(body) {
-                let leaves = snapshot.leaves_of(id);
-                for (corner, (at, place)) in
-                    patch.corners.iter().zip(patch.corners_in_body()).enumerate()
-                {
-                    let Some(leaf) = nearest(leaves, *at) else { continue };
-                    let meeting = Meeting {
-                        patch: id,
-                        corner,
-                        normal: patch.frame.normal,
-                        area_m2: patch.area_m2(),
-                        irradiance: leaf.irradiance.map(f64::from),
-                    };
+                if snapshot.leaves_of(id).is_empty() {
+                    continue;
+                }
+                for (corner, place) in patch.corners_in_body().enumerate() {
+                    let normal = patch.frame.normal;
+                    let meeting = Meeting { patch: id, corner, normal, area_m2: patch.area_m2() };
                     let place = (place / step).round().to_array().map(|x| x as i64);
                     places.entry(place).or_default().push(meeting);
                 }
             }
-            places.values().for_each(|meetings| smooth.add(meetings, large_m2, snapshot));
+            let groups: Vec<Vec<Meeting>> = places.into_values().collect();
+            let shared = |meetings: &Vec<Meeting>| shared(meetings, large_m2, scene, &own);
+            let found: Vec<Vec<Shared>> = groups.par_iter().map(shared).collect();
+            for Shared { meeting, own: had, mean } in found.into_iter().flatten() {
+                let of_patch = &mut smooth.corners[meeting.patch.0 as usize];
+                if of_patch.is_empty() {
+                    // Corners at which nothing else meets stay as they are.
+                    let corners = &scene.patches[meeting.patch.0 as usize].corners;
+                    *of_patch = match lacks {
+                        true => vec![[0.0; 3]; corners.len()],
+                        false => corners.iter().map(|&at| own(meeting.patch, at)).collect(),
+                    };
+                }
+                of_patch[meeting.corner] = match lacks {
+                    true => [0, 1, 2].map(|c| mean[c] - had[c]),
+                    false => mean,
+                };
+            }
         }
         smooth
     }
@@ -73,34 +108,39 @@ impl Smooth {
     pub(super) fn of(&self, patch: PatchId) -> Option<&[Rgb]> {
         self.corners.get(patch.0 as usize).map(Vec::as_slice).filter(|c| !c.is_empty())
     }
+}
 
-    /// What meets at one corner: each small patch gets the mean over those that it goes over into.
-    fn add(&mut self, meetings: &[Meeting], large_m2: f64, snapshot: &Snapshot) {
-        for (k, own) in meetings.iter().enumerate() {
-            let along = |other: &Meeting| own.normal.dot(other.normal);
-            let bends = |m: &Meeting| (SMOOTH..FLAT).contains(&along(m));
-            if own.area_m2 > large_m2 || !meetings.iter().any(bends) {
-                continue;
-            }
-            let (mut sum, mut whole) = ([0.0; 3], 0.0);
-            for other in connected(meetings, k) {
-                let other = &meetings[other];
-                (0..3).for_each(|c| sum[c] += other.area_m2 * other.irradiance[c]);
-                whole += other.area_m2;
-            }
-            let of_patch = &mut self.corners[own.patch.0 as usize];
-            if of_patch.is_empty() {
-                // Corners at which nothing else meets stay as they are.
-                let patch = &snapshot.scene.patches[own.patch.0 as usize];
-                let leaves = snapshot.leaves_of(own.patch);
-                let as_is = |&at: &DVec2| {
-                    nearest(leaves, at).map_or([0.0; 3], |leaf| leaf.irradiance.map(f64::from))
-                };
-                *of_patch = patch.corners.iter().map(as_is).collect();
-            }
-            of_patch[own.corner] = sum.map(|s| s / whole);
-        }
+/// What meets at one corner: each small patch gets the mean over those that it goes over into.
+fn shared(
+    meetings: &[Meeting],
+    large_m2: f64,
+    scene: &Scene,
+    own: &impl Fn(PatchId, DVec2) -> Rgb,
+) -> Vec<Shared> {
+    let bends = |k: usize| {
+        let along = |other: &Meeting| meetings[k].normal.dot(other.normal);
+        let is_bent = |m: &Meeting| (SMOOTH..FLAT).contains(&along(m));
+        meetings[k].area_m2 <= large_m2 && meetings.iter().any(is_bent)
+    };
+    let bent: Vec<usize> = (0..meetings.len()).filter(|&k| bends(k)).collect();
+    if bent.is_empty() {
+        return Vec::new();
     }
+    let at_corner = |m: &Meeting| {
+        let corners = &scene.patches[m.patch.0 as usize].corners;
+        own(m.patch, corners[m.corner])
+    };
+    let values: Vec<Rgb> = meetings.iter().map(at_corner).collect();
+    let of = |k: usize| {
+        let (mut sum, mut whole) = ([0.0; 3], 0.0);
+        for other in connected(meetings, k) {
+            let area_m2 = meetings[other].area_m2;
+            (0..3).for_each(|c| sum[c] += area_m2 * values[other][c]);
+            whole += area_m2;
+        }
+        Shared { meeting: meetings[k], own: values[k], mean: sum.map(|s| s / whole) }
+    };
+    bent.into_iter().map(of).collect()
 }
 
 /// The patches at a corner that one of them goes over into, from neighbour to neighbour at small angles; itself among them.
@@ -119,11 +159,13 @@ fn connected(meetings: &[Meeting], from: usize) -> Vec<usize> {
     found
 }
 
-/// The leaf whose middle is nearest to a point of the patch's frame; of equals the first.
-fn nearest(leaves: &[Leaf], at: DVec2) -> Option<&Leaf> {
-    let off = |leaf: &&Leaf| {
+/// The leaf of a patch whose middle is nearest to a point of its frame; of equals the first.
+fn nearest(snapshot: &Snapshot, patch: PatchId, at: DVec2) -> Option<usize> {
+    let off = |(_, leaf): &(usize, &Leaf)| {
         let [a, b, c, d] = leaf.corners;
         ((a + b + c + d) * 0.25).distance_squared(at)
     };
-    leaves.iter().min_by(|one, other| off(one).total_cmp(&off(other)))
+    let first = snapshot.leaf_offsets[patch.0 as usize] as usize;
+    let leaves = (first..).zip(snapshot.leaves_of(patch));
+    leaves.min_by(|one, other| off(one).total_cmp(&off(other))).map(|(index, _)| index)
 }

@@ -226,3 +226,51 @@ pub(super) const INSTANTS: u32 = 3;
 /// - Larger: time
 /// - Smaller: a good view may be passed over
 pub(super) const FINALISTS: usize = 8;
+
+/// Share of what all lamps emit from which a lamp's light is found exactly in cleaned pictures.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: shadows of weak lamps are the mesh's
+/// - Smaller: time
+pub(super) const LAMP_SHARE: f64 = 1e-3;
+
+/// Polygons of lamps whose light is found exactly, the strongest.
+///
+/// - Unit: polygons
+/// - Tried: not varied
+/// - Larger: time
+/// - Smaller: shadows of finely tessellated lamps are the mesh's
+pub(super) const LAMPS_MAX: usize = 256;
+
+/// Exitance of a part of the sky, over the median of all parts, above which its light is found exactly.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: shadows in the light of windows are the mesh's
+/// - Smaller: time
+pub(super) const BRIGHT_SKY: f64 = 4.0;
+
+/// Parts of the sky whose light is found exactly, the strongest.
+///
+/// - Unit: polygons
+/// - Tried: not varied
+/// - Larger: time
+/// - Smaller: shadows in the light of bright skies are the mesh's
+pub(super) const SKY_LAMPS_MAX: usize = 32;
+
+/// Distance of a lamp, over the diameter of a leaf, from which its unhindered light is interpolated over the leaf.
+///
+/// - Unit: 1
+/// - Tried: 2 (light off by 3e-3), 4
+/// - Larger: time
+/// - Smaller: seams between leaves below clear lamps
+pub(super) const PATCHWORK_FAR: f64 = 4.0;
+
+/// Lamps from which interpolating over a leaf is quicker than finding their light at every pixel.
+///
+/// - Unit: lamps
+/// - Tried: not varied
+/// - Larger: time
+/// - Smaller: light of single lamps is interpolated for nothing
+pub(super) const PATCHWORK_LAMPS: usize = 3;

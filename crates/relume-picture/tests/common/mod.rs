@@ -223,11 +223,13 @@ pub(crate) fn snapshot(
             let normal = pose.direction(patch.frame.normal);
             let material = &scene.materials[patch.material.0 as usize];
             let radiosity = radiosity(centre, normal, material);
+            let (m, rho) = (material.exitance, material.reflectance);
+            let arriving = |c: usize| (f64::from(radiosity[c]) - m[c]) / rho[c].max(1e-9);
             leaves.push(Leaf {
                 facet: 0,
                 path,
                 corners: c,
-                irradiance: [0.0; 3],
+                irradiance: [0, 1, 2].map(|c| arriving(c).max(0.0) as f32),
                 irradiance_gradient: [[0.0; 3]; 2],
                 radiosity,
             });
@@ -235,7 +237,16 @@ pub(crate) fn snapshot(
         leaf_offsets.push(leaves.len() as u32);
     }
     let scene = Arc::new(scene.clone());
-    Snapshot { scene, time_s: 0.0, error_w_m2: 0.0, world, leaves, leaf_offsets }
+    Snapshot {
+        scene,
+        time_s: 0.0,
+        error_w_m2: 0.0,
+        world,
+        leaves,
+        leaf_offsets,
+        indirect: Vec::new(),
+        lamps: Vec::new(),
+    }
 }
 
 /// Splits unevenly, so that there are T-vertices everywhere.

@@ -242,6 +242,18 @@ impl Radiosity {
         self.forget(surfaces);
     }
 
+    /// The light that comes straight from what `surfaces` emit and from punctual lights, over the same links and with the same
+    /// factors of leaves: what they would receive if they reflected nothing (their reflectance must be 0).
+    pub fn of_emission(&self, surfaces: &impl Surfaces, links: &Links) -> Radiosity {
+        let mut out = self.clone();
+        out.start_anew(surfaces);
+        match out.scaling.is_none() {
+            true => out.solve(surfaces, links, Dirty::All, Stop::Sweeps(1)),
+            false => out.solve_scaled(surfaces, links, Stop::Sweeps(1)),
+        }
+        out
+    }
+
     /// Whether the last solve came to its end.
     pub fn has_settled(&self) -> bool {
         self.residual.is_finite() && self.sweeps < SWEEPS_MAX

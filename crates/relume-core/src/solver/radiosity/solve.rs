@@ -117,19 +117,24 @@ impl Radiosity {
             }
             _ => true,
         };
+        let (is_anew, mut grows) = (self.sweeps == 0, false);
         if gain <= GAIN_MAX {
             let dirty = if was_scaled { Dirty::All } else { dirty };
             self.solve(surfaces, links, dirty, stop);
             if self.has_settled() && is_sure(self) {
                 return;
             }
+            // What grew from nothing would again.
+            grows = is_anew && self.residual == f64::INFINITY;
         }
         // Light that hardly loses anything settles slowly: begun as a cold build does, it ends where that ends.
         let stop = Stop::Bounded { residual: SCALED_RESIDUAL * from_nothing, mean_w_m2 };
-        self.start_anew(surfaces);
-        self.solve(surfaces, links, Dirty::All, stop);
-        if self.has_settled() && is_sure(self) {
-            return;
+        if !grows {
+            self.start_anew(surfaces);
+            self.solve(surfaces, links, Dirty::All, stop);
+            if self.has_settled() && is_sure(self) {
+                return;
+            }
         }
         self.levels = Levels::default();
         for (linear, strict) in [(true, false), (false, false), (false, true)] {

@@ -82,3 +82,56 @@ fn rows_of_rooms_with_a_box_sum_to_one() {
         assert!(medium < 5e-4 && fine < 2e-4, "{name}: {medium:.1e}, {fine:.1e}");
     }
 }
+
+/// A square over a part of a larger one, turned and tilted, at a gap from it.
+fn close_squares(gap_m: f64, turn: f64, tilt: f64, aside_m: f64) -> Scene {
+    let mut b = SceneBuilder::new("close");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let lower = common::still(&mut b, "lower");
+    b.polygon(lower, "lower", grey, &common::facing_up([0.0, 1.0], [0.0, 1.0], 0.0));
+    let rotation = DQuat::from_rotation_z(turn) * DQuat::from_rotation_x(tilt);
+    let upper = b.node("upper", None, v(0.5 + aside_m, 0.5, gap_m), rotation);
+    b.polygon(
+        upper,
+        "upper",
+        grey,
+        &common::flipped(common::facing_up([-0.3, 0.3], [-0.3, 0.3], 0.0)),
+    );
+    b.build().unwrap()
+}
+
+/// Two rectangles that were not aligned were refined all over: 0.1 mm apart they took minutes, or did not end.
+#[test]
+fn squares_a_hair_apart_take_few_links_however_they_are_turned() {
+    for (gap_m, turn, tilt_gaps, aside_m) in [
+        (1e-4, 0.3, 0.0, 0.0),
+        (1e-4, 0.785, 1.0, 0.0),
+        (1e-3, 0.3, 2.0, 0.0),
+        (1e-4, 0.0, 0.0, 0.35),
+        (1e-5, 0.2, 0.0, 0.35),
+    ] {
+        let scene = Arc::new(close_squares(gap_m, turn, tilt_gaps * gap_m, aside_m));
+        let mut session = Session::new(Arc::clone(&scene), Options::default()).unwrap();
+        let links = session.step(0, 0.0).unwrap().links;
+        let factors = session.frame().unwrap().factors(&Grouping::by_surface(&scene));
+        let found = factors.row(1).find(|&(to, _)| to == 0).map_or(0.0, |(_, factor)| factor);
+        // What is over the lower one sees it; light gets out along the edge of the overlap, some gaps wide.
+        let over = if aside_m == 0.0 { 1.0 } else { overlap(turn, aside_m) };
+        let edge = if aside_m == 0.0 { 0.0 } else { 4.0 * gap_m };
+        println!("{gap_m} {turn} {aside_m}: {found} of {over}, {links} links");
+        assert!((found - over).abs() <= edge + 1e-4, "{gap_m} {turn}: {found} {over}");
+        assert!(links < 2_000, "{links}");
+    }
+}
+
+/// Share of the upper square that is over the lower one, by its points.
+fn overlap(turn: f64, aside_m: f64) -> f64 {
+    let (n, mut inside) = (2000, 0);
+    for k in 0..n * n {
+        let at = |k: u32| 0.6 * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
+        let p = DQuat::from_rotation_z(turn) * v(at(k % n), at(k / n), 0.0);
+        let (x, y) = (p.x + 0.5 + aside_m, p.y + 0.5);
+        inside += u32::from((0.0..1.0).contains(&x) && (0.0..1.0).contains(&y));
+    }
+    f64::from(inside) / f64::from(n * n)
+}

@@ -32,4 +32,5 @@ mod reference;
 mod regressions;
 mod sky;
 mod validation;
+mod white;
 mod work;

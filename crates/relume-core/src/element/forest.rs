@@ -19,7 +19,7 @@ mod plant;
 mod pool;
 mod replant;
 
-use super::tuning::{EXPOSED_LEAST, HIDDEN};
+use super::tuning::EXPOSED_LEAST;
 pub use cover::PartInside;
 pub use replant::{Seeds, old_coarse_numbers};
 
@@ -319,22 +319,6 @@ impl Forest {
             }
             _ => self.area_m2(id),
         }
-    }
-
-    /// Whether an element, or all of its patch, is covered by what is at rest against it but for next to nothing: nobody sees it, and no
-    /// light reaches it. What moves has no say, so that this changes only with the scene.
-    #[inline]
-    pub fn is_hidden(&self, id: ElementId) -> bool {
-        let Some(patch) = self.patch(id) else { return false };
-        let always = &self.fixed.covered[patch.0 as usize];
-        if always.is_wholly || always.parts.is_empty() {
-            return always.is_wholly;
-        }
-        let exposed = match self.covered_now.contains_key(&patch) {
-            true => exposed_m2(&self.shape(id), always),
-            false => self.exposed_m2(id),
-        };
-        exposed <= HIDDEN * self.area_m2(id)
     }
 
     /// What arrives is spread over this area, m2: what is exposed, or all of an element of which next to nothing is.

@@ -11,14 +11,6 @@
 /// - Smaller: errors of visibility on slivers are amplified
 pub(super) const EXPOSED_LEAST: f64 = 1.0 / 16.0;
 
-/// Share of an element that must be exposed for it to be an end of links, where there is light.
-///
-/// - Unit: 1
-/// - Tried: 1e-3; without, a third of the links of a bookcase end on what is covered
-/// - Larger: light that reaches slivers is lost
-/// - Smaller: links that carry nothing, from what rounding leaves exposed
-pub(super) const HIDDEN: f64 = 1e-3;
-
 /// Share of a polygon's chord that lines of contact must cover for it to be cut there.
 ///
 /// - Unit: 1

@@ -102,9 +102,6 @@ impl Judge for SpaceJudge<'_> {
         if receives_nothing(a) && receives_nothing(b) {
             return culled(CullReason::NoReceiver);
         }
-        if self.leads_nowhere(a) || self.leads_nowhere(b) {
-            return culled(CullReason::Covered);
-        }
         if self.is_group_pair(a, b) {
             return self.judge_group_pair((a, b), candidates, narrowed);
         }
@@ -398,12 +395,6 @@ impl SpaceJudge<'_> {
     /// grew to 80 times that of the room.
     fn leaves_neither(&self, a: ElementId, b: ElementId) -> bool {
         self.forest.shines() && !self.forest.rest_in_contact(a, b)
-    }
-
-    /// Whether no light comes to an element, at or below the coarse level, and none of its own to anything: it is covered. Where there is
-    /// light: tables of form factors have what such elements exchange.
-    fn leads_nowhere(&self, id: ElementId) -> bool {
-        self.forest.shines() && self.forest.kind(id) == Kind::Element && self.forest.is_hidden(id)
     }
 
     fn shaft<'a>(

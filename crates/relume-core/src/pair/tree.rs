@@ -24,8 +24,7 @@ pub enum CullReason {
     Absent,
     /// Two lights.
     NoReceiver,
-    /// The ends touch, and other surfaces in their plane show in place of all that they have in common; or one of them is covered by
-    /// what is at rest against it.
+    /// The ends touch, and other surfaces in their plane show in place of all that they have in common.
     Covered,
 }
 

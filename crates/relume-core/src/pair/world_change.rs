@@ -32,8 +32,6 @@ pub struct WorldChange<'a> {
     knows_margins: bool,
     /// Nodes that became groups or coarse elements, or ceased to be, ascending.
     regrouped: &'a [ElementId],
-    /// Facets of which another part is exposed, whatever moves, than in the scene before, ascending.
-    exposed: &'a [ElementId],
 }
 
 impl<'a> WorldChange<'a> {
@@ -88,25 +86,12 @@ impl<'a> WorldChange<'a> {
             brightness_changed_below: Vec::new(),
             knows_margins: true,
             regrouped: &[],
-            exposed: &[],
         }
     }
 
     /// The same where some nodes (ascending) became groups or coarse elements, or ceased to be: pairs that end there are judged
     /// again, and those above them are looked through.
     pub fn with_regrouped(mut self, forest: &Forest, nodes: &'a [ElementId]) -> WorldChange<'a> {
-        self.look_through_above(forest, nodes);
-        WorldChange { regrouped: nodes, ..self }
-    }
-
-    /// The same where another part of some facets (ascending) is exposed, whatever moves: pairs that end on them or below are
-    /// judged again.
-    pub fn with_exposed(mut self, forest: &Forest, facets: &'a [ElementId]) -> WorldChange<'a> {
-        self.look_through_above(forest, facets);
-        WorldChange { exposed: facets, ..self }
-    }
-
-    fn look_through_above(&mut self, forest: &Forest, nodes: &[ElementId]) {
         for &id in nodes {
             let mut above = forest.parent(id);
             while let Some(id) = above {
@@ -117,6 +102,7 @@ impl<'a> WorldChange<'a> {
                 above = forest.parent(id);
             }
         }
+        WorldChange { regrouped: nodes, ..self }
     }
 
     /// Difference after an update that was left half-way: some margins count from its beginning, others from its end.
@@ -207,11 +193,6 @@ impl<'a> WorldChange<'a> {
             return Stale::Moved;
         }
         if [a, b].iter().any(|end| self.regrouped.binary_search(end).is_ok()) {
-            return Stale::Regrouped;
-        }
-        let is_otherwise =
-            |end: &ElementId| self.exposed.binary_search(&forest.fixed(*end)).is_ok();
-        if !self.exposed.is_empty() && [a, b].iter().any(is_otherwise) {
             return Stale::Regrouped;
         }
         let motion = |id| self.motion[forest.fixed(id).0 as usize];

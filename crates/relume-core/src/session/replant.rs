@@ -208,7 +208,6 @@ fn replanted(
     let (forest, touched) = last.space.forest.replanted(seeds, &to);
     last.space.scene = Arc::clone(&new.scene);
     last.space.forest = forest;
-    last.space.exposed = seeds.exposed_otherwise(&touched, &to);
     last.space.touched = touched;
     last.space.regrouped = seeds.regrouped(&to);
     last.links.renumber(&to);

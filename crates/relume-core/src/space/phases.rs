@@ -39,8 +39,6 @@ pub(crate) struct Was {
     view: WorldView,
     /// See [`SpaceState`].
     regrouped: Vec<ElementId>,
-    /// The same.
-    exposed: Vec<ElementId>,
 }
 
 impl Space for SpaceState {
@@ -66,7 +64,6 @@ impl Space for SpaceState {
             coarse: Coarse::default(),
             sound_world: world.clone(),
             touched: Vec::new(),
-            exposed: Vec::new(),
             covered: Vec::new(),
             regrouped: Vec::new(),
             is_stopped: false,
@@ -104,14 +101,12 @@ impl Space for SpaceState {
             held: std::mem::replace(&mut self.held, goal.held.clone()),
             view: std::mem::replace(&mut self.view, view),
             regrouped: self.regrouped.clone(),
-            exposed: self.exposed.clone(),
         }
     }
 
     fn change<'m>(&self, _: &Goal<'_>, was: &'m Was) -> WorldChange<'m> {
         let change = WorldChange::new(&self.scene, &self.forest, &was.view, &self.view)
-            .with_regrouped(&self.forest, &was.regrouped)
-            .with_exposed(&self.forest, &was.exposed);
+            .with_regrouped(&self.forest, &was.regrouped);
         if self.is_stopped { change.after_a_stop() } else { change }
     }
 
@@ -289,7 +284,7 @@ impl Space for SpaceState {
     }
 
     fn finish(&mut self, is_settled: bool) {
-        for list in [&mut self.touched, &mut self.exposed, &mut self.covered, &mut self.regrouped] {
+        for list in [&mut self.touched, &mut self.covered, &mut self.regrouped] {
             list.clear();
         }
         self.is_stopped = false;

@@ -38,8 +38,6 @@ pub struct SpaceState {
     pub(crate) sound_world: World,
     /// Facets of which another part is covered than when they were solved, ascending.
     pub(crate) touched: Vec<ElementId>,
-    /// Those of which another part is exposed, whatever moves, ascending: pairs that end there are decided anew.
-    pub(crate) exposed: Vec<ElementId>,
     /// Elements of which bodies that move cover another part than when they were solved, ascending.
     pub(crate) covered: Vec<ElementId>,
     /// Nodes that became groups or coarse elements since they were solved, or ceased to be, ascending.

@@ -32,22 +32,6 @@ impl Seeds<'_> {
         out.sort_unstable();
         out
     }
-
-    /// Of some facets of the scene now, those of which another part is exposed, whatever moves ([`Forest::is_hidden`]): not where they
-    /// only touch other patches than before.
-    pub fn exposed_otherwise(&self, touched: &[ElementId], to: &Renumbering) -> Vec<ElementId> {
-        let Seeds { old, new } = self;
-        let facets = old.facets().iter().filter(|facet| old.is_made(**facet));
-        let both = facets.map(|&facet| (facet, ElementId(to.new_of(facet.0))));
-        let both = both.filter(|(_, is)| touched.contains(is));
-        let differs = |&(was, is): &(ElementId, ElementId)| {
-            let (was, is) = (old.covered(was), new.covered(is));
-            was.is_wholly != is.is_wholly || was.parts != is.parts
-        };
-        let mut out: Vec<ElementId> = both.filter(differs).map(|(_, is)| is).collect();
-        out.sort_unstable();
-        out
-    }
 }
 
 impl Forest {

@@ -69,8 +69,9 @@ fn taken(dir: &Path, file: &mut File) -> Failure {
         "" => "another process".to_owned(),
         number => format!("process {number}"),
     };
-    Failure::new(format_args!("{who} is writing to {}", dir.display()))
-        .help("wait for it to end, or name another directory with -o, or another file with --report")
+    Failure::new(format_args!("{who} is writing to {}", dir.display())).help(
+        "wait for it to end, or name another directory with -o, or another file with --report",
+    )
 }
 
 /// Whether a path is that of a file that only runs write into their folder, which have its lock.

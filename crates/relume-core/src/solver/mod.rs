@@ -7,6 +7,7 @@ mod field;
 mod gather;
 mod groups;
 mod jump;
+mod level;
 mod links;
 mod place;
 mod push;

@@ -14,7 +14,6 @@ mod levels;
 mod scaling;
 mod solve;
 
-pub(in crate::solver) use levels::Level;
 use levels::Levels;
 use scaling::RowScaling;
 pub use solve::{Bounds, Stop};

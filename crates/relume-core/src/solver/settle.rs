@@ -6,8 +6,8 @@
 
 use super::dirty_path::{DirtyPath, bit};
 use super::field::{Field, Linear};
+use super::level::Level;
 use super::place::Place;
-use super::radiosity::Level;
 use super::surfaces::{FacetMaterial, Surfaces};
 
 /// Result of pushing and pulling through one facet.

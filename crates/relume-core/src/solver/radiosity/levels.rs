@@ -14,6 +14,7 @@ use super::solve::CHUNK;
 use crate::element::Renumbering;
 use crate::solver::field::{Field, Linear};
 use crate::solver::gather::gather_some;
+use crate::solver::level::Level;
 use crate::solver::links::Links;
 use crate::solver::push::push;
 use crate::solver::surfaces::{Surfaces, for_each_below};
@@ -23,40 +24,6 @@ use crate::transport;
 /// Levels of leaves, by element; of no meaning for what is no leaf. None where nothing is white.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Levels(Vec<Level>);
-
-/// How the light that a leaf receives is levelled.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::solver) struct Level {
-    /// Whether the leaf is in closed surroundings; else nothing changes.
-    is_closed: bool,
-    /// Direct irradiance, W/m2.
-    direct: Linear,
-    /// What reflected light is multiplied with, 1.
-    factor: f32,
-    /// Gradient of the row over its sum, 1/m.
-    slope: [f32; 2],
-}
-
-impl Level {
-    const NONE: Level = Level {
-        is_closed: false,
-        direct: Linear { mean: [0.0; 3], gradient: [[0.0; 3]; 2] },
-        factor: 1.0,
-        slope: [0.0; 2],
-    };
-
-    /// Irradiance as it is with an even row that sums to 1, from that over the links, W/m2 and per metre.
-    pub(in crate::solver) fn of(&self, h: &Linear) -> Linear {
-        if !self.is_closed {
-            return *h;
-        }
-        let mut reflected = h.minus(&self.direct);
-        for (gradient, slope) in reflected.gradient.iter_mut().zip(self.slope) {
-            (0..3).for_each(|c| gradient[c] -= slope * reflected.mean[c]);
-        }
-        reflected.times(self.factor).plus(&self.direct)
-    }
-}
 
 impl Levels {
     /// Levels of all leaves; `sources` has what sources that are no surfaces send.

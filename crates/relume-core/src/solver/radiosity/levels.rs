@@ -48,7 +48,7 @@ impl Levels {
         Levels(leaves)
     }
 
-    /// That of an element.
+    /// Level of an element; none where nothing is levelled, and of elements that came since.
     pub(super) fn get(&self, id: u32) -> Option<&Level> {
         self.0.get(id as usize)
     }
@@ -63,7 +63,7 @@ impl Levels {
         self.get(leaf).is_some_and(|level| level.is_closed)
     }
 
-    /// All of them.
+    /// Levels by element.
     pub(super) fn all(&self) -> &[Level] {
         &self.0
     }

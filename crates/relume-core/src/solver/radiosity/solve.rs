@@ -91,7 +91,7 @@ struct Swept {
 pub(super) const CHUNK: usize = 256;
 
 impl Radiosity {
-    /// [`solve`](Radiosity::solve) within bounds, whatever the links: where rows of leaves that sum to more than 1 might make light of
+    /// [`solve`](Radiosity::solve) within bounds, whatever the links. Among white surfaces leaves are levelled (`Levels`); where rows of leaves that sum to more than 1 might make light of
     /// nothing, from nothing; if it does not settle so or light is made, with factors of leaves (`RowScaling`), with which no row
     /// does; and if lines grow even so, with constant elements and factors that lose light.
     pub fn solve_bounded(
@@ -251,6 +251,8 @@ impl Radiosity {
     /// factors of leaves: what they would receive if they reflected nothing (their reflectance must be 0).
     pub fn of_emission(&self, surfaces: &impl Surfaces, links: &Links) -> Radiosity {
         let mut out = self.clone();
+        // Levels leave direct light as it is.
+        out.levels = Levels::default();
         out.start_anew(surfaces);
         match out.scaling.is_none() {
             true => out.solve(surfaces, links, Dirty::All, Stop::Sweeps(1)),

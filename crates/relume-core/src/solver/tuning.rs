@@ -86,7 +86,7 @@ pub(super) const UNKNOWN_MAX: f64 = 0.08;
 /// - Smaller: time: factors where rows are only a little off
 pub(super) const GAIN_MAX: f64 = 0.005;
 
-/// The same, up to which a solution counts as balanced without a look.
+/// The same, up to which a solution counts as balanced without a look; with the paper's oracle, as levelled ones are always looked at.
 ///
 /// - Unit: 1
 /// - Tried: 0.0015

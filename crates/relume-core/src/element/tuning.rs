@@ -51,6 +51,14 @@ pub(super) const SMALL_CUT_PART: f64 = 1.0 / 64.0;
 /// - Smaller: light leaks through the other walls
 pub(super) const SMALL_CUT_TIMES: u32 = 2;
 
+/// Sides of lamps close before a polygon up to which it is cut along all of them.
+///
+/// - Unit: sides
+/// - Tried: not varied
+/// - Larger: more pairs of patches below ceilings of many lamps
+/// - Smaller: light close above so many lamps leaks into the room
+pub(super) const SPOT_LINES_MAX: usize = 64;
+
 /// Distance of a line of contact from the sides of an element, over its width, from which the element is divided along it.
 ///
 /// - Unit: 1

@@ -1,10 +1,12 @@
-//! Where radiosity jumps: lines along which other patches meet or cross a patch. Pure geometry.
+//! Where radiosity jumps: lines along which other patches meet or cross a patch, or end close before it. Pure geometry.
 //!
 //! On either side of the foot of a wall a floor may receive quite different light (a discontinuity of order zero;
-//! Heckbert 1992). An element across it would carry the mean of both, and send it to both sides.
+//! Heckbert 1992). An element across it would carry the mean of both, and send it to both sides. So it does where a panel hangs a little
+//! below a ceiling: what is above it is dark, or bright if the panel is a lamp, and seen by hardly anything else.
 
 use glam::{DVec2, DVec3};
 
+use super::gap::{PARALLEL, widest_m};
 use super::{BodyId, Patch, PatchId, Scene};
 use crate::geometry::{Aabb, Plane, Pose, Segment, segment_within};
 use crate::scene::tuning::HINGE_INSTANTS;
@@ -12,13 +14,24 @@ use crate::scene::tuning::HINGE_INSTANTS;
 /// What lies this close to a plane, as a share of the largest coordinate, lies in it: a few roundings of 32-bit numbers.
 const IN_PLANE: f64 = 1e-6;
 
+/// Lines on a patch across which radiosity jumps, in its frame, metres; outer edges of the patch are left out.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Discontinuities {
+    /// Where others meet its plane.
+    pub(crate) met: Vec<Segment>,
+    /// Outlines of those that end close before it, without `spots`.
+    pub(crate) ends: Vec<Segment>,
+    /// Outlines of lamps close before it that shine to both sides: it is many times as bright behind these as beside, in a room that they light
+    /// all the same.
+    pub(crate) spots: Vec<Segment>,
+}
+
 impl Scene {
-    /// For each patch, lines along which others meet its plane within it. Bodies that never move meet each other, a body that
+    /// Lines across which radiosity jumps, by patch. Bodies that never move meet each other, a body that
     /// moves or was inserted itself; edges that stay in place while their body turns about them (hinges) meet what never moves.
-    /// Other lines of contact that move are not found. Outer edges of the patch are left out. In the patch's frame, metres;
-    /// exact to a millionth of the largest coordinate. Cost: pairs of patches whose boxes meet along x.
-    pub(crate) fn discontinuities(&self) -> Vec<Vec<Segment>> {
-        let mut out = vec![Vec::new(); self.patches.len()];
+    /// Other lines that move are not found. Exact to a millionth of the largest coordinate. Cost: pairs of patches whose boxes meet along x.
+    pub(crate) fn discontinuities(&self) -> Vec<Discontinuities> {
+        let mut out = vec![Discontinuities::default(); self.patches.len()];
         let bodies = (0..self.bodies.len() as u32).map(BodyId);
         let alone = |body: &BodyId| self.moves(*body) || self.is_inserted(*body);
         let (moving, at_rest): (Vec<BodyId>, Vec<BodyId>) =
@@ -61,7 +74,7 @@ impl Scene {
     }
 
     /// Adds where edges, in the world, lie in patches of bodies at rest.
-    fn stand(&self, at_rest: &[BodyId], edges: &[[DVec3; 2]], out: &mut [Vec<Segment>]) {
+    fn stand(&self, at_rest: &[BodyId], edges: &[[DVec3; 2]], out: &mut [Discontinuities]) {
         if edges.is_empty() {
             return;
         }
@@ -75,12 +88,12 @@ impl Scene {
                 |edge: &&[DVec3; 2]| edge.iter().all(|&p| plane.distance(p).abs() <= slack_m);
             let lines = edges.iter().filter(lies).map(|edge| edge.map(|p| in_frame(patch, p)));
             let within = lines.filter_map(|line| segment_within(&patch.corners, line, slack_m));
-            out[id.0 as usize].extend(within);
+            out[id.0 as usize].met.extend(within);
         }
     }
 
-    /// Adds where patches of some bodies that share a frame meet.
-    fn meet(&self, bodies: &[BodyId], out: &mut [Vec<Segment>]) {
+    /// Adds where patches of some bodies that share a frame meet, or end close before each other.
+    fn meet(&self, bodies: &[BodyId], out: &mut [Discontinuities]) {
         let mut placed: Vec<Placed> = bodies
             .iter()
             .flat_map(|&body| self.patches_of(body))
@@ -91,18 +104,57 @@ impl Scene {
         placed.iter_mut().for_each(|p| p.bounds = p.bounds.grown(slack_m));
         placed.sort_by(|p, q| p.bounds.lo.x.total_cmp(&q.bounds.lo.x).then(p.id.cmp(&q.id)));
         for (k, one) in placed.iter().enumerate() {
-            let beside = placed[k + 1..].iter().take_while(|q| q.bounds.lo.x <= one.bounds.hi.x);
-            for other in beside.filter(|q| q.bounds.meets(&one.bounds)) {
+            let near = one.bounds.grown(one.widest_m);
+            let beside = placed[k + 1..].iter().take_while(|q| q.bounds.lo.x <= near.hi.x);
+            for other in beside.filter(|q| q.bounds.meets(&near)) {
+                let touches = other.bounds.meets(&one.bounds);
                 for (of, by) in [(one, other), (other, one)] {
                     let twin = self.patches[by.id.0 as usize].twin;
+                    if twin == Some(of.id) {
+                        continue;
+                    }
+                    let out = &mut out[of.id.0 as usize];
                     // The back of a polygon lies where its front does.
-                    let is_back = twin.is_some_and(|twin| twin < by.id);
-                    if twin != Some(of.id) && !is_back {
-                        self.met((of, by), slack_m, &mut out[of.id.0 as usize]);
+                    if touches && twin.is_none_or(|twin| twin >= by.id) {
+                        self.met((of, by), slack_m, &mut out.met);
+                    }
+                    if self.is_close_before((of, by), slack_m) {
+                        self.end((of, by), slack_m, out);
                     }
                 }
             }
         }
+    }
+
+    /// Whether the polygon `by` lies before `of`, parallel to it, with a narrow gap between.
+    fn is_close_before(&self, (of, by): (&Placed, &Placed), slack_m: f64) -> bool {
+        let [of_frame, by_frame] = [of, by].map(|p| self.patches[p.id.0 as usize].frame);
+        let plane = Plane::through(of_frame.origin, of_frame.normal);
+        let heights = || by.corners.iter().map(|&c| plane.distance(c));
+        let widest_m = of.widest_m.min(by.widest_m);
+        of_frame.normal.dot(by_frame.normal) <= -PARALLEL
+            && heights().all(|h| h >= -slack_m && h <= widest_m)
+            && heights().any(|h| h > slack_m)
+    }
+
+    /// Adds where the polygon `by` ends before the patch.
+    fn end(&self, (of, by): (&Placed, &Placed), slack_m: f64, out: &mut Discontinuities) {
+        let patch = &self.patches[of.id.0 as usize];
+        let corners: Vec<DVec2> = by.corners.iter().map(|&c| in_frame(patch, c)).collect();
+        let sides = (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]]);
+        let within = sides.filter_map(|side| segment_within(&patch.corners, side, slack_m));
+        match self.shines_both_ways(by.id) {
+            true => out.spots.extend(within),
+            false => out.ends.extend(within),
+        }
+    }
+
+    /// Whether a patch emits, and another of its body that looks away from it.
+    fn shines_both_ways(&self, id: PatchId) -> bool {
+        let patch = &self.patches[id.0 as usize];
+        let looks_away = |p: &Patch| p.frame.normal.dot(patch.frame.normal) <= -PARALLEL;
+        let emits_away = |p: &Patch| looks_away(p) && self.patch_emits(p);
+        self.patch_emits(patch) && self.patches_of(patch.body).any(|(_, p)| emits_away(p))
     }
 
     /// Adds where the polygon `by` meets the plane of `of` within that patch.
@@ -150,13 +202,18 @@ struct Placed {
     id: PatchId,
     corners: Vec<DVec3>,
     bounds: Aabb,
+    /// Width of the widest narrow gap that the patch may be at, metres.
+    widest_m: f64,
 }
 
 impl Placed {
     fn new(scene: &Scene, id: PatchId) -> Placed {
         let corners: Vec<DVec3> = scene.patches[id.0 as usize].corners_in_body().collect();
         let bounds = Aabb::of(corners.iter().copied());
-        Placed { id, corners, bounds }
+        let n = corners.len();
+        let border_m: f64 = (0..n).map(|k| corners[k].distance(corners[(k + 1) % n])).sum();
+        let widest_m = 0.1 * (4.0 * scene.patches[id.0 as usize].area_m2() / border_m);
+        Placed { id, corners, bounds, widest_m }
     }
 }
 
@@ -165,7 +222,11 @@ mod tests {
     use glam::{DQuat, DVec2, DVec3};
 
     use crate::geometry::Segment;
-    use crate::scene::{Interpolation, RotationTrack, SceneBuilder, Track};
+    use crate::scene::{Interpolation, RotationTrack, Scene, SceneBuilder, Track};
+
+    fn met(scene: &Scene) -> Vec<Vec<Segment>> {
+        scene.discontinuities().into_iter().map(|found| found.met).collect()
+    }
 
     /// A floor of 4 x 4 m with a wall across it, on a body of its own; where the wall is, and whether it moves.
     fn lines(at: DVec3, moves: bool) -> Vec<Vec<Segment>> {
@@ -182,7 +243,7 @@ mod tests {
             let interpolation = Interpolation::Linear;
             b.animate_translation(wall, Track { times_s: vec![0.0, 1.0], values, interpolation });
         }
-        b.build().unwrap().discontinuities()
+        met(&b.build().unwrap())
     }
 
     #[test]
@@ -218,7 +279,7 @@ mod tests {
         let values = vec![DQuat::IDENTITY, DQuat::from_rotation_z(1.5)];
         let interpolation = Interpolation::Linear;
         b.animate_rotation(hinge, RotationTrack { times_s: vec![0.0, 1.0], values, interpolation });
-        b.build().unwrap().discontinuities()
+        met(&b.build().unwrap())
     }
 
     #[test]
@@ -227,5 +288,42 @@ mod tests {
         assert_eq!(found[0].len(), 1, "{found:?}");
         assert!((found[0][0][0].distance(found[0][0][1]) - 2.0).abs() < 1e-9);
         assert!(door(0.01)[0].is_empty());
+    }
+    /// How many outlines of others, and of lamps, are on a floor of 4 x 4 m below a panel of 1 x 1 m that is turned.
+    fn below_panel(height_m: f64, emits: [bool; 2], faces_down: bool) -> [usize; 2] {
+        let mut b = SceneBuilder::new("panel");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let materials =
+            emits.map(|emits| b.material("panel", [0.5; 3], [f64::from(u8::from(emits)); 3]));
+        let square =
+            |r: f64| [(-r, -r), (r, -r), (r, r), (-r, r)].map(|(x, y)| DVec3::new(x, y, 0.0));
+        let floor = b.node("floor", None, DVec3::ZERO, DQuat::IDENTITY);
+        b.polygon(floor, "floor", grey, &square(2.0));
+        let at = DVec3::Z * height_m;
+        let node = b.node("panel", None, at, DQuat::from_rotation_z(0.3));
+        let [up, mut down] = [square(0.5), square(0.5)];
+        down.reverse();
+        if faces_down {
+            b.polygon(node, "lower side", materials[0], &down);
+        }
+        b.polygon(node, "upper side", materials[1], &up.map(|c| c + DVec3::Z * 0.001));
+        let found = b.build().unwrap().discontinuities();
+        assert!(found[1..].iter().all(|f| f.ends.is_empty() && f.spots.is_empty()));
+        [found[0].ends.len(), found[0].spots.len()]
+    }
+
+    #[test]
+    fn a_panel_close_before_a_floor_ends_there() {
+        let dark = [false; 2];
+        assert_eq!(below_panel(0.01, dark, true), [4, 0]);
+        assert_eq!(below_panel(0.01, dark, false), [0, 0]);
+        assert_eq!(below_panel(0.1, dark, true), [0, 0]);
+    }
+
+    #[test]
+    fn a_lamp_that_shines_to_both_sides_throws_a_spot() {
+        assert_eq!(below_panel(0.01, [true, true], true), [0, 4]);
+        assert_eq!(below_panel(0.01, [true, false], true), [4, 0]);
+        assert_eq!(below_panel(0.01, [false, true], true), [4, 0]);
     }
 }

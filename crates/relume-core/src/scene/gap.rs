@@ -11,7 +11,7 @@ use super::weld::Weld;
 use crate::geometry::{Aabb, Moments, Plane, common, part_in_front};
 
 /// Least cosine between the normals of two faces, one turned about, between which a gap is.
-const PARALLEL: f64 = 0.998;
+pub(super) const PARALLEL: f64 = 0.998;
 
 /// The part of two faces between which next to no light gets.
 pub(super) struct Gap {

@@ -55,6 +55,7 @@ pub use builder::SceneBuilder;
 pub use check::check;
 pub use covered::{Covered, Inside};
 pub use covering::{Covering, Instant};
+pub(crate) use discontinuity::Discontinuities;
 pub use draft::Edits;
 pub use drift::Drift;
 pub use edited::Edited;

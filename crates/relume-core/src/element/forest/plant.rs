@@ -17,10 +17,10 @@ use crate::element::groups::{Layout, Sort};
 use crate::element::ids::{ElementId, Kind};
 use crate::element::split::{Chart, Place, Shape};
 use crate::element::tuning::{
-    CUT_LEAST, CUT_SHARE, SMALL_CUT_PART, SMALL_CUT_SHARE, SMALL_CUT_TIMES, WIDE,
+    CUT_LEAST, CUT_SHARE, SMALL_CUT_PART, SMALL_CUT_SHARE, SMALL_CUT_TIMES, SPOT_LINES_MAX, WIDE,
 };
-use crate::geometry::{Aabb, Segment, cut_along, polygon_area, split_convex};
-use crate::scene::{BodyId, Scene};
+use crate::geometry::{Aabb, Segment, cut_along, polygon_area, segment_within, split_convex};
+use crate::scene::{BodyId, Discontinuities, Scene};
 
 /// Input of planting: the scene, the lines that its patches are cut along, and the order of its bodies.
 #[derive(Clone, Copy)]
@@ -344,7 +344,8 @@ impl Forest {
         self.set(at, Kind::Element, cuts.patch);
         let shape = Shape::new(corners);
         let chart = Chart::of(&shape);
-        let seams = chart.seams(cuts.lines);
+        let Discontinuities { met, ends, spots } = cuts.lines;
+        let seams = chart.seams(&[&met[..], ends, spots].concat());
         let fixed = self.fixed_mut();
         fixed.charts[at as usize] = chart;
         if !seams.is_empty() {
@@ -396,9 +397,10 @@ impl Forest {
     }
 }
 
-/// The lines that patches are cut along before anything else, so that no element lies on both sides of a wall's foot.
+/// The lines that patches are cut along before anything else, so that no element lies on both sides of a wall's foot, or of the outline
+/// of a lamp close before it.
 struct Cuts {
-    lines: Vec<Vec<Segment>>,
+    of: Vec<Discontinuities>,
     /// Smaller polygons are cut where lines run from edge to edge only, m2.
     least_m2: f64,
 }
@@ -406,19 +408,19 @@ struct Cuts {
 /// Lines that one patch is cut along.
 struct PatchCuts<'a> {
     patch: u32,
-    lines: &'a [Segment],
+    lines: &'a Discontinuities,
     least_m2: f64,
     slack_m: f64,
 }
 
 impl Cuts {
     fn new(scene: &Scene) -> Cuts {
-        Cuts { lines: scene.discontinuities(), least_m2: CUT_LEAST * scene.made_area_m2() }
+        Cuts { of: scene.discontinuities(), least_m2: CUT_LEAST * scene.made_area_m2() }
     }
 
     fn of(&self, patch: u32) -> PatchCuts<'_> {
-        let lines = &self.lines[patch as usize];
-        let ends = lines.iter().flatten();
+        let lines = &self.of[patch as usize];
+        let ends = lines.met.iter().chain(&lines.spots).flatten();
         let reach = ends.fold(0.0_f64, |reach, p| reach.max(p.abs().max_element()));
         PatchCuts { patch, lines, least_m2: self.least_m2, slack_m: 1e-6 * reach }
     }
@@ -427,16 +429,33 @@ impl Cuts {
 impl PatchCuts<'_> {
     /// Both parts of a polygon that is to be cut, after so many cuts before.
     fn apply(&self, corners: &[DVec2], cut: u32) -> Option<[Vec<DVec2>; 2]> {
+        self.at_contact(corners, cut).or_else(|| self.around_spots(corners))
+    }
+
+    fn at_contact(&self, corners: &[DVec2], cut: u32) -> Option<[Vec<DVec2>; 2]> {
         let area = polygon_area(corners);
         if area >= self.least_m2 {
-            return cut_along(corners, self.lines, CUT_SHARE, self.slack_m);
+            return cut_along(corners, &self.lines.met, CUT_SHARE, self.slack_m);
         }
         if cut >= SMALL_CUT_TIMES {
             return None;
         }
         let is_part = |part: &Vec<DVec2>| polygon_area(part) >= SMALL_CUT_PART * area;
-        cut_along(corners, self.lines, SMALL_CUT_SHARE, self.slack_m)
+        cut_along(corners, &self.lines.met, SMALL_CUT_SHARE, self.slack_m)
             .filter(|parts| parts.iter().all(is_part))
+    }
+
+    /// Along the outlines of lamps where elements cannot be divided along these.
+    fn around_spots(&self, corners: &[DVec2]) -> Option<[Vec<DVec2>; 2]> {
+        let within = |&line: &Segment| segment_within(corners, line, self.slack_m);
+        let spots: Vec<Segment> = self.lines.spots.iter().filter_map(within).collect();
+        let is_seam = |line: &Segment, chart: &Chart| !chart.seams(&[*line]).is_empty();
+        let divides = |chart: &Chart| spots.iter().all(|line| is_seam(line, chart));
+        let are_seams = corners.len() <= 4 && divides(&Chart::of(&Shape::new(corners)));
+        if spots.len() > SPOT_LINES_MAX || are_seams {
+            return None;
+        }
+        cut_along(corners, &spots, 0.0, self.slack_m)
     }
 }
 

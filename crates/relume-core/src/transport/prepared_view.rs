@@ -109,7 +109,8 @@ impl<'a> Between<'a> {
         // The near plane in the frame.
         let up = frame.direction(observer.plane.normal);
         let is_low = |c: DVec3| up.dot(c - from) <= slack;
-        let corners = observer.corners.map(|c| frame.place(c));
+        let [a, b, c, d] = &observer.corners;
+        let corners = [frame.place(*a), frame.place(*b), frame.place(*c), frame.place(*d)];
         for PlacedSolid { number, solid, pose } in &self.solids {
             // What reaches behind the other's plane hides less than its silhouette.
             if solid.corners.iter().all(|&c| other.plane.distance(pose.point(c)) >= -slack) {

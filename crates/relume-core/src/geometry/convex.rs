@@ -57,13 +57,18 @@ impl ConvexPolygon {
         &self.corners[..self.len]
     }
 
-    /// The part in front of `plane` (Sutherland & Hodgman 1974); corners within `slack_m` of the
-    /// plane count as on it and are kept.
+    /// The part in front of `plane`: [`ConvexPolygon::part`] of this polygon.
     pub fn clipped(&self, plane: &Plane, slack_m: f64) -> ConvexPolygon {
+        ConvexPolygon::part(self.corners(), plane, slack_m)
+    }
+
+    /// The part in front of `plane` of a polygon with some corners (Sutherland & Hodgman 1974); corners within `slack_m` of the
+    /// plane count as on it and are kept.
+    pub fn part(corners: &[DVec3], plane: &Plane, slack_m: f64) -> ConvexPolygon {
         let mut out = ConvexPolygon { corners: [DVec3::ZERO; CAPACITY], len: 0 };
-        let heights = self.corners().iter().map(|&c| (c, plane.distance(c)));
+        let heights = corners.iter().map(|&c| (c, plane.distance(c)));
         let Some((mut p, mut dp)) = heights.clone().next() else { return out };
-        for (q, dq) in heights.clone().skip(1).chain([(p, dp)]) {
+        for (q, dq) in heights.skip(1).chain([(p, dp)]) {
             if dp >= -slack_m {
                 out.push(p);
             }

@@ -813,7 +813,8 @@ impl SpaceJudge<'_> {
             true => light_past_crowd(&crowd, &segments),
             false => light_visibility(self.simd, &shaft, &found.blockers, (&segments, from)),
         };
-        let (verdict, margin) = self.decide_light((light, element), side, (&e, &x, &v));
+        let (verdict, margin) =
+            self.decide_light((light, element), side, &LitEnd { e: &e, x: &x, v: &v });
         Judgement { margin, ..carrying(verdict, &x, &v, (&e, &place.stand_in)) }
     }
 
@@ -822,7 +823,7 @@ impl SpaceJudge<'_> {
         &self,
         (light, element): (ElementId, ElementId),
         side: Side,
-        (e, x, v): (&WorldElement, &Exchange, &Visibility),
+        &LitEnd { e, x, v }: &LitEnd<'_>,
     ) -> (Verdict, Margin) {
         let may_split = self.forest.can_split(element);
         match (self.stage, self.oracle) {
@@ -863,6 +864,13 @@ impl SpaceJudge<'_> {
     fn refine_if(&self, wanted: bool, side: Side) -> Verdict {
         if wanted { Verdict::Refine(side) } else { Verdict::Link }
     }
+}
+
+/// An element in the light of a punctual light.
+struct LitEnd<'a> {
+    e: &'a WorldElement,
+    x: &'a Exchange,
+    v: &'a Visibility,
 }
 
 /// A pair of elements that is decided on.
@@ -933,6 +941,7 @@ struct Places {
 }
 
 impl Places {
+    #[inline]
     fn new(at: &SpaceJudge<'_>, (a, b): (ElementId, ElementId), world: bool) -> Places {
         let patches = (at.patch_of(a), at.patch_of(b));
         let body = at.view.patch(patches.0).body;

@@ -73,7 +73,7 @@ const PERPENDICULAR: f64 = 1e-12;
 /// The double integral over an edge and the whole outline with some `corners`.
 fn over_edge(simd: Simd, e: &Edge, corners: &[DVec3], error_max: f64) -> f64 {
     let length2 = e.along.length_squared();
-    let (length, direction) = (e.along.length(), e.along.normalize());
+    let line = Stretch { start: e.from, direction: e.along.normalize(), length: e.along.length() };
     let mut sum = 0.0;
     // Corners where edges begin that are at an angle to `e`.
     let mut tilted = [false; ConvexPolygon::CAPACITY];
@@ -87,7 +87,7 @@ fn over_edge(simd: Simd, e: &Edge, corners: &[DVec3], error_max: f64) -> f64 {
             continue;
         }
         if e.along.cross(along).length_squared() <= PARALLEL * both2 {
-            sum += of_parallels((e.from, direction, length), &Edge { from, along });
+            sum += of_parallels(simd, &line, &Edge { from, along });
         } else {
             (tilted[k], any) = (true, true);
         }
@@ -153,28 +153,49 @@ fn half_logarithm(r2: f64) -> f64 {
     if r2 <= f64::MIN_POSITIVE { 0.0 } else { 0.5 * logarithm(r2.max(f64::MIN_POSITIVE)) }
 }
 
-/// (e . f) times the double integral of ln r over two parallel edges: the first, e, from its start in a direction, with
-/// a length.
+/// A stretch of a line, in units of the pair: an [`Edge`] made ready for those that are parallel to it.
+struct Stretch {
+    start: DVec3,
+    /// Of length 1.
+    direction: DVec3,
+    length: f64,
+}
+
+/// (e . f) times the double integral of ln r over two parallel edges.
 ///
 /// With z the difference of places along the edges and h their distance, ln r is the second derivative of
 /// P(z) = (z2 - h2)/4 ln(z2 + h2) + h z atan(z/h) - 3/4 z2.
-fn of_parallels((start, u, s1): (DVec3, DVec3, f64), f: &Edge) -> f64 {
+fn of_parallels(
+    simd: Simd,
+    &Stretch { start, direction: u, length: s1 }: &Stretch,
+    f: &Edge,
+) -> f64 {
     let t1 = f.along.dot(u);
     let away = f.from - start;
     let t0 = away.dot(u);
     let h = (away - u * t0).length();
-    let primitive = |z: f64| {
-        let r2 = z * z + h * h;
-        if r2 <= f64::MIN_POSITIVE {
-            return 0.0;
-        }
-        0.25 * (z * z - h * h) * logarithm(r2) + h * z * arctangent(z, h) - 0.75 * z * z
-    };
     // Places on e run from 0 to s1, on f from t0 to t0 + t1 (t1 < 0 where they run against each other).
-    primitive(t0 + t1) - primitive(t0 + t1 - s1) - primitive(t0) + primitive(t0 - s1)
+    let ends = [t0 + t1, t0 + t1 - s1, t0, t0 - s1];
+    let p = dispatch!(simd.level(), _simd => primitives(&ends, h));
+    p[0] - p[1] - p[2] + p[3]
+}
+
+/// P at four places.
+#[inline(always)]
+fn primitives(places: &[f64; 4], h: f64) -> [f64; 4] {
+    let mut out = [0.0; 4];
+    for (z, out) in places.iter().zip(&mut out) {
+        let r2 = z * z + h * h;
+        let value = 0.25 * (z * z - h * h) * logarithm(r2.max(f64::MIN_POSITIVE))
+            + h * z * arctangent(*z, h)
+            - 0.75 * z * z;
+        *out = if r2 <= f64::MIN_POSITIVE { 0.0 } else { value };
+    }
+    out
 }
 
 /// atan(z / h) for h >= 0.
+#[inline(always)]
 fn arctangent(z: f64, h: f64) -> f64 {
     let magnitude = angle(z.abs(), h);
     if z < 0.0 { -magnitude } else { magnitude }

@@ -338,8 +338,7 @@ fn close_exchange(simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
 /// The parts of two elements that face each other.
 fn facing_parts(a: &WorldElement, b: &WorldElement) -> [ConvexPolygon; 2] {
     let slack = a.rounding_m + b.rounding_m;
-    let part =
-        |e: &WorldElement, plane| ConvexPolygon::new(&e.corners[..e.len]).clipped(plane, slack);
+    let part = |e: &WorldElement, plane| ConvexPolygon::part(&e.corners[..e.len], plane, slack);
     [part(a, &b.plane), part(b, &a.plane)]
 }
 
@@ -371,9 +370,8 @@ pub fn exchange_of_polygons((a, of_a): (&[DVec3], DVec3), (b, of_b): (&[DVec3], 
         return 0.0;
     }
     let reach = a.iter().chain(b).map(|c| c.abs().max_element()).fold(0.0, f64::max);
-    let part = |corners: &[DVec3], plane: Plane| {
-        ConvexPolygon::new(corners).clipped(&plane, ROUNDED * reach)
-    };
+    let part =
+        |corners: &[DVec3], plane: Plane| ConvexPolygon::part(corners, &plane, ROUNDED * reach);
     let (one, two) = (part(a, Plane::through(b[0], of_b)), part(b, Plane::through(a[0], of_a)));
     if one.corners().len() < 3 || two.corners().len() < 3 {
         return 0.0;

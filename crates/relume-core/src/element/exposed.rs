@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::split::{Extent, Shape};
+use super::split::{Extent, Shape, overlap};
 use crate::geometry::{Moments, common};
 use crate::scene::Covered;
 
@@ -33,6 +33,7 @@ fn exposed(shape: &Shape, covered: &Covered) -> Moments {
         let moved: Vec<DVec2> = p.iter().map(|&c| c - centroid).collect();
         Moments::of(&moved)
     };
-    let near = covered.parts.iter().filter(|(_, bounds)| shape.meets(bounds));
+    let bounds = shape.bounds();
+    let near = covered.parts.iter().filter(|(_, of_part)| overlap(&bounds, of_part));
     near.fold(about(own), |rest, (part, _)| rest.without(&about(&common(own, part))))
 }

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::exposed::{exposed_extent, exposed_m2};
 use super::groups::{Group, Groups};
 use super::ids::{ElementId, ElementKey, Kind, Renumbering};
-use super::split::{Chart, Extent, Place, Seam, Shape};
+use super::split::{Chart, Extent, Place, Seam, Shape, overlap};
 use crate::geometry::Aabb;
 use crate::scene::{BodyId, Covered, Covering, Enclosure, PatchId, Solid, Solids};
 

@@ -14,6 +14,12 @@ pub struct Shape {
     pub len: usize,
 }
 
+/// Whether two boxes in a plane, by lowest and highest coordinates, have an inner point in common.
+#[inline]
+pub(super) fn overlap([lo, hi]: &[DVec2; 2], [low, high]: &[DVec2; 2]) -> bool {
+    low.cmplt(*hi).all() && lo.cmplt(*high).all()
+}
+
 impl Shape {
     /// A shape from three or four corners.
     pub fn new(corners: &[DVec2]) -> Shape {
@@ -22,13 +28,15 @@ impl Shape {
         Shape { corners: [corner(0), corner(1), corner(2), corner(3)], len: corners.len() }
     }
 
+    /// Lowest and highest coordinates, metres.
+    pub fn bounds(&self) -> [DVec2; 2] {
+        let with = |[lo, hi]: [DVec2; 2], &p: &DVec2| [lo.min(p), hi.max(p)];
+        self.corners.iter().fold([DVec2::INFINITY, DVec2::NEG_INFINITY], with)
+    }
+
     /// Whether the box around it and another have an inner point in common.
-    pub fn meets(&self, [low, high]: &[DVec2; 2]) -> bool {
-        let (lo, hi) = self
-            .corners
-            .iter()
-            .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)));
-        low.cmplt(hi).all() && lo.cmplt(*high).all()
+    pub fn meets(&self, other: &[DVec2; 2]) -> bool {
+        overlap(&self.bounds(), other)
     }
 
     /// Area, m2: half the cross product of the diagonals, which holds for a triangle with its last
@@ -151,7 +159,8 @@ impl Place {
     /// Parameters of the corners; a triangle repeats its last.
     #[inline]
     pub(super) fn corners(&self, corner_count: usize) -> [DVec2; 4] {
-        let [a, b, c, d, e, f] = self.0.map(|x| f64::from(x) * (1.0 / ONE as f64));
+        let at = |k: usize| f64::from(self.0[k]) * (1.0 / ONE as f64);
+        let [a, b, c, d, e, f] = [at(0), at(1), at(2), at(3), at(4), at(5)];
         let v = DVec2::new;
         if corner_count == 3 {
             [v(a, b), v(c, d), v(e, f), v(e, f)]
@@ -341,7 +350,8 @@ impl Chart {
     #[inline]
     pub(super) fn shape(&self, place: &Place) -> Shape {
         let at = |p: DVec2| self.origin + self.e * p.x + self.f * p.y + self.g * (p.x * p.y);
-        Shape { corners: place.corners(self.len).map(at), len: self.len }
+        let [a, b, c, d] = place.corners(self.len);
+        Shape { corners: [at(a), at(b), at(c), at(d)], len: self.len }
     }
 }
 

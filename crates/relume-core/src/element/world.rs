@@ -40,17 +40,26 @@ pub struct OccluderPolygon<'a> {
 impl OccluderPolygon<'_> {
     /// Distance of a point from the polygon, m.
     pub fn distance(&self, p: DVec3) -> f64 {
-        let foot = p - self.plane.normal * self.plane.distance(p);
+        let height = self.plane.distance(p);
+        let foot = p - self.plane.normal * height;
         if self.edges.iter().all(|edge| edge.distance(foot) >= 0.0) {
-            return self.plane.distance(p).abs();
+            return height.abs();
         }
-        let to_edge = |k: usize| {
-            let (from, to) = (self.corners[k], self.corners[(k + 1) % self.corners.len()]);
+        let mut least2 = f64::INFINITY;
+        let mut from = self.corners[self.corners.len() - 1];
+        for &to in self.corners {
             let along = to - from;
-            let share = (p - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
-            (p - (from + along * share.clamp(0.0, 1.0))).length()
-        };
-        (0..self.corners.len()).map(to_edge).fold(f64::INFINITY, f64::min)
+            let (share, whole) = ((p - from).dot(along), along.length_squared());
+            // Most points are beyond the ends of most edges: no division there.
+            let share = match share {
+                _ if share <= 0.0 => 0.0,
+                _ if share >= whole => 1.0,
+                _ => share / whole.max(f64::MIN_POSITIVE),
+            };
+            least2 = least2.min((p - (from + along * share)).length_squared());
+            from = to;
+        }
+        least2.sqrt()
     }
 }
 
@@ -356,7 +365,8 @@ impl WorldElement {
     pub fn of_shape(patch: &WorldPatch, shape: &Shape, in_body: bool) -> WorldElement {
         let frame = if in_body { &patch.local } else { &patch.world };
         let place = |p: DVec2| frame.point(p);
-        let corners = shape.corners.map(place);
+        let [a, b, c, d] = shape.corners;
+        let corners = [place(a), place(b), place(c), place(d)];
         let centre = place(shape.centroid());
         let reach2 = corners.iter().map(|c| (*c - centre).length_squared()).fold(0.0, f64::max);
         WorldElement {

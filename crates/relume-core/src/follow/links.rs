@@ -1,11 +1,13 @@
 //! Links by receiver, built from the pairs of a tree or updated by its edits.
 
+use rayon::prelude::*;
+
 use crate::element::ElementId;
 use crate::pair::{self, Edit, PairTree};
 use crate::solver::{Link, Links, LinksBuilder};
 
 /// Receivers of a hierarchy: what is needed to turn pairs into links.
-pub(crate) trait Receivers {
+pub(crate) trait Receivers: Sync {
     /// Room for elements: ids are below this.
     fn room(&self) -> usize;
     /// Whether light is gathered there: an element, neither a light nor distant.
@@ -26,43 +28,69 @@ pub(crate) trait Receivers {
     }
 }
 
-/// Both directions of a link: (receiver, link), for the ends that receive. Links of visibility 0
-/// carry nothing.
-pub(crate) fn directions(
-    forest: &impl Receivers,
+/// Exchange area of a link over which light goes, m2: nothing where it carries none.
+fn lit_exchange_m2(forest: &impl Receivers, link: &pair::Link) -> f32 {
+    if forest.is_apart(link.a) || forest.is_apart(link.b) {
+        return 0.0;
+    }
+    let exchange = link.carried.exchange_area_past_occluders_m2();
+    match exchange > 0.0 && !forest.rest_in_contact(link.a, link.b) {
+        true => exchange - forest.dark_exchange_m2(link.a, link.b, exchange),
+        false => 0.0,
+    }
+}
+
+/// Both directions of a link with a lit exchange area, m2: (receiver, link), for the ends with an area that receives, m2.
+fn both_ways(
     link: &pair::Link,
+    exchange: f32,
+    receiving_area_m2: impl Fn(ElementId) -> Option<f32>,
 ) -> impl Iterator<Item = (u32, Link)> {
-    let carried = link.carried;
-    let exchange = carried.exchange_area_past_occluders_m2();
-    let g = carried.gradients;
-    let exchange = match forest.rest_in_contact(link.a, link.b) {
-        true => 0.0,
-        false => exchange - forest.dark_exchange_m2(link.a, link.b, exchange),
-    };
+    let g = link.carried.gradients;
     let one = |receiver: ElementId, source: ElementId, over_receiver, over_source| {
-        let apart = forest.is_apart(link.a) || forest.is_apart(link.b);
-        let receives = forest.receives(receiver) && exchange > 0.0 && !apart;
-        receives.then(|| {
-            let coupling = exchange / forest.receiving_area_m2(receiver) as f32;
-            // Nothing at all would take the link out.
-            let coupling = coupling.max(f32::MIN_POSITIVE);
-            (receiver.0, Link { source: source.0, coupling, over_receiver, over_source })
-        })
+        let area = receiving_area_m2(receiver).filter(|_| exchange > 0.0)?;
+        // Nothing at all would take the link out.
+        let coupling = (exchange / area).max(f32::MIN_POSITIVE);
+        Some((receiver.0, Link { source: source.0, coupling, over_receiver, over_source }))
     };
     let forth = one(link.a, link.b, g.over_a, g.over_b);
     let back = one(link.b, link.a, g.over_b, g.over_a);
     forth.into_iter().chain(back)
 }
 
+/// Area that what arrives is spread over, m2, where light is gathered.
+fn receiving_area_m2(forest: &impl Receivers, id: ElementId) -> Option<f32> {
+    forest.receives(id).then(|| forest.receiving_area_m2(id) as f32)
+}
+
+/// Both directions of a link: (receiver, link), for the ends that receive. Links of visibility 0
+/// carry nothing.
+pub(crate) fn directions(
+    forest: &impl Receivers,
+    link: &pair::Link,
+) -> impl Iterator<Item = (u32, Link)> {
+    both_ways(link, lit_exchange_m2(forest, link), |id| receiving_area_m2(forest, id))
+}
+
 /// All links of a tree, by receiver.
 pub(super) fn links_of(forest: &impl Receivers, tree: &PairTree) -> Links {
+    // Asked for often: what is covered of the ends takes a search.
+    let ids = (0..forest.room() as u32).into_par_iter().map(ElementId);
+    let areas: Vec<Option<f32>> = ids.map(|id| receiving_area_m2(forest, id)).collect();
+    let area = |id: ElementId| areas[id.0 as usize];
+    let exchanges: Vec<f32> = tree
+        .par_slots()
+        .map(|link| link.map_or(0.0, |link| lit_exchange_m2(forest, &link)))
+        .collect();
+    let lit =
+        || tree.slots().zip(&exchanges).filter_map(|(link, &exchange)| Some((link?, exchange)));
     let mut builder = LinksBuilder::new(forest.room());
-    for link in tree.links() {
-        directions(forest, &link).for_each(|(receiver, _)| builder.count(receiver));
+    for (link, exchange) in lit() {
+        both_ways(&link, exchange, area).for_each(|(receiver, _)| builder.count(receiver));
     }
     builder.fill(|add| {
-        for link in tree.links() {
-            directions(forest, &link).for_each(|(receiver, link)| add(receiver, link));
+        for (link, exchange) in lit() {
+            both_ways(&link, exchange, area).for_each(|(receiver, link)| add(receiver, link));
         }
     })
 }

@@ -57,19 +57,25 @@ impl ConvexPolygon {
         &self.corners[..self.len]
     }
 
-    /// The part in front of `plane` (Sutherland & Hodgman 1974); corners within `slack_m` of the
-    /// plane count as on it and are kept.
+    /// The part in front of `plane`: [`ConvexPolygon::part`] of this polygon.
     pub fn clipped(&self, plane: &Plane, slack_m: f64) -> ConvexPolygon {
+        ConvexPolygon::part(self.corners(), plane, slack_m)
+    }
+
+    /// The part in front of `plane` of a polygon with some corners (Sutherland & Hodgman 1974); corners within `slack_m` of the
+    /// plane count as on it and are kept.
+    pub fn part(corners: &[DVec3], plane: &Plane, slack_m: f64) -> ConvexPolygon {
         let mut out = ConvexPolygon { corners: [DVec3::ZERO; CAPACITY], len: 0 };
-        for i in 0..self.len {
-            let (p, q) = (self.corners[i], self.corners[(i + 1) % self.len]);
-            let (dp, dq) = (plane.distance(p), plane.distance(q));
+        let heights = corners.iter().map(|&c| (c, plane.distance(c)));
+        let Some((mut p, mut dp)) = heights.clone().next() else { return out };
+        for (q, dq) in heights.skip(1).chain([(p, dp)]) {
             if dp >= -slack_m {
                 out.push(p);
             }
             if (dp > slack_m && dq < -slack_m) || (dp < -slack_m && dq > slack_m) {
                 out.push(p + (q - p) * (dp / (dp - dq)));
             }
+            (p, dp) = (q, dq);
         }
         out
     }

@@ -24,6 +24,15 @@ struct GroupExchange {
     shows_m2: (f64, f64),
 }
 
+/// What crosses a pair of which an end is a group.
+struct Crossing<'x> {
+    /// Distance of the centres, metres.
+    apart_m: f64,
+    x: &'x GroupExchange,
+    /// Visibility, in [0, 1].
+    v: f64,
+}
+
 impl SpaceJudge<'_> {
     /// Whether a node is a cluster that may be an end of links.
     pub(super) fn is_group(&self, id: ElementId) -> bool {
@@ -124,9 +133,10 @@ impl SpaceJudge<'_> {
             true => sight.visibility(end_a, end_b, key),
             false => (1.0, 0),
         };
+        let crossing = Crossing { apart_m: apart, x: &x, v };
         let on = [
-            self.group_error(brightness, (a, end_a.area_m2), (b, x.shows_m2.1), (apart, &x, v)),
-            self.group_error(brightness, (b, end_b.area_m2), (a, x.shows_m2.0), (apart, &x, v)),
+            self.group_error(brightness, (a, end_a.area_m2), (b, x.shows_m2.1), &crossing),
+            self.group_error(brightness, (b, end_b.area_m2), (a, x.shows_m2.0), &crossing),
         ];
         let error = on[0].max(on[1]);
         if let Some(side) = side.filter(|_| error > threshold) {
@@ -154,7 +164,7 @@ impl SpaceJudge<'_> {
         brightness: &CoarseBrightness,
         (receiver, area_m2): (ElementId, f64),
         (source, shows_m2): (ElementId, f64),
-        (apart, x, v): (f64, &GroupExchange, f64),
+        &Crossing { apart_m, x, v }: &Crossing<'_>,
     ) -> f64 {
         if self.forest.is_distant(receiver) {
             return 0.0;
@@ -163,7 +173,7 @@ impl SpaceJudge<'_> {
         let sent = brightness.of(self.forest, source).radiosity;
         let reference_m2 = self.group_reference_m2(brightness, receiver);
         let weight = (area_m2 / reference_m2).sqrt();
-        let arrives = sent * shows_m2 / (std::f64::consts::PI * apart * apart);
+        let arrives = sent * shows_m2 / (std::f64::consts::PI * apart_m * apart_m);
         // What a facet shows a part of the sky is known exactly.
         let place = match self.forest.is_distant(source) {
             true => 0.0,

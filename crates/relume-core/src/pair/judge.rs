@@ -380,12 +380,7 @@ impl SpaceJudge<'_> {
             true => contact_exchange(places.0, places.1, shaft.contact_m2(&pair.found.blockers)),
             false => exchange_by_points(self.simd, places.0, places.1, met),
         };
-        // A steep pair that counts as partly hidden is refined as if points could not tell how much, so what is only beside it is told
-        // from what is between.
-        if x.is_steep && shaft.is_beside(&pair.found.blockers) {
-            pair.found.blockers.clear();
-        }
-        self.decide(&pair, x, known)
+        self.decide(&mut pair, x, known)
     }
 
     /// Whether what two touching elements exchange counts for nothing, as it leaves neither: where there is light. Links of patches
@@ -416,7 +411,12 @@ impl SpaceJudge<'_> {
     }
 
     /// Judges a pair of elements that face each other, at or below the coarse level; `x` is what they exchange by points.
-    fn decide(&self, pair: &Elements<'_>, x: Exchange, known: Option<&Carried>) -> Judgement {
+    fn decide(&self, pair: &mut Elements<'_>, x: Exchange, known: Option<&Carried>) -> Judgement {
+        // The paper's oracle refines without asking for blockers.
+        let asks_first = matches!(self.oracle, Oracle::Error { .. });
+        if asks_first {
+            pair.leave_out_what_is_beside(&x);
+        }
         if let Some(linked) = self.by_whole_ends(pair, &x) {
             return linked;
         }
@@ -429,6 +429,9 @@ impl SpaceJudge<'_> {
             Ok(margin) => margin,
             Err(decided) => return decided,
         };
+        if !asks_first {
+            pair.leave_out_what_is_beside(x);
+        }
         let seen = self.look(pair, x);
         let verdict = match (self.stage, self.oracle) {
             (Stage::Fine(brightness), Oracle::Error { threshold }) => {
@@ -618,7 +621,7 @@ impl SpaceJudge<'_> {
         let ends = self.ends(pair, brightness);
         let norm = norm_of(brightness, threshold);
         let around = |end: &End| end.surface_area.min(SPOT_AROUND * norm.reference_area_m2);
-        let around = ends.each_ref().map(around);
+        let around = [around(&ends[0]), around(&ends[1])];
         let sizes = match &seen.crossed {
             Some(crossed) => {
                 let (blockers, lamps) = (crossed.clone(), pair.found.lamps.clone());
@@ -810,7 +813,8 @@ impl SpaceJudge<'_> {
             true => light_past_crowd(&crowd, &segments),
             false => light_visibility(self.simd, &shaft, &found.blockers, (&segments, from)),
         };
-        let (verdict, margin) = self.decide_light((light, element), side, (&e, &x, &v));
+        let (verdict, margin) =
+            self.decide_light((light, element), side, &LitEnd { e: &e, x: &x, v: &v });
         Judgement { margin, ..carrying(verdict, &x, &v, (&e, &place.stand_in)) }
     }
 
@@ -819,7 +823,7 @@ impl SpaceJudge<'_> {
         &self,
         (light, element): (ElementId, ElementId),
         side: Side,
-        (e, x, v): (&WorldElement, &Exchange, &Visibility),
+        &LitEnd { e, x, v }: &LitEnd<'_>,
     ) -> (Verdict, Margin) {
         let may_split = self.forest.can_split(element);
         match (self.stage, self.oracle) {
@@ -862,6 +866,13 @@ impl SpaceJudge<'_> {
     }
 }
 
+/// An element in the light of a punctual light.
+struct LitEnd<'a> {
+    e: &'a WorldElement,
+    x: &'a Exchange,
+    v: &'a Visibility,
+}
+
 /// A pair of elements that is decided on.
 struct Elements<'a> {
     ids: (ElementId, ElementId),
@@ -882,6 +893,14 @@ impl Elements<'_> {
     /// What may be in the way: of two ends in contact nothing, as what covers them is left out of what they exchange.
     fn blockers(&self) -> &[PatchId] {
         if self.in_contact() { &[] } else { &self.found.blockers }
+    }
+
+    /// Leaves out blockers that are only beside the ends: a steep pair that counts as partly hidden is refined as if points
+    /// could not tell how much.
+    fn leave_out_what_is_beside(&mut self, x: &Exchange) {
+        if x.is_steep && self.shaft.is_beside(&self.found.blockers) {
+            self.found.blockers.clear();
+        }
     }
 
     /// Form factor from the smaller end to the other.
@@ -922,6 +941,7 @@ struct Places {
 }
 
 impl Places {
+    #[inline]
     fn new(at: &SpaceJudge<'_>, (a, b): (ElementId, ElementId), world: bool) -> Places {
         let patches = (at.patch_of(a), at.patch_of(b));
         let body = at.view.patch(patches.0).body;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 use crate::element::{ElementId, Renumbering};
 use crate::predict::{History, Lookahead, Tick};
@@ -105,12 +106,11 @@ impl Gradients {
 
     /// From relative gradients (1/m) and radii (m) of both ends.
     pub fn new((a, radius_a): (DVec2, f64), (b, radius_b): (DVec2, f64)) -> Gradients {
-        let steps = |g: DVec2, r: f64| {
-            [g.x, g.y].map(|v| {
-                let share = (v * r / f64::from(Gradients::MAX)).clamp(-1.0, 1.0);
-                (share.abs().sqrt() * 127.0).round().copysign(share) as i8
-            })
+        let step = |v: f64, r: f64| {
+            let share = (v * r / f64::from(Gradients::MAX)).clamp(-1.0, 1.0);
+            (share.abs().sqrt() * 127.0).round().copysign(share) as i8
         };
+        let steps = |g: DVec2, r: f64| [step(g.x, r), step(g.y, r)];
         Gradients { over_a: steps(a, radius_a), over_b: steps(b, radius_b) }
     }
 
@@ -221,11 +221,11 @@ impl Node {
     #[inline]
     fn carried(&self) -> Carried {
         let [x, v, g] = self.payload;
-        let [au, av, bu, bv] = g.to_le_bytes().map(|b| b as i8);
+        let [au, av, bu, bv] = g.to_le_bytes();
         Carried {
             exchange_area_m2: f32::from_bits(x),
             visibility: v as u16,
-            gradients: Gradients { over_a: [au, av], over_b: [bu, bv] },
+            gradients: Gradients { over_a: [au as i8, av as i8], over_b: [bu as i8, bv as i8] },
         }
     }
 
@@ -234,7 +234,7 @@ impl Node {
         self.payload = [
             carried.exchange_area_m2.to_bits(),
             self.payload[1] & !0xffff | u32::from(carried.visibility),
-            u32::from_le_bytes([au, av, bu, bv].map(|g| g as u8)),
+            u32::from_le_bytes([au as u8, av as u8, bu as u8, bv as u8]),
         ];
     }
 }
@@ -476,7 +476,17 @@ impl PairTree {
 
     /// All links, in no particular order.
     pub fn links(&self) -> impl Iterator<Item = Link> + Clone + '_ {
-        (0..self.nodes.len() as u32).filter_map(|id| self.link(PairId(id)))
+        self.slots().flatten()
+    }
+
+    /// The links by id; `None` for pairs that are none.
+    pub fn slots(&self) -> impl Iterator<Item = Option<Link>> + Clone + '_ {
+        (0..self.nodes.len() as u32).map(|id| self.link(PairId(id)))
+    }
+
+    /// [`PairTree::slots`] in parallel.
+    pub fn par_slots(&self) -> impl IndexedParallelIterator<Item = Option<Link>> + '_ {
+        (0..self.nodes.len() as u32).into_par_iter().map(|id| self.link(PairId(id)))
     }
 
     /// Sets what a pair without children is; what it carries is kept where it stays a link.

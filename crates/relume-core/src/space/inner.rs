@@ -12,7 +12,7 @@ pub(super) fn exchange_inside_m2(
     (a, b): (ElementId, ElementId),
     exchange_m2: f64,
 ) -> f64 {
-    if !forest.may_be_inside(a) || !forest.may_be_inside(b) {
+    if !forest.may_be_inside_alike(a, b) {
         return 0.0;
     }
     let (of_a, of_b) = (forest.parts_inside(a), forest.parts_inside(b));

@@ -15,8 +15,8 @@ use crate::solver::{FacetMaterial, GroupLinks, Place, Surfaces};
 pub(crate) struct LitForest<'a> {
     forest: &'a Forest,
     patch_materials: Vec<FacetMaterial>,
-    /// Places of all elements, where they were worth computing ahead.
-    places: Vec<Place>,
+    /// Places of all elements and their exposed areas, m2, where they were worth computing ahead.
+    places: Vec<(Place, f32)>,
     groups: Option<&'a GroupLinks>,
 }
 
@@ -60,10 +60,11 @@ impl<'a> LitForest<'a> {
         self.patch_materials.iter().all(|lit| lit.exitance == [0.0; 3])
     }
 
-    /// With all places computed ahead: for several sweeps over all of the forest.
+    /// With all places and areas computed ahead: for several sweeps over all of the forest.
     pub(super) fn with_places(mut self) -> LitForest<'a> {
-        let ids = (0..self.forest.len() as u32).into_par_iter();
-        self.places = ids.map(|id| place_of(self.forest, ElementId(id))).collect();
+        let forest = self.forest;
+        let ids = (0..forest.len() as u32).into_par_iter().map(ElementId);
+        self.places = ids.map(|id| (place_of(forest, id), forest.exposed_m2(id) as f32)).collect();
         self
     }
 }
@@ -111,17 +112,20 @@ impl Surfaces for LitForest<'_> {
     }
 
     fn area_m2(&self, id: u32) -> f64 {
-        self.forest.exposed_m2(ElementId(id))
+        match self.places.get(id as usize) {
+            // Areas have single precision.
+            Some((_, area)) => f64::from(*area),
+            None => self.forest.exposed_m2(ElementId(id)),
+        }
     }
 
     fn is_covered(&self, id: u32) -> bool {
-        let id = ElementId(id);
-        self.forest.exposed_m2(id) < COVERED * self.forest.area_m2(id)
+        self.area_m2(id) < COVERED * self.forest.area_m2(ElementId(id))
     }
 
     fn place(&self, id: u32) -> Place {
         match self.places.get(id as usize) {
-            Some(place) => *place,
+            Some((place, _)) => *place,
             None => place_of(self.forest, ElementId(id)),
         }
     }

@@ -19,7 +19,7 @@ pub(super) fn balance(solved: &Solved) -> Balance {
 
 fn flux(solved: &Solved) -> (RowSumError, Energy) {
     let SpaceState { scene, forest, view, .. } = &solved.space;
-    let surfaces = solved.space.surfaces();
+    let surfaces = solved.space.surfaces().with_places();
     let present = |facet: &ElementId| {
         let patch = forest.patch(*facet).expect("has a patch");
         view.is_present(scene.patches[patch.0 as usize].body)

@@ -147,7 +147,7 @@ impl<'a> Receiver<'a> {
     fn receive_close(&self, simd: Simd, from: &WorldElement) -> [f64; LANES] {
         let plane = &self.element.plane;
         let slack = self.element.rounding_m + from.rounding_m;
-        let seen = ConvexPolygon::new(&from.corners[..from.len]).clipped(plane, slack);
+        let seen = ConvexPolygon::part(&from.corners[..from.len], plane, slack);
         if seen.corners().len() < 3 {
             return [0.0; LANES];
         }

@@ -34,6 +34,9 @@ pub(super) fn exchange_along_outlines(
     if unit <= 0.0 {
         return 0.0;
     }
+    let mut corners = [DVec3::ZERO; ConvexPolygon::CAPACITY];
+    corners.iter_mut().zip(b).for_each(|(to, &from)| *to = from / unit);
+    let corners = &corners[..b.len()];
     let mut sum = 0.0;
     let mut p = a[a.len() - 1] / unit;
     for &corner in a {
@@ -41,8 +44,7 @@ pub(super) fn exchange_along_outlines(
         sum += over_edge(
             simd,
             &Edge { from: p, along: q - p },
-            b,
-            unit,
+            corners,
             error_max_m2 / (unit * unit * a.len() as f64),
         );
         p = q;
@@ -68,31 +70,29 @@ const PARALLEL: f64 = 1e-18;
 /// Cosine of the angle below which edges count as perpendicular.
 const PERPENDICULAR: f64 = 1e-12;
 
-/// The double integral over an edge and the whole outline `b`.
-fn over_edge(simd: Simd, e: &Edge, b: &[DVec3], unit: f64, error_max: f64) -> f64 {
+/// The double integral over an edge and the whole outline with some `corners`.
+fn over_edge(simd: Simd, e: &Edge, corners: &[DVec3], error_max: f64) -> f64 {
     let length2 = e.along.length_squared();
+    let line = Stretch { start: e.from, direction: e.along.normalize(), length: e.along.length() };
     let mut sum = 0.0;
-    let mut corners = [DVec3::ZERO; ConvexPolygon::CAPACITY];
-    corners.iter_mut().zip(b).for_each(|(to, &from)| *to = from / unit);
     // Corners where edges begin that are at an angle to `e`.
     let mut tilted = [false; ConvexPolygon::CAPACITY];
     let mut any = false;
-    for k in 0..b.len() {
-        let from = corners[k];
-        let along = corners[(k + 1) % b.len()] - from;
+    let ends = corners.iter().skip(1).chain(corners.first());
+    for (k, (&from, &to)) in corners.iter().zip(ends).enumerate() {
+        let along = to - from;
         let both2 = length2 * along.length_squared();
         let dot = e.along.dot(along);
         if dot * dot <= PERPENDICULAR * PERPENDICULAR * both2 {
             continue;
         }
         if e.along.cross(along).length_squared() <= PARALLEL * both2 {
-            sum += of_parallels(e, &Edge { from, along });
+            sum += of_parallels(simd, &line, &Edge { from, along });
         } else {
             (tilted[k], any) = (true, true);
         }
     }
     if any {
-        let corners = &corners[..b.len()];
         let integrand = |places: &Points| dispatch!(simd.level(), _simd => tilted_means(e, places, corners, &tilted));
         sum += adaptive(&integrand, (0.0, 1.0), error_max.max(ROUNDING), LEVELS);
     }
@@ -153,28 +153,49 @@ fn half_logarithm(r2: f64) -> f64 {
     if r2 <= f64::MIN_POSITIVE { 0.0 } else { 0.5 * logarithm(r2.max(f64::MIN_POSITIVE)) }
 }
 
+/// A stretch of a line, in units of the pair: an [`Edge`] made ready for those that are parallel to it.
+struct Stretch {
+    start: DVec3,
+    /// Of length 1.
+    direction: DVec3,
+    length: f64,
+}
+
 /// (e . f) times the double integral of ln r over two parallel edges.
 ///
 /// With z the difference of places along the edges and h their distance, ln r is the second derivative of
 /// P(z) = (z2 - h2)/4 ln(z2 + h2) + h z atan(z/h) - 3/4 z2.
-fn of_parallels(e: &Edge, f: &Edge) -> f64 {
-    let u = e.along.normalize();
-    let (s1, t1) = (e.along.length(), f.along.dot(u));
-    let away = f.from - e.from;
+fn of_parallels(
+    simd: Simd,
+    &Stretch { start, direction: u, length: s1 }: &Stretch,
+    f: &Edge,
+) -> f64 {
+    let t1 = f.along.dot(u);
+    let away = f.from - start;
     let t0 = away.dot(u);
     let h = (away - u * t0).length();
-    let primitive = |z: f64| {
-        let r2 = z * z + h * h;
-        if r2 <= f64::MIN_POSITIVE {
-            return 0.0;
-        }
-        0.25 * (z * z - h * h) * logarithm(r2) + h * z * arctangent(z, h) - 0.75 * z * z
-    };
     // Places on e run from 0 to s1, on f from t0 to t0 + t1 (t1 < 0 where they run against each other).
-    primitive(t0 + t1) - primitive(t0 + t1 - s1) - primitive(t0) + primitive(t0 - s1)
+    let ends = [t0 + t1, t0 + t1 - s1, t0, t0 - s1];
+    let p = dispatch!(simd.level(), _simd => primitives(&ends, h));
+    p[0] - p[1] - p[2] + p[3]
+}
+
+/// P at four places.
+#[inline(always)]
+fn primitives(places: &[f64; 4], h: f64) -> [f64; 4] {
+    let mut out = [0.0; 4];
+    for (z, out) in places.iter().zip(&mut out) {
+        let r2 = z * z + h * h;
+        let value = 0.25 * (z * z - h * h) * logarithm(r2.max(f64::MIN_POSITIVE))
+            + h * z * arctangent(*z, h)
+            - 0.75 * z * z;
+        *out = if r2 <= f64::MIN_POSITIVE { 0.0 } else { value };
+    }
+    out
 }
 
 /// atan(z / h) for h >= 0.
+#[inline(always)]
 fn arctangent(z: f64, h: f64) -> f64 {
     let magnitude = angle(z.abs(), h);
     if z < 0.0 { -magnitude } else { magnitude }

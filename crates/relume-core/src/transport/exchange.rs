@@ -151,6 +151,16 @@ pub fn exchange_of_points(a: &WorldElement, b: &WorldElement) -> Exchange {
     Exchange { area_m2, over_a: over(a, rise), over_b: over(b, -rise), is_steep: false }
 }
 
+/// The sum of a term over lanes.
+#[inline(always)]
+fn sum_over(term: impl Fn(usize) -> f64) -> f64 {
+    let mut terms = [0.0; LANES];
+    for (k, to) in terms.iter_mut().enumerate() {
+        *to = term(k);
+    }
+    sum_of_lanes(terms)
+}
+
 /// A weighted linear least-squares fit over points of an element.
 #[derive(Clone, Copy, Debug, Default)]
 struct Fit {
@@ -183,16 +193,15 @@ impl Fit {
     #[inline(always)]
     fn add_all(&mut self, grid: &Grid, value: &[f64; LANES]) {
         let Grid { offsets: [x, y], weights: weight, .. } = grid;
-        let sum = |term: &dyn Fn(usize) -> f64| sum_of_lanes(std::array::from_fn(term));
         self.weight += sum_of_lanes(*weight);
-        self.value += sum(&|k| weight[k] * value[k]);
-        self.value2 += sum(&|k| weight[k] * value[k] * value[k]);
-        self.at += DVec2::new(sum(&|k| weight[k] * x[k]), sum(&|k| weight[k] * y[k]));
-        self.at_value.x += sum(&|k| weight[k] * x[k] * value[k]);
-        self.at_value.y += sum(&|k| weight[k] * y[k] * value[k]);
-        self.xx += sum(&|k| weight[k] * x[k] * x[k]);
-        self.xy += sum(&|k| weight[k] * x[k] * y[k]);
-        self.yy += sum(&|k| weight[k] * y[k] * y[k]);
+        self.value += sum_over(|k| weight[k] * value[k]);
+        self.value2 += sum_over(|k| weight[k] * value[k] * value[k]);
+        self.at += DVec2::new(sum_over(|k| weight[k] * x[k]), sum_over(|k| weight[k] * y[k]));
+        self.at_value.x += sum_over(|k| weight[k] * x[k] * value[k]);
+        self.at_value.y += sum_over(|k| weight[k] * y[k] * value[k]);
+        self.xx += sum_over(|k| weight[k] * x[k] * x[k]);
+        self.xy += sum_over(|k| weight[k] * x[k] * y[k]);
+        self.yy += sum_over(|k| weight[k] * y[k] * y[k]);
     }
 
     fn variation(&self) -> Variation {
@@ -261,7 +270,8 @@ impl Grid {
             z: at(c0.z, u.z, v.z, w.z),
         };
         let weights = std::array::from_fn(|k| W[k] * (even + S[k] * along_s + T[k] * along_t));
-        let offsets = e.axes.map(|a| at((c0 - e.centre).dot(a), u.dot(a), v.dot(a), w.dot(a)));
+        let along = |a: DVec3| at((c0 - e.centre).dot(a), u.dot(a), v.dot(a), w.dot(a));
+        let offsets = [along(e.axes[0]), along(e.axes[1])];
         Grid { points, offsets, weights }
     }
 }
@@ -328,8 +338,7 @@ fn close_exchange(simd: Simd, a: &WorldElement, b: &WorldElement) -> Exchange {
 /// The parts of two elements that face each other.
 fn facing_parts(a: &WorldElement, b: &WorldElement) -> [ConvexPolygon; 2] {
     let slack = a.rounding_m + b.rounding_m;
-    let part =
-        |e: &WorldElement, plane| ConvexPolygon::new(&e.corners[..e.len]).clipped(plane, slack);
+    let part = |e: &WorldElement, plane| ConvexPolygon::part(&e.corners[..e.len], plane, slack);
     [part(a, &b.plane), part(b, &a.plane)]
 }
 
@@ -361,9 +370,8 @@ pub fn exchange_of_polygons((a, of_a): (&[DVec3], DVec3), (b, of_b): (&[DVec3], 
         return 0.0;
     }
     let reach = a.iter().chain(b).map(|c| c.abs().max_element()).fold(0.0, f64::max);
-    let part = |corners: &[DVec3], plane: Plane| {
-        ConvexPolygon::new(corners).clipped(&plane, ROUNDED * reach)
-    };
+    let part =
+        |corners: &[DVec3], plane: Plane| ConvexPolygon::part(corners, &plane, ROUNDED * reach);
     let (one, two) = (part(a, Plane::through(b[0], of_b)), part(b, Plane::through(a[0], of_a)));
     if one.corners().len() < 3 || two.corners().len() < 3 {
         return 0.0;

@@ -199,6 +199,7 @@ impl<'a> Spread<'a> {
                 out.normals = [e.plane.normal; 16];
             }
             Points::Group(leaves, pose) => {
+                let placing = Placing { forest, view, pose };
                 let towards = Towards::new(pose, self, other);
                 let of = |l: &GroupLeaf| l.area_m2 * towards.factor(l);
                 let total: f64 = leaves.iter().map(of).sum();
@@ -212,14 +213,14 @@ impl<'a> Spread<'a> {
                         && (sum >= total * (next as f64 + jitter(key, next)) / 16.0)
                         && sum > 0.0
                     {
-                        out.set(next, leaf, (forest, view, pose), key);
+                        out.set(next, leaf, &placing, key);
                         next += 1;
                     }
                 }
                 // What rounding left over.
                 let last = leaves.iter().rev().find(|l| of(l) > 0.0);
                 while let (Some(leaf), true) = (last, next < GROUP_SEGMENTS as usize) {
-                    out.set(next, leaf, (forest, view, pose), key);
+                    out.set(next, leaf, &placing, key);
                     next += 1;
                 }
             }
@@ -295,38 +296,40 @@ impl Default for Samples {
 }
 
 impl Samples {
-    fn set(
-        &mut self,
-        k: usize,
-        leaf: &GroupLeaf,
-        (forest, view, pose): (&Forest, &WorldView, &Pose),
-        key: u64,
-    ) {
+    fn set(&mut self, k: usize, leaf: &GroupLeaf, placing: &Placing<'_>, key: u64) {
         let turn = scrambled(key, k as u64 + 1);
         let unit = |bits: u32| f64::from(bits & 0xffff) / 65_536.0;
-        let (patch, at) = point_of(leaf, (forest, view, pose), (unit(turn), unit(turn >> 16)));
+        let (patch, at) = placing.point_of(leaf, (unit(turn), unit(turn >> 16)));
         self.points[k] = at;
-        self.normals[k] = pose.direction(leaf.normal);
+        self.normals[k] = placing.pose.direction(leaf.normal);
         self.weights[k] = 1.0;
         self.patches[k] = patch;
     }
 }
 
-/// A point of a facet in the frame of a pair, and its patch.
-fn point_of(
-    leaf: &GroupLeaf,
-    (forest, view, pose): (&Forest, &WorldView, &Pose),
-    (s, t): (f64, f64),
-) -> (u32, DVec3) {
-    let patch = forest.patch(leaf.facet).expect("a facet has a patch");
-    let place = view.patch(patch);
-    // Groups of several bodies are in the world.
-    let frame = match forest.moves_with_group(leaf.facet) {
-        true => &place.local,
-        false => &place.world,
-    };
-    let corners = forest.shape(leaf.facet).corners.map(|c| frame.point(c));
-    (patch.0, pose.point(bilinear(&corners, s, t)))
+/// Where the facets of a group are in the frame of a pair.
+struct Placing<'a> {
+    forest: &'a Forest,
+    view: &'a WorldView,
+    /// Of the group in that frame.
+    pose: &'a Pose,
+}
+
+impl Placing<'_> {
+    /// The patch of a facet, and a point of it by parameters of the unit square.
+    fn point_of(&self, leaf: &GroupLeaf, (s, t): (f64, f64)) -> (u32, DVec3) {
+        let Placing { forest, view, pose } = *self;
+        let patch = forest.patch(leaf.facet).expect("a facet has a patch");
+        let place = view.patch(patch);
+        // Groups of several bodies are in the world.
+        let frame = match forest.moves_with_group(leaf.facet) {
+            true => &place.local,
+            false => &place.world,
+        };
+        let [a, b, c, d] = forest.shape(leaf.facet).corners;
+        let corners = [frame.point(a), frame.point(b), frame.point(c), frame.point(d)];
+        (patch.0, pose.point(bilinear(&corners, s, t)))
+    }
 }
 
 /// 32 bits of the finaliser of SplitMix64.

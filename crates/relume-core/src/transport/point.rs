@@ -121,7 +121,11 @@ pub(super) fn bundle_sums(points: &PointBundle, normal: DVec3, corners: &[DVec3]
         }
         from = to;
     }
-    sums.map(|s| s.abs() / (2.0 * PI))
+    // Written out, here and where elements are placed: mapping an array is a call for each number.
+    for sum in &mut sums {
+        *sum = sum.abs() / (2.0 * PI);
+    }
+    sums
 }
 
 /// Edges of many polygons, each as seen from its own point, evaluated sixteen at a time.

@@ -109,7 +109,8 @@ impl<'a> Between<'a> {
         // The near plane in the frame.
         let up = frame.direction(observer.plane.normal);
         let is_low = |c: DVec3| up.dot(c - from) <= slack;
-        let corners = observer.corners.map(|c| frame.place(c));
+        let [a, b, c, d] = &observer.corners;
+        let corners = [frame.place(*a), frame.place(*b), frame.place(*c), frame.place(*d)];
         for PlacedSolid { number, solid, pose } in &self.solids {
             // What reaches behind the other's plane hides less than its silhouette.
             if solid.corners.iter().all(|&c| other.plane.distance(pose.point(c)) >= -slack) {
@@ -176,8 +177,7 @@ impl PreparedView {
     ) -> PreparedView {
         let slack = observer.rounding_m + other.rounding_m;
         let frame = TargetFrame::of(other);
-        let facing =
-            ConvexPolygon::new(&other.corners[..other.len]).clipped(&observer.plane, slack);
+        let facing = ConvexPolygon::part(&other.corners[..other.len], &observer.plane, slack);
         let scratch = SCRATCH.take();
         PreparedView {
             simd,
@@ -211,8 +211,7 @@ impl PreparedView {
     /// Whether the other end, in parts of each of which one occluder hides all, is hidden from all of the observer, its
     /// rim aside.
     fn is_hidden(&mut self, observer: &WorldElement) -> bool {
-        let corners =
-            ConvexPolygon::new(&observer.corners[..observer.len]).clipped(&self.other, 0.0);
+        let corners = ConvexPolygon::part(&observer.corners[..observer.len], &self.other, 0.0);
         let corners = corners.corners();
         if corners.len() < 3 || self.target.len() < 3 {
             return false;
@@ -358,7 +357,7 @@ fn looks_best(a: &WorldElement, b: &WorldElement, between: &Between<'_>) -> bool
     let slack = a.rounding_m + b.rounding_m;
     let facing = |e: &WorldElement, plane: &Plane| match e.span(plane).lo >= -slack {
         true => 1.0,
-        false => ConvexPolygon::new(&e.corners[..e.len]).clipped(plane, slack).area() / e.area,
+        false => ConvexPolygon::part(&e.corners[..e.len], plane, slack).area() / e.area,
     };
     let (of_a, of_b) = (facing(a, &b.plane), facing(b, &a.plane));
     let alike = no_smaller(of_a, of_b) && no_smaller(of_b, of_a);

@@ -32,22 +32,50 @@ pub struct SegmentBundle {
 /// How far polygons reach over their edges, in slacks: neighbours leave no gap between them.
 pub(super) const EDGE_OVERLAP: f64 = 1e-5;
 
-/// The k-th point of the (0, m, 2)-net of van der Corput and Sobol, as `bits`-bit integers.
-fn net_point(k: u32, bits: u32) -> (u32, u32) {
+/// Bits of the points of the [`NET`].
+const NET_BITS: u32 = 6;
+
+/// The (0, 6, 2)-net of van der Corput and Sobol, as integers of 6 bits.
+const NET: [[u8; 2]; 1 << NET_BITS] = {
     // Direction numbers of the second Sobol dimension: Pascal's triangle modulo 2.
-    const SECOND: [u32; 6] = [1, 3, 5, 15, 17, 51];
-    let mut x = 0;
-    let mut y = 0;
-    for (bit, m) in SECOND.iter().enumerate().take(bits as usize) {
-        if k >> bit & 1 == 1 {
-            x ^= 1 << (bits - 1 - bit as u32);
-            y ^= m << (bits - 1 - bit as u32);
+    const SECOND: [u8; NET_BITS as usize] = [1, 3, 5, 15, 17, 51];
+    let mut net = [[0; 2]; 1 << NET_BITS];
+    let mut k = 0;
+    while k < net.len() {
+        let mut bit = 0;
+        while bit < SECOND.len() {
+            if k >> bit & 1 == 1 {
+                net[k][0] ^= 1 << (SECOND.len() - 1 - bit);
+                net[k][1] ^= SECOND[bit] << (SECOND.len() - 1 - bit);
+            }
+            bit += 1;
         }
+        k += 1;
     }
-    (x, y)
+    net
+};
+
+/// The k-th of the first `2^bits` points of the net, which are a net too, as integers of so many bits: 6 at most.
+#[inline]
+fn net_point(k: u32, bits: u32) -> (u32, u32) {
+    let [x, y] = NET[k as usize];
+    (u32::from(x) >> (NET_BITS - bits), u32::from(y) >> (NET_BITS - bits))
 }
 
 impl SegmentBundle {
+    /// Segments of no length that carry nothing.
+    const NOTHING: SegmentBundle = SegmentBundle {
+        px: [0.0; SEGMENTS],
+        py: [0.0; SEGMENTS],
+        pz: [0.0; SEGMENTS],
+        dx: [0.0; SEGMENTS],
+        dy: [0.0; SEGMENTS],
+        dz: [0.0; SEGMENTS],
+        weight: [0.0; SEGMENTS],
+        quadrant_a: [0; SEGMENTS],
+        quadrant_b: [0; SEGMENTS],
+    };
+
     /// Segments `16 block .. 16 block + 16` of the `2^log2_count` of the pair.
     ///
     /// Both ends run through a (0, m, 2)-net, joined in bit-reversed order and scrambled by
@@ -59,17 +87,7 @@ impl SegmentBundle {
         log2_count: u32,
         block: u32,
     ) -> SegmentBundle {
-        let mut out = SegmentBundle {
-            px: [0.0; SEGMENTS],
-            py: [0.0; SEGMENTS],
-            pz: [0.0; SEGMENTS],
-            dx: [0.0; SEGMENTS],
-            dy: [0.0; SEGMENTS],
-            dz: [0.0; SEGMENTS],
-            weight: [0.0; SEGMENTS],
-            quadrant_a: [0; SEGMENTS],
-            quadrant_b: [0; SEGMENTS],
-        };
+        let mut out = SegmentBundle::NOTHING;
         let mask = (1_u32 << log2_count) - 1;
         let scramble = |shift: u32| (key >> shift) as u32 & mask;
         let step = 1.0 / f64::from(1_u32 << log2_count);
@@ -90,18 +108,13 @@ impl SegmentBundle {
 
     /// Segments between given ends, which carry nothing.
     pub fn of_ends(ends: &[[DVec3; 2]; SEGMENTS]) -> SegmentBundle {
-        let of = |part: fn(&[DVec3; 2]) -> f64| ends.each_ref().map(part);
-        SegmentBundle {
-            px: of(|[p, _]| p.x),
-            py: of(|[p, _]| p.y),
-            pz: of(|[p, _]| p.z),
-            dx: of(|[p, q]| q.x - p.x),
-            dy: of(|[p, q]| q.y - p.y),
-            dz: of(|[p, q]| q.z - p.z),
-            weight: [0.0; SEGMENTS],
-            quadrant_a: [0; SEGMENTS],
-            quadrant_b: [0; SEGMENTS],
+        let mut out = SegmentBundle::NOTHING;
+        for (k, [p, q]) in ends.iter().enumerate() {
+            let d = q - p;
+            (out.px[k], out.py[k], out.pz[k]) = (p.x, p.y, p.z);
+            (out.dx[k], out.dy[k], out.dz[k]) = (d.x, d.y, d.z);
         }
+        out
     }
 
     fn set(

@@ -73,8 +73,8 @@ impl Silhouette {
         let sights: Vec<Sight> = solid.faces.iter().zip(&is_low).map(sight).collect();
         let (mut always, mut sometimes) = (Vec::new(), Vec::new());
         for edge in solid.edges.iter().filter(is_high) {
-            let ([p, q], of) =
-                (edge.ends.map(|c| c as usize), edge.faces.map(|f| sights[f as usize]));
+            let [p, q] = [edge.ends[0] as usize, edge.ends[1] as usize];
+            let of = [sights[edge.faces[0] as usize], sights[edge.faces[1] as usize]];
             match of {
                 [Sight::All, Sight::All] | [Sight::None, Sight::None] => {}
                 [Sight::All, Sight::None] => always.push([q, p]),
@@ -114,7 +114,7 @@ impl Silhouette {
                 Sight::None => false,
                 Sight::Some(face) => seen[face],
             };
-            match edge.faces.map(sees) {
+            match [sees(edge.faces[0]), sees(edge.faces[1])] {
                 [true, false] => Some([q, p]),
                 [false, true] => Some([p, q]),
                 _ => None,

@@ -201,19 +201,17 @@ impl<'a> Shaft<'a> {
             return Standing::Out;
         }
         let root = self.forest.patch_root(patch);
-        let SeenEnds { own, a, b, shaft } =
-            self.seen_ends(shafts, Some(self.view.patch(patch).body));
-        let (occluder, bounds) = if own {
-            (self.view.occluder_in_body(patch), self.view.box_in_body(root))
-        } else {
-            (self.view.occluder(patch), self.view.fixed_box(root))
-        };
+        let body = self.own.map(|_| self.view.patch(patch).body);
+        let SeenEnds { own, a, b, shaft } = self.seen_ends(shafts, body);
+        let bounds = if own { self.view.box_in_body(root) } else { self.view.fixed_box(root) };
         let slack = self.slack();
         // The margins: what covers an end may lie a little behind it.
         let (margin, wide_margin) = (COVER * slack, 1.5 * COVER * slack);
         if !shaft.meets(bounds, wide_margin) {
             return Standing::Out;
         }
+        let occluder =
+            if own { self.view.occluder_in_body(patch) } else { self.view.occluder(patch) };
         // A lamp beside the ends lights the one unevenly, though it blocks nothing.
         let unseen = if self.forest.glows(patch) { Standing::Beside } else { Standing::Out };
         let (above_a, above_b) = (span(&occluder, &a.plane), span(&occluder, &b.plane));
@@ -498,7 +496,7 @@ impl<'a> Shaft<'a> {
                 None => solids.push((solid, 1, count)),
             }
         }
-        let ends = [self.patches.0, self.patches.1].map(|patch| self.forest.solid(patch));
+        let ends = [self.forest.solid(self.patches.0), self.forest.solid(self.patches.1)];
         let is_cheaper = |&(solid, faces, corners): &(u32, usize, usize)| {
             // A single face is as good, and a few of a ball are better.
             let edges = self.forest.solid_shape(solid).edges.len();

@@ -127,11 +127,11 @@ impl<'a> Drawing<'a> {
             Light::Flat | Light::Smooth(_) => Smooth::default(),
             Light::Gouraud => Smooth::new(snapshot),
         };
-        let shading = (light, &smooth, quantity);
+        let shown = Showing { light, smooth: &smooth, quantity };
         let of_patches: Vec<Option<PatchDrawing>> = (0..count)
             .into_par_iter()
             .map(|i| {
-                PatchDrawing::new(snapshot, PatchId(i), projector, grid, near, shading, outlines)
+                PatchDrawing::new(snapshot, PatchId(i), projector, grid, near, &shown, outlines)
             })
             .collect();
         let mut seen: Vec<(usize, PatchDrawing)> = of_patches
@@ -287,6 +287,14 @@ struct PatchDrawing {
     pieces: Vec<(Primitive, Fill)>,
 }
 
+/// What is shown of patches.
+struct Showing<'a> {
+    light: Light<'a>,
+    /// Light at corners of smooth patches.
+    smooth: &'a Smooth,
+    quantity: Quantity,
+}
+
 impl PatchDrawing {
     fn new(
         snapshot: &Snapshot,
@@ -294,7 +302,7 @@ impl PatchDrawing {
         projector: &Projector,
         grid: &Grid,
         near: f64,
-        (light, smooth, quantity): (Light<'_>, &Smooth, Quantity),
+        &Showing { light, smooth, quantity }: &Showing<'_>,
         outlines: bool,
     ) -> Option<PatchDrawing> {
         let patch = &snapshot.scene.patches[id.0 as usize];

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DVec2, DVec3};
 
-use super::{ElementId, Forest, Kind, exposed_m2};
+use super::{ElementId, Forest, Kind, exposed_m2, overlap};
 use crate::geometry::{Aabb, Moments, common};
-use crate::scene::{BodyId, Covered, Instant, LightId, PatchId, Scene, World};
+use crate::scene::{BodyId, Covered, Inside, Instant, LightId, PatchId, Scene, World};
 
 /// Part of an element that lies within a body.
 pub struct PartInside {
@@ -79,7 +79,7 @@ impl Forest {
         let shape = self.shape(id);
         let own = &shape.corners[..shape.len];
         let mut out = Vec::new();
-        for part in self.covered(id).inside.iter().filter(|part| shape.meets(&part.bounds)) {
+        for part in self.inside_near(id) {
             let [origin, u, v] = part.plane;
             let outline = common(&part.outline, own);
             if outline.len() > 2 {
@@ -92,10 +92,24 @@ impl Forest {
         out
     }
 
-    /// Whether some of the patch of an element lies within a body.
-    #[inline]
-    pub fn may_be_inside(&self, id: ElementId) -> bool {
-        self.patch(id).is_some_and(|patch| !self.covered_of(patch).inside.is_empty())
+    /// Whether parts of two elements may lie within the same body. Conservative; cheaper than
+    /// [`Forest::parts_inside`].
+    pub fn may_be_inside_alike(&self, a: ElementId, b: ElementId) -> bool {
+        let has_some = |id: ElementId| {
+            self.patch(id).is_some_and(|patch| !self.covered_of(patch).inside.is_empty())
+        };
+        has_some(a) && has_some(b) && {
+            let of_b: Vec<&Inside> = self.inside_near(b).collect();
+            let is_alike =
+                |one: &Inside| of_b.iter().any(|two| one.of == two.of && one.is_own == two.is_own);
+            !of_b.is_empty() && self.inside_near(a).any(is_alike)
+        }
+    }
+
+    /// Those parts of the patch of an element within bodies that the box around it meets.
+    fn inside_near(&self, id: ElementId) -> impl Iterator<Item = &Inside> {
+        let bounds = self.shape(id).bounds();
+        self.covered(id).inside.iter().filter(move |part| overlap(&bounds, &part.bounds))
     }
 
     /// Finds anew what is exposed of elements of a patch, given its root; adds them.

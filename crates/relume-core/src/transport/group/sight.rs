@@ -8,7 +8,7 @@ use crate::transport::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use glam::DVec3;
 
 use super::super::tuning::{FACET_RAYS, GROUP_SEGMENTS};
-use super::{Points, Spread, Towards, factor, point_of, scrambled};
+use super::{Placing, Points, Spread, Towards, factor, scrambled};
 
 /// Query for the occluders between two ends of which one is a group.
 pub struct GroupSight<'a> {
@@ -361,7 +361,8 @@ impl GroupSight<'_> {
             }
             Points::Group(leaves, pose) => {
                 let leaf = &leaves[facet as usize];
-                let (patch, at) = point_of(leaf, (self.forest, self.view, pose), (s, t));
+                let placing = Placing { forest: self.forest, view: self.view, pose };
+                let (patch, at) = placing.point_of(leaf, (s, t));
                 Aim { at, normal: pose.direction(leaf.normal), patch, weight: 1.0 }
             }
         }

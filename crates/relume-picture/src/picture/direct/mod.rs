@@ -69,11 +69,13 @@ impl Direct {
             if scene.is_distant(patch.body) || is_second {
                 continue;
             }
-            let corners = corners(k, frame);
             let own = PatchId(k as u32);
-            known.push(Known { patch: own, twin: patch.twin, area_m2: patch.area_m2() });
-            boxes.push(Aabb::of(corners.iter().copied()));
-            blockers.push(Blocker { plane: Plane::through(frame.origin, frame.normal), corners });
+            for corners in Blocker::parts(&corners(k, frame)) {
+                known.push(Known { patch: own, twin: patch.twin, area_m2: patch.area_m2() });
+                boxes.push(Aabb::of(corners.iter().copied()));
+                let plane = Plane::through(frame.origin, frame.normal);
+                blockers.push(Blocker { plane, corners });
+            }
         }
         let lamp = |lamp: &LampLight| {
             let k = lamp.patch.0 as usize;

@@ -145,10 +145,18 @@ impl Cutter {
 
     /// Takes away what is in a cone.
     fn cut(&mut self, cone: &Cone) {
+        let is_beside = |piece: &ConvexPolygon| cone.is_beside(piece.corners().iter().copied());
+        // Most hide nothing of what is left.
+        if self.pieces.iter().all(is_beside) {
+            return;
+        }
         self.next.clear();
         let room = ConvexPolygon::CAPACITY.saturating_sub(cone.planes().len()).max(3);
-        while let Some(piece) = self.pieces.pop() {
-            if cone.is_beside(piece.corners().iter().copied()) {
+        let mut k = 0;
+        while k < self.pieces.len() {
+            let piece = self.pieces[k];
+            k += 1;
+            if is_beside(&piece) {
                 self.next.push(piece);
                 continue;
             }
@@ -200,12 +208,14 @@ fn at_points(
     near_m: f64,
     pieces: &[ConvexPolygon],
 ) -> f64 {
+    let target = Cone::new(whole.iter().copied(), 1.0);
     let cones: Vec<Cone> = blockers
         .iter()
         .filter_map(|blocker| {
             let off = blocker.plane.distance(point);
             let corners = blocker.corners.iter().map(|&c| c - point);
-            (off.abs() > near_m).then(|| Cone::new(corners, off.signum()))
+            let counts = off.abs() > near_m && !target.is_beside(corners.clone());
+            counts.then(|| Cone::new(corners, off.signum()))
         })
         .collect();
     let is_seen = |at: DVec3| {

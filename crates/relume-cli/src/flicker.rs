@@ -180,7 +180,7 @@ impl Sums {
             if mean > 0.0 { 100.0 * (squares / others).sqrt() / mean } else { 0.0 }
         };
         let mut text = format!(
-            "{}, frames {}: {} of {size} pixels at tolerance {}, against a reconstruction at {tolerance}\n\
+            "{}, frames {}: {} of {size} pixels at tolerance {}, against a reconstruction at {tolerance:.3}\n\
              surfaces whose light is kept: {:.1} % of the pixels; elsewhere light changes by {:.2} % of its mean (RMS)\n\n\
              {:10}{:>28}{:>28}\n",
             clip.scene.name,
@@ -194,7 +194,10 @@ impl Sums {
             "elsewhere: change off by",
         );
         for (way, name) in WAYS.iter().enumerate() {
-            let most = format!("{} W/m2/sr", self.most[way]);
+            let most = match self.kept {
+                0 => "none seen".to_owned(),
+                _ => format!("{} W/m2/sr", self.most[way]),
+            };
             let off = format!("{:.2} %", share(self.squares[way]));
             text += &format!("{name:10}{most:>28}{off:>28}\n");
         }

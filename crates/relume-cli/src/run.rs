@@ -124,7 +124,6 @@ impl Job {
         if let Some((_, flags)) = &self.picture {
             // Not only after the first frame.
             ask_for_picture(flags, self.format)?;
-            self.check_shown(&clip)?;
         }
         if let Some(dir) = &self.dir {
             make_directory(dir)?;
@@ -189,6 +188,7 @@ impl Job {
                 light::required(&read.scene).map(|()| (read, None))?
             }
         };
+        self.check_shown(&clip)?;
         clip.warn();
         clip.warn_of(self.solve.update);
         let clip = clip.without_dark_sides();

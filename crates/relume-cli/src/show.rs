@@ -11,13 +11,12 @@ use clap::{Args, ValueEnum};
 use glam::{DVec2, DVec3};
 use relume::element::ElementId;
 use relume::scene::{BodyId, PatchId, Scene};
-use relume::session::{Leaf, Session, Snapshot};
+use relume::session::{Frame, Leaf, Session, Snapshot};
 use relume_picture::drawing::{Drawing, Pen, with_legend};
 use relume_picture::picture::{
     self, ColourMap, Image, Layers, Numbers, Outlines, Scale, Settings, View,
 };
 
-use crate::clip::solved;
 use crate::failure::Failure;
 use crate::flat::draw::{BLACK, PINK};
 use crate::output;
@@ -226,6 +225,11 @@ impl ShowFlags {
             .help("`relume info` lists the bodies")),
         }
     }
+}
+
+/// What a session has solved last.
+fn solved(session: &Session) -> Frame<'_> {
+    session.frame().expect("pictures are drawn of solutions")
 }
 
 /// Of linear RGB (Rec. 709).

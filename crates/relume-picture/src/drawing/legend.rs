@@ -11,11 +11,13 @@ const LETTERS: f64 = 8.0;
 const BLACK: Colour = [30, 30, 30];
 
 /// A picture with the colours of a scale along its right edge, numbers beside them and a title above, over the picture itself.
-/// `steps` numbers are written, evenly from one end to the other; in small pictures as many as there is room for.
+/// `steps` numbers are written, evenly from one end to the other; in small pictures every second of them, or fewer.
 pub fn with_legend(mut image: Image, scale: &Scale, title: &str, steps: u32) -> Image {
     let (width, height) = (image.width, image.height);
     let tall = (0.6 * f64::from(height)).min(300.0);
-    let steps = steps.clamp(1, (tall / (2.0 * LETTERS)).max(1.0) as u32);
+    // Every so many of them, where there is not room for all.
+    let room = (tall / (2.0 * LETTERS)).max(1.0) as u32;
+    let steps = (1..=steps.min(room)).rev().find(|k| steps.is_multiple_of(*k)).unwrap_or(1);
     let labels: Vec<String> = (0..=steps)
         .map(|k| number(scale.low + (scale.high - scale.low) * f64::from(k) / f64::from(steps)))
         .collect();
@@ -93,6 +95,9 @@ mod tests {
         };
         let rows = [0.99, 0.75, 0.5, 0.25, 0.01].map(|share| near(share).unwrap());
         assert!(rows.windows(2).all(|w| w[0] < w[1]), "{rows:?}");
+        // Of ten numbers there is room for every fifth.
+        let shares = |steps| with_legend(grey.clone(), &scale, "W/M2", steps);
+        assert_eq!(shares(10), shares(2));
         // What is left of it is as it was.
         assert!((0..100).all(|y| (0..120).all(|x| out.pixel(x, y) == [90; 3])));
     }

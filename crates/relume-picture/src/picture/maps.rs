@@ -101,7 +101,7 @@ impl Scale {
             (self.share(f64::from(value)) * f64::from(self.lines)).floor().clamp(0.0, last)
         };
         let width = numbers.width as usize;
-        let right = ((k + 1) % width != 0).then_some(k + 1);
+        let right = (!(k + 1).is_multiple_of(width)).then_some(k + 1);
         let own = numbers.values[k].map(part);
         let differs = |other: usize| {
             let other = numbers.values.get(other).copied().flatten().map(part);

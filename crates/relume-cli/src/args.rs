@@ -8,6 +8,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::frames::FrameSpec;
 use crate::outside::OutsideFlags;
 use crate::scene_file::AnimationFlag;
+use crate::show::ShowFlags;
 use crate::viewing::ViewFlags;
 
 mod values;
@@ -45,9 +46,9 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Write a scene that ships with relume as .glb and render it.
     ///
-    /// The two scenes are the sequences of the paper: a corridor with a box under a light that
+    /// Two scenes are the sequences of the paper: a corridor with a box under a light that
     /// moves in the plane of the ceiling (109 frames), and a closed room with a light that circles
-    /// below the ceiling (20 frames).
+    /// below the ceiling (20 frames). The third is a furnished living room (36 frames).
     Demo(DemoArgs),
     /// Solve a scene and write one PNG a frame: DIR/frame-0000.png ...
     Render(RenderArgs),
@@ -121,6 +122,13 @@ pub(crate) enum Command {
     /// whatever else the machine does hits both alike: go by the ratios.
     #[command(after_help = "Example:  relume bench --demo room --frames 0-9 --json bench.json")]
     Bench(BenchArgs),
+    /// Measure how much of what changes in pictures from frame to frame is not the light.
+    ///
+    /// Draws every frame in three ways, `gouraud`, `smooth`, and smooth and cleaned, and compares the change of each pixel that sees one
+    /// place of an unmoved surface with the change in a finer, reconstructed solution. Surfaces whose elements keep their light are
+    /// told apart: there the change is to be 0.
+    #[command(after_help = "Example:  relume flicker --demo room --frames 0-4 --tolerance 0.1")]
+    Flicker(FlickerArgs),
     /// Solve a scene in the plane: what does not change along one direction, that direction integrated
     /// out.
     ///
@@ -288,7 +296,7 @@ pub(crate) struct DemoArgs {
     #[arg(value_enum)]
     pub(crate) scene: DemoScene,
     /// Directory for the scene, the pictures and report.json; made if missing
-    /// [default: relume-demo-corridor or relume-demo-room].
+    /// [default: relume-demo- and the name of the scene].
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
@@ -305,6 +313,8 @@ pub(crate) enum DemoScene {
     Corridor,
     /// A closed cubical room, a light circling below the ceiling: 20 frames.
     Room,
+    /// A living room: a door opens, a lantern is carried, and a sun stands behind blinds: 36 frames.
+    LivingRoom,
 }
 
 /// `relume render`
@@ -330,6 +340,8 @@ pub(crate) struct RenderArgs {
         conflicts_with = "preview"
     )]
     pub(crate) format: FrameFormat,
+    #[command(flatten)]
+    pub(crate) show: ShowFlags,
     #[command(flatten)]
     pub(crate) solve: SolveFlags,
     #[command(flatten)]
@@ -597,6 +609,25 @@ pub(crate) struct BenchArgs {
     pub(crate) no_pictures: bool,
     #[command(flatten)]
     pub(crate) picture: PictureFlags,
+}
+
+/// `relume flicker`
+#[derive(Debug, Args)]
+pub(crate) struct FlickerArgs {
+    #[command(flatten)]
+    pub(crate) source: SourceFlags,
+    #[command(flatten)]
+    pub(crate) clip: ClipFlags,
+    #[command(flatten)]
+    pub(crate) update: UpdateChoice,
+    /// Tolerance of the reference [default: a fifth of the other].
+    #[arg(long, value_name = "ERROR", value_parser = parse_tolerance, allow_negative_numbers = true)]
+    pub(crate) reference: Option<f64>,
+    /// Width x height of the pictures in pixels.
+    #[arg(long, value_name = "WxH", default_value = "160x120")]
+    pub(crate) size: Size,
+    #[command(flatten)]
+    pub(crate) view: ViewFlags,
 }
 
 /// What is measured against what, and where the numbers go.

@@ -1,5 +1,5 @@
 //! The scenes that ship with the command: the two sequences of Forsyth, Yang and Teo 1995,
-//! Table 0.1, made from code. Metres, +Y up.
+//! Table 0.1, and a living room, made from code. Metres, +Y up.
 //!
 //! Nothing here knows how a scene is solved or drawn, beyond the settings that suit it.
 
@@ -12,6 +12,8 @@ use relume::scene::{
 
 use crate::args::{DemoScene, Shading};
 
+mod living_room;
+
 /// Frames a second that the keys are made for.
 const FPS: f64 = 24.0;
 
@@ -22,6 +24,8 @@ const ROOM_FRAMES: u32 = 20;
 /// Tolerances at which the paper's 5,000 to 6,000 elements are drawn in a frame.
 const CORRIDOR_TOLERANCE: f64 = 0.028;
 const ROOM_TOLERANCE: f64 = 0.036;
+/// That of pictures.
+const LIVING_ROOM_TOLERANCE: f64 = 0.1;
 
 const CORRIDOR_WIDTH_M: f64 = 4.0;
 const CORRIDOR_LENGTH_M: f64 = 8.0;
@@ -55,7 +59,7 @@ const NONE: [f64; 3] = [0.0; 3];
 pub(crate) struct Demo {
     /// File stem.
     pub(crate) name: &'static str,
-    /// Display of the paper's sequence.
+    /// Display of the sequence.
     pub(crate) shading: Shading,
     /// Default tolerance.
     pub(crate) tolerance: f64,
@@ -75,6 +79,12 @@ pub(crate) fn demo(scene: DemoScene) -> Demo {
         DemoScene::Room => {
             Demo { name: "room", shading: Shading::Smooth, tolerance: ROOM_TOLERANCE, build: room }
         }
+        DemoScene::LivingRoom => Demo {
+            name: "living-room",
+            shading: Shading::Smooth,
+            tolerance: LIVING_ROOM_TOLERANCE,
+            build: living_room::living_room,
+        },
     }
 }
 
@@ -218,6 +228,31 @@ mod tests {
         for (scene, frames) in [(DemoScene::Corridor, 109), (DemoScene::Room, 20)] {
             let scene = (demo(scene).build)().unwrap();
             assert_eq!(frame_count(scene.motion.duration_s, FPS), Ok(frames));
+        }
+    }
+
+    #[test]
+    fn the_living_room_is_large_and_its_door_stays_clear_of_the_wall_and_the_furniture() {
+        let scene = (demo(DemoScene::LivingRoom).build)().unwrap();
+        assert_eq!(frame_count(scene.motion.duration_s, FPS), Ok(living_room::FRAMES));
+        assert!((2_000..10_000).contains(&scene.patches.len()), "{}", scene.patches.len());
+        // That names are shared is said, and no more.
+        assert!(scene.notes.iter().all(|note| note.code == "renamed"), "{:?}", scene.notes);
+        let moving = |name: &str, frame: u32| {
+            let body = scene.body_named(name).unwrap();
+            let pose = scene.pose(body, f64::from(frame) / FPS).unwrap();
+            let corners = scene.patches_of(body).flat_map(|(_, p)| p.corners_in_body());
+            corners.map(|c| pose.point(c)).collect::<Vec<DVec3>>()
+        };
+        for frame in 0..living_room::FRAMES {
+            // Between the doorway and the shelf, and above the floor.
+            for p in moving("door", frame) {
+                assert!(p.x < 4.35 && p.y > 0.0 && p.y < 2.05, "{p} in frame {frame}");
+                assert!(p.z < -2.9 && p.z > -4.12, "{p} in frame {frame}");
+            }
+            for p in moving("lantern", frame) {
+                assert!(p.x > 1.2 && p.x < 4.0 && p.y > 1.0 && p.z < -1.3 && p.z > -2.9, "{p}");
+            }
         }
     }
 

@@ -14,6 +14,7 @@ mod factors;
 mod failure;
 mod figures;
 mod flat;
+mod flicker;
 mod frames;
 mod in_flags;
 mod info;
@@ -37,6 +38,7 @@ mod scene_file;
 mod sensors;
 mod sequence;
 mod shell;
+mod show;
 mod size;
 mod strategies;
 mod text;
@@ -71,6 +73,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Verify(args) => interrupt::listen().and_then(|()| verify::verify(&args)),
         Command::Replay(args) => interrupt::listen().and_then(|()| replay::replay(&args)),
         Command::Bench(args) => interrupt::listen().and_then(|()| bench::bench(&args)),
+        Command::Flicker(args) => interrupt::listen().and_then(|()| flicker::flicker(&args)),
         Command::Factors(args) => interrupt::listen().and_then(|()| factors::factors(&args)),
         Command::Probe(args) => interrupt::listen().and_then(|()| probe::probe(&args)),
         Command::Export(args) => interrupt::listen().and_then(|()| export::export(&args)),

@@ -36,6 +36,7 @@ use crate::progress::Progress;
 use crate::report::{self, PictureOptions, Report, RunOptions, SceneSummary};
 use crate::resume;
 use crate::scene_file;
+use crate::show::ShowFlags;
 use crate::size::Size;
 use crate::tuning::UNBALANCED_SAID;
 use crate::viewing::Viewing;
@@ -59,6 +60,7 @@ pub(crate) fn demo(args: DemoArgs) -> Result<(), Failure> {
         tolerance: demo.tolerance,
         picture: Some((args.picture.shading.unwrap_or(Shading::Smooth), args.picture)),
         format: FrameFormat::Png,
+        show: ShowFlags::default(),
         preview: false,
         solve: args.solve,
     };
@@ -70,6 +72,7 @@ pub(crate) fn render(args: RenderArgs) -> Result<(), Failure> {
     let job = Job {
         preview: args.preview,
         format: args.format,
+        show: args.show,
         scene: args.scene,
         dir: Some(args.output),
         tolerance: PICTURE_TOLERANCE,
@@ -87,6 +90,7 @@ pub(crate) fn solve(args: SolveArgs) -> Result<(), Failure> {
         tolerance: TOLERANCE,
         picture: None,
         format: FrameFormat::Png,
+        show: ShowFlags::default(),
         preview: false,
         solve: args.solve,
     };
@@ -101,6 +105,8 @@ struct Job {
     tolerance: f64,
     picture: Option<(Shading, PictureFlags)>,
     format: FrameFormat,
+    /// What is shown in place of pictures.
+    show: ShowFlags,
     /// Whether pictures are rough ones, and nothing is solved.
     preview: bool,
     solve: SolveFlags,
@@ -182,6 +188,7 @@ impl Job {
                 light::required(&read.scene).map(|()| (read, None))?
             }
         };
+        self.check_shown(&clip)?;
         clip.warn();
         clip.warn_of(self.solve.update);
         let clip = clip.without_dark_sides();
@@ -302,7 +309,7 @@ impl Job {
             size: flags.size.to_string(),
             shading: *shading,
             camera: flags.view.camera.clone(),
-            view: flags.view.described(),
+            view: [flags.view.described(), self.show.described()].concat(),
             exposure: flags.exposure.to_string(),
             exposure_ev: match flags.exposure {
                 ExposureFlag::Auto => None,
@@ -326,6 +333,15 @@ impl Job {
             outside: clip.light.clone(),
             picture,
         }
+    }
+
+    /// An error where what is asked to be shown is not there.
+    fn check_shown(&self, clip: &Clip) -> Result<(), Failure> {
+        if self.show.show.is_some() && self.format == FrameFormat::Exr {
+            return Err(Failure::usage("--show is for pictures: .exr files hold the numbers")
+                .help("leave out --show, or use --format png"));
+        }
+        self.show.check(&clip.scene)
     }
 
     /// Path of a frame's picture, if this run makes pictures.
@@ -611,8 +627,12 @@ impl Run<'_> {
         let exposure = options.exposure_ev.map_or(Exposure::Automatic, fixed);
         let settings = clip::picture_settings(flags, options.shading, exposure);
         ask_for_picture(flags, self.job.format)?;
+        let scale = options.exposure_ev.map_or(1.0, f64::exp2);
+        let shown = self.job.show.draw(&self.session, &snapshot, (&view, &settings), scale)?;
         let bytes = match self.job.format {
-            FrameFormat::Png => picture::render(&snapshot, &view, &settings).to_png(),
+            FrameFormat::Png => {
+                shown.unwrap_or_else(|| picture::render(&snapshot, &view, &settings)).to_png()
+            }
             FrameFormat::Exr => picture::layers(&snapshot, &view, &settings).to_exr(),
         };
         drop(snapshot);

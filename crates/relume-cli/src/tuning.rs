@@ -67,3 +67,11 @@ pub(crate) const TARGETS_MAX: usize = 200;
 /// - Larger: phones do not show the file
 /// - Smaller: light goes straight over more of the frames
 pub(crate) const MORPH_BYTES_MAX: u64 = 256 << 20;
+
+/// Tolerance of the solution that flicker is measured against, over that of the one that flickers.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: what the reference itself is off by counts
+/// - Smaller: time
+pub(crate) const REFERENCE_SHARE: f64 = 0.2;

@@ -8,6 +8,7 @@ mod factors;
 mod files;
 mod first_minutes;
 mod flat;
+mod flicker;
 mod fuzz;
 mod killed;
 mod memory;

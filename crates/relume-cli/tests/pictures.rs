@@ -69,6 +69,50 @@ fn parts_of_a_clip_match_the_whole() {
 }
 
 #[test]
+fn numbers_are_shown_on_one_scale_over_the_clip() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().to_str().unwrap();
+    succeeded(&relume(&["demo", "room", "-o", out, "--frames", "0"]));
+    let scene = format!("{out}/room.glb");
+    let render = |name: &str, more: &[&str]| {
+        let out = format!("{out}/{name}");
+        relume(&[&["render", &scene, "-o", &out, "--frames", "3,9"], more].concat())
+    };
+    let pixels = |name: &str, frame: u32| {
+        let path = dir.path().join(format!("{name}/frame-{frame:04}.png"));
+        image::load_from_memory(&fs::read(path).unwrap()).unwrap().into_rgb8().into_raw()
+    };
+    succeeded(&render("auto", &["--show", "irradiance", "--isolines", "4"]));
+    let [one, other] = [3, 9].map(|frame| pixels("auto", frame));
+    assert_ne!(one, other);
+    // Where the legend is: frames differ in what is behind it by a fifth.
+    let row = |bytes: &[u8], y: usize| bytes[3 * (64 * y + 20)..3 * (64 * y + 57)].to_vec();
+    for y in 14..36 {
+        let pairs = row(&one, y).into_iter().zip(row(&other, y));
+        assert!(pairs.map(|(a, b)| a.abs_diff(b)).max() < Some(60), "row {y}");
+    }
+    let options = &report(&dir.path().join("auto"))["options"]["picture"]["view"];
+    assert_eq!(options[0], "--show irradiance");
+    // Below the scale all is its first colour, above it the last, but for the legend.
+    for (ends, colour) in [("1e8,1e9", [0, 0, 0]), ("-2,-1", [255, 255, 255])] {
+        succeeded(&render(ends, &["--show=irradiance", "--map=grey", &format!("--scale={ends}")]));
+        let bytes = pixels(ends, 3);
+        assert!((0..48).all(|y| bytes[3 * (64 * y + 62)..][..3] == colour), "{ends}");
+    }
+    for shown in ["level", "mesh", "body", "linked", "links", "error", "radiosity", "illuminance"] {
+        succeeded(&render(shown, &["--show", shown]));
+        assert_ne!(pixels(shown, 3), one, "{shown}");
+    }
+    let lamp = pixels("links", 3);
+    succeeded(&render("of", &["--show", "links", "--of", "lamp"]));
+    assert_eq!(pixels("of", 3), lamp);
+    let refused = render("none", &["--show", "links", "--of", "door"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("no body `door`"));
+    assert_eq!(render("exr", &["--show=level", "--format=exr"]).status.code(), Some(2));
+}
+
+#[test]
 fn parts_of_a_reconstructed_clip_match_the_whole() {
     part_matches_whole(&["--reconstruct"]);
 }

@@ -5,5 +5,6 @@ mod common;
 mod gallery;
 mod pictures;
 mod recording;
+mod show;
 mod sky;
 mod smooth;

@@ -115,6 +115,41 @@ fn direct_light_of_every_pixel_is_the_exact_formulas() {
     assert!(partly > 20 && most > 1.0, "{partly} {most}");
 }
 
+/// A horizontal regular polygon that faces up or down.
+fn disc(centre: DVec3, radius: f64, corners: u32, up: bool) -> Vec<DVec3> {
+    let corner = |k: u32| {
+        let turn = std::f64::consts::TAU * f64::from(k) / f64::from(corners);
+        centre + radius * v(turn.cos(), 0.0, if up { -turn.sin() } else { turn.sin() })
+    };
+    (0..corners).map(corner).collect()
+}
+
+/// Suns are polygons of sixteen corners, and files have round table tops.
+#[test]
+fn lamps_and_blockers_of_many_corners_are_found_exactly() {
+    let mut scene = room(&[]);
+    scene.materials[3].exitance = [0.0; 3];
+    let glow = material(&mut scene, [0.0; 3], 60.0);
+    let grey = material(&mut scene, [0.5; 3], 0.0);
+    body(&mut scene, &[(disc(v(2.0, 2.5, 2.5), 0.3, 16, false), glow)]);
+    body(&mut scene, &[(disc(v(1.9, 1.0, 2.4), 0.4, 30, true), grey)]);
+    solid(&mut scene, v(2.6, 1.2, 2.2), v(3.0, 1.5, 2.6), grey);
+    let session = solved(scene, 0.3);
+    let polygons = polygons(&session);
+    let (mut partly, mut clear) = (0, 0);
+    for (k, seen) in numbers(&cleaned(&session), &view(), Shading::Smooth, SIZE).iter().enumerate()
+    {
+        let normal = DVec3::from_array(seen.normal.map(f64::from));
+        let at = place(&view(), seen, k, SIZE) + normal * 2e-6;
+        let [exact, open] = judged_direct(&polygons, at, normal);
+        partly += u32::from(exact > 0.01 * open && exact < 0.99 * open);
+        clear += u32::from(exact > 0.1 && exact == open);
+        let off = (f64::from(seen.direct[0]) - exact).abs();
+        assert!(off < 1e-3 * open.max(1.0), "{exact} of {open} at {at}: {seen:?}");
+    }
+    assert!(partly > 20 && clear > 20, "{partly} {clear}");
+}
+
 /// A plate lies on half of a lamp in the floor, in its plane, and a box stands on another part: what they cover does not shine. The floor
 /// around the lamp, larger and in its plane, covers nothing.
 #[test]
@@ -200,7 +235,11 @@ fn cleaned_pictures_err_a_third_of_gouraud_ones_and_half_in_penumbrae() {
 
 /// A snapshot with the irradiance of a function, line by line.
 fn with_lines(scene: &Scene, of: impl Fn(DVec3) -> f64) -> Snapshot {
-    let mut snapshot = snapshot(scene, uneven, |_, _, _| [0.0; 3]);
+    with_lines_over(snapshot(scene, uneven, |_, _, _| [0.0; 3]), of)
+}
+
+fn with_lines_over(mut snapshot: Snapshot, of: impl Fn(DVec3) -> f64) -> Snapshot {
+    let scene = std::sync::Arc::clone(&snapshot.scene);
     for k in 0..scene.patches.len() {
         let frame = scene.patches[k].frame;
         for index in snapshot.leaf_offsets[k]..snapshot.leaf_offsets[k + 1] {
@@ -238,6 +277,58 @@ fn light_has_no_seams_between_leaves() {
         let row = shades(f64::from(k) / 16.0);
         let jump = (1..8).map(|i| (row[i].irradiance[0] - row[i - 1].irradiance[0]).abs());
         assert!(jump.fold(0.0, f32::max) < 1e-4, "at {k}: {row:?}");
+    }
+}
+
+/// A slender triangle that points at a wall of squares: what it says beyond its sharp corner ends before it is left out.
+#[test]
+fn light_has_no_seams_beyond_sharp_corners() {
+    let mut scene = empty();
+    let white = material(&mut scene, [0.5; 3], 0.0);
+    let square = |k: u32| {
+        let (x, y) = (0.5 + 0.1 * f64::from(k / 10), 0.1 * f64::from(k % 10));
+        (
+            vec![v(x, y, 0.0), v(x + 0.1, y, 0.0), v(x + 0.1, y + 0.1, 0.0), v(x, y + 0.1, 0.0)],
+            white,
+        )
+    };
+    let mut wall: Vec<_> = (0..100).map(square).collect();
+    wall.push((vec![v(0.0, 0.53, 0.0), v(0.5, 0.55, 0.0), v(0.0, 0.57, 0.0)], white));
+    body(&mut scene, &wall);
+    let first = scene.patches[0].surface;
+    scene.patches.iter_mut().for_each(|patch| patch.surface = first);
+    let whole = snapshot(&scene, |_, _, _| false, |_, _, _| [0.0; 3]);
+    let snapshot = with_lines_over(whole, |p| 3.0 + (3.0 * p.x).sin() + (2.0 * p.y).cos());
+    // Past the corner in steps of a tenth of a millimetre.
+    let world_from_camera = Pose { rotation: DMat3::IDENTITY, translation: v(0.9, 0.55, 1.0) };
+    let projection = Projection::Orthographic { xmag: 0.5, ymag: 1e-4 };
+    let row =
+        numbers(&snapshot, &View { world_from_camera, projection }, Shading::Smooth, (10_000, 2));
+    let on = row[..10_000].windows(2).filter(|pair| pair.iter().all(|seen| seen.body == 1));
+    let steps: Vec<f32> = on.map(|p| (p[1].irradiance[0] - p[0].irradiance[0]).abs()).collect();
+    let most = steps.iter().copied().fold(0.0, f32::max);
+    assert!(steps.len() > 9_000 && most < 3e-3, "{most}");
+}
+
+/// Two halves of a wall that numbers of few digits have bent by two thousandths.
+#[test]
+fn light_has_no_seam_where_a_wall_is_flat_but_for_rounding() {
+    let mut scene = empty();
+    let white = material(&mut scene, [0.5; 3], 0.0);
+    let half = |x: [f64; 2], z: [f64; 2]| {
+        let corners =
+            vec![v(x[0], 0.0, z[0]), v(x[1], 0.0, z[1]), v(x[1], 1.0, z[1]), v(x[0], 1.0, z[0])];
+        (corners, white)
+    };
+    body(&mut scene, &[half([0.0, 1.0], [0.0, 0.0]), half([1.0, 2.0], [0.0, 2e-3])]);
+    let mut snapshot = snapshot(&scene, |_, _, _| false, |_, _, _| [0.0; 3]);
+    snapshot.leaves[0].irradiance = [1.0; 3];
+    snapshot.leaves[1].irradiance = [2.0; 3];
+    let world_from_camera = Pose { rotation: DMat3::IDENTITY, translation: v(1.0, 0.5, 1.0) };
+    let projection = Projection::Orthographic { xmag: 1e-5, ymag: 1e-5 };
+    let view = View { world_from_camera, projection };
+    for seen in &numbers(&snapshot, &view, Shading::Smooth, (8, 2)) {
+        assert!((seen.irradiance[0] - 1.5).abs() < 1e-3, "{seen:?}");
     }
 }
 

@@ -7,11 +7,13 @@ use std::sync::Arc;
 
 use crate::picture::Image;
 
+mod legend;
 mod letters;
 mod palette;
 mod pixels;
 mod svg;
 
+pub use legend::with_legend;
 pub use pixels::animation;
 
 /// A colour: sRGB.

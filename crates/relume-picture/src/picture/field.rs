@@ -20,6 +20,9 @@ const SAME: f64 = 1e-6;
 /// Weight of a leaf that no light arrives at, beside its neighbours: something rests on it, or it would be no brighter beside them.
 const DARK: f64 = 1e-3;
 
+/// Square of the sum of the inward normals of two edges that meet at 60 degrees: sharper corners have a say no further than edges.
+const SHARP: f64 = 1.0;
+
 /// How far a leaf may lead outside the range of its neighbours' means, in parts of that range.
 const BEYOND: f64 = 1.0;
 
@@ -69,20 +72,21 @@ struct Blended {
     centroid: DVec2,
     irradiance: [f64; 3],
     gradient: [DVec2; 3],
-    /// `(a, b, c)` for each edge: `a x + b y + c` is 0 where its say ends beyond the edge and 1 where it is whole.
-    edges: [DVec3; 4],
+    /// `(a, b, c)` for each edge and sharp corner: `a x + b y + c` is 0 where its say ends beyond it and 1 where it is whole.
+    edges: [DVec3; 8],
     edge_count: usize,
     weight: f64,
-    low: DVec2,
-    high: DVec2,
-    reach: f64,
+    /// The box around it.
+    own: [DVec2; 2],
+    /// The box around what it has a say in.
+    heard: [DVec2; 2],
 }
 
 impl Blended {
     fn new(corners: [DVec2; 4], line: &Gathered, gradient: [DVec2; 3]) -> Blended {
         let shape = relume_core::element::Shape { corners, len: 4 };
         let (centroid, area) = (shape.centroid(), shape.area().abs());
-        let mut edges = [DVec3::ZERO; 4];
+        let mut edges = [DVec3::ZERO; 8];
         let mut edge_count = 0;
         let mut reach = f64::INFINITY;
         for k in 0..4 {
@@ -93,6 +97,24 @@ impl Blended {
             edge_count += 1;
         }
         let reach = reach.max(f64::MIN_POSITIVE);
+        let own = box_of(&corners, 0.0);
+        let mut heard = own;
+        let count = edge_count;
+        for k in 0..count {
+            let (before, after) = (edges[(k + count - 1) % count], edges[k]);
+            let Some(corner) = meet(before, after) else { continue };
+            let inward = before.truncate() + after.truncate();
+            let end = if inward.length_squared() >= SHARP {
+                // Where its say ends beyond both.
+                box_of(&[corner - inward * (2.0 * reach / inward.length_squared())], 0.0)
+            } else {
+                let inward = inward.normalize_or_zero();
+                edges[edge_count] = inward.extend(-inward.dot(corner));
+                edge_count += 1;
+                box_of(&[corner], 2.0 * reach)
+            };
+            heard = [heard[0].min(end[0]), heard[1].max(end[1])];
+        }
         for edge in &mut edges[..edge_count] {
             edge.z += reach;
             *edge /= 2.0 * reach;
@@ -106,9 +128,8 @@ impl Blended {
             edges,
             edge_count,
             weight: if is_dark { DARK } else { 1.0 } / area.max(f64::MIN_POSITIVE),
-            low: corners.into_iter().fold(corners[0], DVec2::min),
-            high: corners.into_iter().fold(corners[0], DVec2::max),
-            reach,
+            own,
+            heard,
         }
     }
 
@@ -127,6 +148,19 @@ impl Blended {
         }
         say
     }
+}
+
+/// Where two lines cross; lines as edges are kept.
+fn meet(one: DVec3, other: DVec3) -> Option<DVec2> {
+    let across = one.cross(other);
+    (across.z != 0.0).then(|| across.truncate() / across.z)
+}
+
+/// The box around some points, and so much more on every side.
+fn box_of(points: &[DVec2], more: f64) -> [DVec2; 2] {
+    let low = points.iter().copied().fold(DVec2::INFINITY, DVec2::min);
+    let high = points.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
+    [low - more, high + more]
 }
 
 impl Field {
@@ -183,6 +217,12 @@ impl Field {
         field
     }
 
+    /// Whether two patches lie in one plane of one surface, so that light is continuous over both.
+    pub(super) fn is_one(&self, patch: PatchId, other: PatchId) -> bool {
+        let sheet = |id: PatchId| self.of_patch[id.0 as usize].as_ref().map(|on| on.sheet);
+        sheet(patch) == sheet(other)
+    }
+
     /// The light at a point of a patch's frame, in or right beside one of its leaves, never negative.
     pub(super) fn at(&self, patch: PatchId, leaf: usize, p: DVec2) -> [f64; 3] {
         let Some(on) = &self.of_patch[patch.0 as usize] else { return [0.0; 3] };
@@ -196,7 +236,7 @@ impl Sheet {
         let none = [DVec2::INFINITY, DVec2::NEG_INFINITY];
         self.tree = vec![none; 2 * n];
         for (k, leaf) in self.leaves.iter().enumerate() {
-            self.tree[n + k] = [leaf.low - leaf.reach, leaf.high + leaf.reach];
+            self.tree[n + k] = leaf.heard;
         }
         for k in (1..n).rev() {
             let [a, b] = [self.tree[2 * k], self.tree[2 * k + 1]];
@@ -256,8 +296,9 @@ impl Sheet {
 
     fn find_beside(&self, leaf: u32) -> Vec<u32> {
         let own = &self.leaves[leaf as usize];
-        let beyond = (own.high - own.low) * 0.05;
-        let (low, high) = (own.low - beyond, own.high + beyond);
+        let [low, high] = own.own;
+        let beyond = (high - low) * 0.05;
+        let (low, high) = (low - beyond, high + beyond);
         let n = self.tree.len() / 2;
         let mut found = Vec::new();
         let mut stack = vec![1];

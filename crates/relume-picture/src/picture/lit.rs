@@ -45,7 +45,8 @@ impl<'a> Lit<'a> {
         let mut lit = Lit { snapshot, field, direct, smooth: Smooth::default() };
         let of_corner =
             |patch: PatchId, leaf: usize, at: DVec2| lit.flat(patch, leaf, at).irradiance;
-        lit.smooth = Smooth::lacking(snapshot, &of_corner);
+        let is_one = |patch: PatchId, other: PatchId| lit.field.is_one(patch, other);
+        lit.smooth = Smooth::lacking(snapshot, &of_corner, &is_one);
         lit
     }
 

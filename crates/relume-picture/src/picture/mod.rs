@@ -23,6 +23,8 @@
 //! | `tone` | radiosity to display values and bytes |
 //! | `layers` | what is seen as numbers, and OpenEXR files: [`Layers`] |
 //! | `exposure` | one exposure for a clip |
+//! | `show` | numbers, elements and bodies that a view sees: [`numbers_of`], [`mesh`], [`bodies`] |
+//! | `maps` | numbers as colours: [`Scale`] |
 //! | `sketch` | a rough picture of a scene that is not solved: [`Sketch`] |
 //! | `recording` | light at several instants on one triangulation: [`Recorder`] |
 //! | `image` | pixels and PNG files |
@@ -36,6 +38,7 @@ mod gouraud;
 mod image;
 mod layers;
 mod lit;
+mod maps;
 mod outline;
 mod overview;
 mod printed;
@@ -44,6 +47,7 @@ mod raster;
 mod recording;
 mod render;
 mod shading;
+mod show;
 mod sketch;
 mod smooth;
 mod stitch;
@@ -56,10 +60,12 @@ pub use direct::direct_lamps;
 pub use exposure::{Exposure, Metered};
 pub use image::{Image, WriteError, is_whole_png};
 pub use layers::{Layers, Seen, is_whole_exr, layers};
+pub use maps::{ColourMap, Numbers, Scale};
 pub use outline::Outlines;
 pub use overview::Overview;
 pub use recording::{PatchLight, Recorder, Recording};
 pub use render::{Settings, render};
 pub use shading::Shading;
+pub use show::{bodies, colour_of_body, mesh, numbers_of, numbers_of_leaves};
 pub use sketch::Sketch;
 pub use tone::Tone;

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use relume_core::scene::{BodyId, PatchId, Scene};
 use relume_core::session::{Leaf, Snapshot};
 
-/// Cosine above which neighbours lie in one plane: light on a plane is left as it is.
+/// Cosine above which neighbours lie in one plane but for rounding.
 const FLAT: f64 = 0.999_99;
 
 /// Corners are one if they are no further apart than this, in extents of the scene.
@@ -47,19 +47,33 @@ struct Shared {
 /// place of the corner in the patch's frame.
 type OfCorner<'a> = &'a (dyn Fn(PatchId, usize, DVec2) -> Rgb + Sync);
 
+/// Whether the light of two patches is one function already.
+type IsOne<'a> = &'a (dyn Fn(PatchId, PatchId) -> bool + Sync);
+
 impl Smooth {
     /// Irradiance at corners, by the nearest leaves. Cost O(n log n) in the number of corners.
     pub(super) fn new(snapshot: &Snapshot) -> Smooth {
         let of_leaf = |_, leaf: usize, _| snapshot.leaves[leaf].irradiance.map(f64::from);
-        Smooth::of_all(snapshot, &of_leaf, false)
+        let normal = |patch: PatchId| snapshot.scene.patches[patch.0 as usize].frame.normal;
+        let is_one = |patch, other| normal(patch).dot(normal(other)) >= FLAT;
+        Smooth::of_all(snapshot, &of_leaf, &is_one, false)
     }
 
-    /// What corners lack of the irradiance that they have with their neighbours.
-    pub(super) fn lacking(snapshot: &Snapshot, of_corner: OfCorner<'_>) -> Smooth {
-        Smooth::of_all(snapshot, of_corner, true)
+    /// What corners lack of the irradiance that they have with their neighbours, where that is not one already.
+    pub(super) fn lacking(
+        snapshot: &Snapshot,
+        of_corner: OfCorner<'_>,
+        is_one: IsOne<'_>,
+    ) -> Smooth {
+        Smooth::of_all(snapshot, of_corner, is_one, true)
     }
 
-    fn of_all(snapshot: &Snapshot, of_corner: OfCorner<'_>, lacks: bool) -> Smooth {
+    fn of_all(
+        snapshot: &Snapshot,
+        of_corner: OfCorner<'_>,
+        is_one: IsOne<'_>,
+        lacks: bool,
+    ) -> Smooth {
         let scene = &snapshot.scene;
         let mut smooth = Smooth { corners: vec![Vec::new(); scene.patches.len()] };
         let large_m2 = LARGE * scene.area_m2();
@@ -83,7 +97,8 @@ impl Smooth {
                 }
             }
             let groups: Vec<Vec<Meeting>> = places.into_values().collect();
-            let shared = |meetings: &Vec<Meeting>| shared(meetings, large_m2, scene, &own);
+            let bends = Bends { large_m2, is_one };
+            let shared = |meetings: &Vec<Meeting>| shared(meetings, &bends, scene, &own);
             let found: Vec<Vec<Shared>> = groups.par_iter().map(shared).collect();
             for Shared { meeting, own: had, mean } in found.into_iter().flatten() {
                 let of_patch = &mut smooth.corners[meeting.patch.0 as usize];
@@ -110,19 +125,31 @@ impl Smooth {
     }
 }
 
+/// Which patches go over into their neighbours.
+struct Bends<'a> {
+    /// Area above which patches are walls.
+    large_m2: f64,
+    is_one: IsOne<'a>,
+}
+
+impl Bends<'_> {
+    fn between(&self, own: &Meeting, other: &Meeting) -> bool {
+        let along = own.normal.dot(other.normal);
+        // What is flat but for rounding is so whatever its size.
+        let may = along > SMOOTH && (along >= FLAT || own.area_m2 <= self.large_m2);
+        may && !(self.is_one)(own.patch, other.patch)
+    }
+}
+
 /// What meets at one corner: each small patch gets the mean over those that it goes over into.
 fn shared(
     meetings: &[Meeting],
-    large_m2: f64,
+    bends: &Bends<'_>,
     scene: &Scene,
     own: &impl Fn(PatchId, DVec2) -> Rgb,
 ) -> Vec<Shared> {
-    let bends = |k: usize| {
-        let along = |other: &Meeting| meetings[k].normal.dot(other.normal);
-        let is_bent = |m: &Meeting| (SMOOTH..FLAT).contains(&along(m));
-        meetings[k].area_m2 <= large_m2 && meetings.iter().any(is_bent)
-    };
-    let bent: Vec<usize> = (0..meetings.len()).filter(|&k| bends(k)).collect();
+    let is_bent = |&k: &usize| meetings.iter().any(|other| bends.between(&meetings[k], other));
+    let bent: Vec<usize> = (0..meetings.len()).filter(is_bent).collect();
     if bent.is_empty() {
         return Vec::new();
     }

@@ -6,8 +6,11 @@ use glam::DVec3;
 use relume_core::geometry::{ConvexPolygon, Plane};
 use relume_core::transport::form_factor_from_point;
 
-/// Pieces of a polygon beyond which what is left is taken at fixed points of it.
+/// Pieces of a polygon, more than it begins with, beyond which what is left is taken at fixed points of it.
 const PIECES_MAX: usize = 24;
+
+/// Corners of a blocker at most, so that there is room for those that it cuts into a piece.
+pub(super) const CORNERS_MAX: usize = 8;
 
 /// A convex polygon that hides what is behind it, from both sides.
 #[derive(Clone, Debug)]
@@ -55,6 +58,15 @@ impl Cone {
 }
 
 impl Blocker {
+    /// A convex polygon as one of few corners, or several that have its area together.
+    pub(super) fn parts(corners: &[DVec3]) -> impl Iterator<Item = Vec<DVec3>> {
+        let step = CORNERS_MAX - 2;
+        (1..corners.len().saturating_sub(1)).step_by(step).map(move |from| {
+            let end = corners.len().min(from + step + 1);
+            [&corners[..1], &corners[from..end]].concat()
+        })
+    }
+
     /// How much it hides of a polygon from a point, which is further than `near_m` off its plane or sees it edge on.
     pub(super) fn hides(&self, point: DVec3, target: &[DVec3], near_m: f64) -> Hides {
         let off = self.plane.distance(point);
@@ -85,6 +97,7 @@ impl Blocker {
 /// Cuts polygons; its buffers serve many points.
 #[derive(Default)]
 pub(super) struct Cutter {
+    whole: Vec<DVec3>,
     pieces: Vec<ConvexPolygon>,
     next: Vec<ConvexPolygon>,
     parts: Vec<ConvexPolygon>,
@@ -100,15 +113,13 @@ impl Cutter {
         blockers: &[Blocker],
         near_m: f64,
     ) -> f64 {
-        let start = target.len().min(ConvexPolygon::START_MAX);
-        let mut whole = [DVec3::ZERO; ConvexPolygon::START_MAX];
-        for (to, from) in whole.iter_mut().zip(target) {
-            *to = *from - point;
-        }
-        let whole = &whole[..start];
-        let seen = Cone::new(whole.iter().copied(), 1.0);
+        self.whole.clear();
+        self.whole.extend(target.iter().map(|&corner| corner - point));
+        let seen = Cone::new(self.whole.iter().copied(), 1.0);
         self.pieces.clear();
-        self.pieces.push(ConvexPolygon::new(whole));
+        // A sun has more corners than there is room for.
+        push_parts(&self.whole, ConvexPolygon::START_MAX, &mut self.pieces);
+        let pieces_max = PIECES_MAX + self.pieces.len();
         for (k, blocker) in blockers.iter().enumerate() {
             let off = blocker.plane.distance(point);
             if off.abs() <= near_m {
@@ -122,8 +133,9 @@ impl Cutter {
             if self.pieces.is_empty() {
                 return 0.0;
             }
-            if self.pieces.len() > PIECES_MAX {
-                return at_points(normal, whole, (point, &blockers[k..]), near_m, &self.pieces);
+            if self.pieces.len() > pieces_max {
+                let left = (point, &blockers[k..]);
+                return at_points(normal, &self.whole, left, near_m, &self.pieces);
             }
         }
         let factor =
@@ -133,14 +145,28 @@ impl Cutter {
 
     /// Takes away what is in a cone.
     fn cut(&mut self, cone: &Cone) {
+        let is_beside = |piece: &ConvexPolygon| cone.is_beside(piece.corners().iter().copied());
+        // Most hide nothing of what is left.
+        if self.pieces.iter().all(is_beside) {
+            return;
+        }
         self.next.clear();
-        for piece in &self.pieces {
-            if cone.is_beside(piece.corners().iter().copied()) {
-                self.next.push(*piece);
+        let room = ConvexPolygon::CAPACITY.saturating_sub(cone.planes().len()).max(3);
+        let mut k = 0;
+        while k < self.pieces.len() {
+            let piece = self.pieces[k];
+            k += 1;
+            if is_beside(&piece) {
+                self.next.push(piece);
+                continue;
+            }
+            if piece.corners().len() > room {
+                // Each plane may add a corner.
+                push_parts(piece.corners(), room, &mut self.pieces);
                 continue;
             }
             self.parts.clear();
-            let mut rest = *piece;
+            let mut rest = piece;
             for &normal in cone.planes() {
                 let [inside, outside] = rest.split(&Plane { normal, offset: 0.0 });
                 if outside.corners().len() >= 3 {
@@ -152,12 +178,23 @@ impl Cutter {
                 }
             }
             match rest.corners().len() {
-                0..3 => self.next.push(*piece),
+                0..3 => self.next.push(piece),
                 _ => self.next.append(&mut self.parts),
             }
         }
         std::mem::swap(&mut self.pieces, &mut self.next);
     }
+}
+
+/// A convex polygon as several of at most so many corners.
+fn push_parts(corners: &[DVec3], corners_max: usize, out: &mut Vec<ConvexPolygon>) {
+    if corners.len() <= corners_max {
+        out.push(ConvexPolygon::new(corners));
+        return;
+    }
+    let half = corners.len() / 2;
+    push_parts(&corners[..=half], corners_max, out);
+    push_parts(&[&corners[half..], &corners[..1]].concat(), corners_max, out);
 }
 
 /// Points on a polygon that stand for it.
@@ -171,12 +208,14 @@ fn at_points(
     near_m: f64,
     pieces: &[ConvexPolygon],
 ) -> f64 {
+    let target = Cone::new(whole.iter().copied(), 1.0);
     let cones: Vec<Cone> = blockers
         .iter()
         .filter_map(|blocker| {
             let off = blocker.plane.distance(point);
             let corners = blocker.corners.iter().map(|&c| c - point);
-            (off.abs() > near_m).then(|| Cone::new(corners, off.signum()))
+            let counts = off.abs() > near_m && !target.is_beside(corners.clone());
+            counts.then(|| Cone::new(corners, off.signum()))
         })
         .collect();
     let is_seen = |at: DVec3| {

@@ -20,7 +20,7 @@ use std::sync::OnceLock;
 use glam::{DVec2, DVec3};
 use relume_core::element::WorldView;
 use relume_core::geometry::{Aabb, Plane};
-use relume_core::scene::{Frame, LightId, PatchId};
+use relume_core::scene::{Frame, LightId, Patch, PatchId, World};
 use relume_core::session::{LampLight, Snapshot};
 
 use cut::{Blocker, Cutter};
@@ -45,18 +45,20 @@ pub(super) struct Direct {
     sights: Vec<OnceLock<Sight>>,
 }
 
+/// The plane of a patch in the world; `None` where its body is absent.
+fn frame_of(patch: &Patch, world: &World) -> Option<Frame> {
+    let pose = world.pose(patch.body)?;
+    let Frame { origin, u, v, normal } = patch.frame;
+    let turn = |d| pose.direction(d);
+    Some(Frame { origin: pose.point(origin), u: turn(u), v: turn(v), normal: turn(normal) })
+}
+
 impl Direct {
     /// Cost: proportional to the patches; leaves are looked at when they are asked about.
     pub(super) fn new(snapshot: &Snapshot) -> Direct {
         let (scene, world) = (&snapshot.scene, &snapshot.world);
-        let frame = |patch: &relume_core::scene::Patch| {
-            let pose = world.pose(patch.body)?;
-            let Frame { origin, u, v, normal } = patch.frame;
-            let turn = |d| pose.direction(d);
-            let origin = pose.point(origin);
-            Some(Frame { origin, u: turn(u), v: turn(v), normal: turn(normal) })
-        };
-        let frames: Vec<Option<Frame>> = scene.patches.iter().map(frame).collect();
+        let frames: Vec<Option<Frame>> =
+            scene.patches.iter().map(|patch| frame_of(patch, world)).collect();
         let corners = |k: usize, frame: &Frame| -> Vec<DVec3> {
             scene.patches[k].corners.iter().map(|&c| frame.point(c)).collect()
         };
@@ -69,11 +71,13 @@ impl Direct {
             if scene.is_distant(patch.body) || is_second {
                 continue;
             }
-            let corners = corners(k, frame);
             let own = PatchId(k as u32);
-            known.push(Known { patch: own, twin: patch.twin, area_m2: patch.area_m2() });
-            boxes.push(Aabb::of(corners.iter().copied()));
-            blockers.push(Blocker { plane: Plane::through(frame.origin, frame.normal), corners });
+            for corners in Blocker::parts(&corners(k, frame)) {
+                known.push(Known { patch: own, twin: patch.twin, area_m2: patch.area_m2() });
+                boxes.push(Aabb::of(corners.iter().copied()));
+                let plane = Plane::through(frame.origin, frame.normal);
+                blockers.push(Blocker { plane, corners });
+            }
         }
         let lamp = |lamp: &LampLight| {
             let k = lamp.patch.0 as usize;

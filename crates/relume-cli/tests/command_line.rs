@@ -191,7 +191,7 @@ fn frames_say_how_good_they_are_unless_that_is_off() {
     let file = dir.path().join("report.json");
     let solve = |more: &[&str]| {
         let fixed = ["solve", text(&scene), "--frames", "0-1", "--tolerance", "0.3"];
-        relume(&[&fixed, &["--report", text(&file)], more].concat()).succeeds()
+        relume(&[&fixed[..], &["--report", text(&file)], more].concat()).succeeds()
     };
     let said = solve(&[]).out;
     assert!(said.contains("irradiance is off by about") && said.contains("nine tenths"), "{said}");

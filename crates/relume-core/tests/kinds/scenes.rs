@@ -4,8 +4,11 @@
 use glam::{DQuat, DVec3};
 use relume_core::scene::{MaterialId, NodeId, Scene, SceneBuilder};
 
+/// Draws a scene.
+type Draw = fn(&mut Maker);
+
 /// The scenes, by name.
-pub(crate) const SCENES: &[(&str, fn(&mut Maker))] = &[
+pub(crate) const SCENES: &[(&str, Draw)] = &[
     ("pillar", pillar),
     ("hall of 60 boxes", hall),
     ("door at 22 degrees", |m| door(m, 22.0)),

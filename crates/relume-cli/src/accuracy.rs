@@ -2,18 +2,22 @@
 
 use relume::session::{Accuracy, Frame, Sensor};
 
+use crate::args::AccuracyFlag;
+
 /// The estimates of a run, if any are wanted, and the worst of them.
 #[derive(Debug)]
 pub(crate) struct Estimates {
-    points: Option<usize>,
+    how: AccuracyFlag,
     /// What was looked at, for the line.
     where_: &'static str,
+    /// That of the frame before, which a still frame repeats.
+    last: Option<Accuracy>,
     worst: Option<(u32, Accuracy)>,
 }
 
 impl Estimates {
-    pub(crate) fn new(points: Option<u32>) -> Estimates {
-        Estimates { points: points.map(|n| n as usize), where_: "points of the mesh", worst: None }
+    pub(crate) fn new(how: AccuracyFlag) -> Estimates {
+        Estimates { how, where_: "points of the mesh", last: None, worst: None }
     }
 
     /// Estimates the error of the frame just solved: at an even share of the sensors, or else at points spread over what is lit.
@@ -23,14 +27,23 @@ impl Estimates {
         frame: u32,
         sensors: Option<&[Sensor]>,
     ) -> Option<Accuracy> {
-        let points = self.points?;
-        if sensors.is_some() {
-            self.where_ = "sensors";
-        }
-        let found = match sensors {
-            None => solved.accuracy(points),
-            Some(sensors) => solved.accuracy_at(&some(sensors, points)),
+        // Nothing changed, so neither has the error.
+        let is_still = solved.report().sweeps == 0 && sensors.is_none();
+        let found = match (self.how, sensors) {
+            (AccuracyFlag::Off, _) => return None,
+            (AccuracyFlag::Quick | AccuracyFlag::Points(_), None)
+                if is_still && self.last.is_some() =>
+            {
+                return self.last;
+            }
+            (AccuracyFlag::Quick, _) => solved.estimate(),
+            (AccuracyFlag::Points(points), None) => solved.accuracy(points as usize),
+            (AccuracyFlag::Points(points), Some(sensors)) => {
+                self.where_ = "sensors";
+                solved.accuracy_at(&some(sensors, points as usize))
+            }
         };
+        self.last = Some(found);
         if self.worst.is_none_or(|(_, worst)| found.rms > worst.rms) {
             self.worst = Some((frame, found));
         }
@@ -42,15 +55,18 @@ impl Estimates {
         let Some((frame, found)) = self.worst.filter(|(_, found)| found.points > 0) else {
             return String::new();
         };
-        let Accuracy { points, rms, resolved, largest, largest_at: [x, y, z], .. } = found;
+        let Accuracy { points, rms, nine_tenths, resolved, largest, largest_at, .. } = found;
+        let [x, y, z] = largest_at;
         let percent = |error: f64| match error < resolved {
             true => format!("less than {:.2} %", 100.0 * resolved),
             false => format!("about {:.2} %", 100.0 * error),
         };
         let mut line = format!(
-            "\nframe {frame}: irradiance is off by {} (RMS at {points} {}, most near {x:.3},{y:.3},{z:.3}: {:+.1} %)",
+            "\nframe {frame}: irradiance is off by {} (RMS at {points} {}, nine tenths within {:.2} %, most near \
+             {x:.3},{y:.3},{z:.3}: {:+.1} %)",
             percent(rms),
             self.where_,
+            100.0 * nine_tenths,
             100.0 * largest
         );
         if rms > tolerance && rms > resolved {

@@ -14,8 +14,8 @@ use crate::viewing::ViewFlags;
 mod values;
 
 pub(crate) use values::{
-    By, ClosureFlag, ExactUpdate, ExposureFlag, FactorFormat, FrameFormat, MemorySize, OracleFlag,
-    Shading, Size, UpdateChoice, UpdateFlag,
+    AccuracyFlag, By, ClosureFlag, ExactUpdate, ExposureFlag, FactorFormat, FrameFormat,
+    MemorySize, OracleFlag, Shading, Size, UpdateChoice, UpdateFlag,
 };
 use values::{parse_every, parse_fps, parse_threads, parse_tolerance};
 
@@ -101,6 +101,12 @@ pub(crate) enum Command {
     /// Stops at the first frame that differs, names the first link in question, and exits with 1.
     #[command(after_help = "Example:  relume verify scene.glb --frames 0-48x12 --tolerance 0.1")]
     Verify(VerifyArgs),
+    /// Say where the error of a solution comes from: from which surfaces and places, from the light of lamps or from reflected light.
+    ///
+    /// What the mesh says at points is compared with what arrives there from the elements, with exact visibility. What the elements
+    /// send is taken at its word.
+    #[command(after_help = "Example:  relume errors scene.glb --frames 0 --tolerance 0.1")]
+    Errors(ErrorsArgs),
     /// Do again what a log of commands says was done to a scene, and compare the hashes.
     ///
     /// LOG has a line of JSON for each step: `set_pose` (body, to: axes and translation), `set_presence`,
@@ -406,10 +412,16 @@ pub(crate) struct ProbeArgs {
     /// many sensors, and wrong on either side of a shadow's edge. Sensors must lie on surfaces.
     #[arg(long)]
     pub(crate) interpolate: bool,
-    /// Estimate the error of the rows of each frame at so many of the sensors, by walks along rays. Said at
-    /// the end.
-    #[arg(long, value_name = "SENSORS", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "interpolate")]
-    pub(crate) accuracy: Option<u32>,
+    /// Estimate the error of the rows of each frame at so many of the sensors, by walks along rays, or `off`. Said at the end;
+    /// by default of the mesh, at few points.
+    #[arg(
+        long,
+        value_name = "SENSORS",
+        default_value = "quick",
+        hide_default_value = true,
+        conflicts_with = "interpolate"
+    )]
+    pub(crate) accuracy: AccuracyFlag,
     #[command(flatten)]
     pub(crate) clip: ClipFlags,
     #[command(flatten)]
@@ -549,10 +561,10 @@ pub(crate) struct SolveFlags {
     /// frame, kind, receiver, source, exchange area and visibility before and after.
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     pub(crate) events: Option<PathBuf>,
-    /// Estimate the error of what the mesh says in each frame at so many points, by walks along rays. The report and the last line
-    /// say it.
-    #[arg(long, value_name = "POINTS", value_parser = clap::value_parser!(u32).range(1..))]
-    pub(crate) accuracy: Option<u32>,
+    /// Estimate the error of what the mesh says in each frame at so many points, by walks along rays, or `off`. The report and the
+    /// last line say it; by default it is estimated at fewer, for a tenth of the time of a cold build.
+    #[arg(long, value_name = "POINTS", default_value = "quick", hide_default_value = true)]
+    pub(crate) accuracy: AccuracyFlag,
 }
 
 /// A scene file, or a demonstration instead.
@@ -564,6 +576,18 @@ pub(crate) struct SourceFlags {
     /// Instead of a file, a scene that ships with relume, at its own tolerance by default.
     #[arg(long, value_name = "DEMO", value_enum)]
     pub(crate) demo: Option<DemoScene>,
+}
+
+/// `relume errors`
+#[derive(Debug, Args)]
+pub(crate) struct ErrorsArgs {
+    #[command(flatten)]
+    pub(crate) source: SourceFlags,
+    #[command(flatten)]
+    pub(crate) clip: ClipFlags,
+    /// Points to compare at, most of them where light changes much over an element.
+    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) points: u32,
 }
 
 /// `relume verify`

@@ -8,6 +8,7 @@ mod clip;
 mod clock;
 mod demo;
 mod edits;
+mod errors;
 mod events;
 mod export;
 mod factors;
@@ -71,6 +72,7 @@ fn execute(command: Command) -> Result<(), Failure> {
         Command::Info(args) => info::info(&args),
         Command::Check(args) => check::check(&args),
         Command::Verify(args) => interrupt::listen().and_then(|()| verify::verify(&args)),
+        Command::Errors(args) => interrupt::listen().and_then(|()| errors::errors(&args)),
         Command::Replay(args) => interrupt::listen().and_then(|()| replay::replay(&args)),
         Command::Bench(args) => interrupt::listen().and_then(|()| bench::bench(&args)),
         Command::Flicker(args) => interrupt::listen().and_then(|()| flicker::flicker(&args)),

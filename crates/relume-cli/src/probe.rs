@@ -7,7 +7,7 @@ use relume::scene::{BodyId, Scene};
 use relume::session::{Frame, Sensor, Session};
 
 use crate::accuracy::Estimates;
-use crate::args::ProbeArgs;
+use crate::args::{AccuracyFlag, ProbeArgs};
 use crate::clip::{Clip, TOLERANCE, solved, step_failure};
 use crate::clock::now;
 use crate::failure::Failure;
@@ -43,7 +43,8 @@ pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
     }
     let progress = Progress::new(clip.frames.len(), 0, args.clip.quiet);
     progress.watch(session.watch(), size.pairs());
-    let mut estimates = Estimates::new(args.accuracy);
+    let mut estimates =
+        Estimates::new(if args.clip.quiet { AccuracyFlag::Off } else { args.accuracy });
     let outcome =
         frames((&clip, &mut session), &riders, (args, &mut estimates), &progress, &mut sink);
     progress.clear();

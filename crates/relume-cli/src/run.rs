@@ -17,8 +17,8 @@ use relume_picture::picture::{self, Exposure};
 
 use crate::accuracy::Estimates;
 use crate::args::{
-    DemoArgs, ExposureFlag, FrameFormat, PictureFlags, RenderArgs, Shading, SolveArgs, SolveFlags,
-    UpdateFlag,
+    AccuracyFlag, DemoArgs, ExposureFlag, FrameFormat, PictureFlags, RenderArgs, Shading,
+    SolveArgs, SolveFlags, UpdateFlag,
 };
 use crate::clip::{self, Clip, PICTURE_TOLERANCE, TOLERANCE, fixed};
 use crate::clock::now;
@@ -230,7 +230,11 @@ impl Job {
             links: 0,
             energy: None,
             suspects: Vec::new(),
-            estimates: Estimates::new(self.solve.accuracy),
+            estimates: Estimates::new(match self.quiet() && self.report_paths().is_empty() {
+                // Nobody would read it.
+                true => AccuracyFlag::Off,
+                false => self.solve.accuracy,
+            }),
         })
     }
 

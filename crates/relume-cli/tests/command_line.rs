@@ -177,11 +177,36 @@ fn solve_prints_a_summary_and_writes_a_report() {
         "row_sum_error",
         "energy",
         "unbalanced",
+        "accuracy",
         "hash",
         "seconds",
     ];
     expected.sort_unstable();
     assert_eq!(keys, expected);
+}
+
+#[test]
+fn frames_say_how_good_they_are_unless_that_is_off() {
+    let (dir, scene) = room();
+    let file = dir.path().join("report.json");
+    let solve = |more: &[&str]| {
+        let fixed = ["solve", text(&scene), "--frames", "0-1", "--tolerance", "0.3"];
+        relume(&[&fixed[..], &["--report", text(&file)], more].concat()).succeeds()
+    };
+    let said = solve(&[]).out;
+    assert!(said.contains("irradiance is off by about") && said.contains("nine tenths"), "{said}");
+    let accuracy = json(&file)["frames"][1]["accuracy"].clone();
+    assert!(accuracy["points"].as_u64().unwrap() >= 4, "{accuracy}");
+    let rms = accuracy["rms"].as_f64().unwrap();
+    assert!(rms > 0.0 && rms < 1.0, "{accuracy}");
+    // The same numbers again, on any number of threads.
+    solve(&["--threads", "1"]);
+    assert_eq!(json(&file)["frames"][1]["accuracy"], accuracy);
+    let said = solve(&["--accuracy", "off"]).out;
+    assert!(!said.contains("irradiance is off"), "{said}");
+    assert!(json(&file)["frames"][1]["accuracy"].is_null());
+    let said = relume(&["errors", text(&scene), "--frames", "0", "--tolerance", "0.3"]).succeeds();
+    assert!(said.out.starts_with("frame 0\n") && said.out.contains("W/m2 said"), "{}", said.out);
 }
 
 #[test]

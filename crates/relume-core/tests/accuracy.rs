@@ -3,7 +3,7 @@
 use crate::common::{at_tolerance, facing_up, flipped, judged, lit_room, v};
 use glam::{DQuat, DVec3};
 use relume_core::scene::{MaterialId, Scene, SceneBuilder};
-use relume_core::session::{Sensor, Session};
+use relume_core::session::{PointError, Sensor, Session};
 use relume_judge::path::{self, Site};
 use relume_judge::{Random, World};
 
@@ -101,6 +101,58 @@ fn a_solution_knows_its_own_error() {
         }
     }
     assert!(found_alike.iter().all(|alike| *alike), "{found_alike:?}");
+}
+
+#[test]
+fn every_solution_is_told_how_good_it_is_in_little_time() {
+    for (scene, tolerance) in [(lit_room(), 0.1), (behind_a_slit(), 0.2), (between_blocks(), 0.1)] {
+        let scene = Arc::new(scene);
+        let said = [0, 1].map(|_| {
+            let mut session = Session::new(Arc::clone(&scene), at_tolerance(tolerance)).unwrap();
+            let report = session.step(0, 0.0).unwrap();
+            let frame = session.frame().unwrap();
+            (frame.estimate(), report, frame.errors(1024))
+        });
+        let (few, report, many) = &said[0];
+        assert_eq!(*few, said[1].0);
+        let links = f64::from(few.points) * (report.leaves as f64).sqrt();
+        assert!(few.points >= 4 && links <= 0.1 * report.links as f64, "{few:?}");
+        let share = many.iter().map(|point| point.share).sum::<f64>();
+        assert!((share - 1.0).abs() < 0.1, "{share}");
+        let square = many.iter().map(|p| p.share * p.relative().powi(2)).sum::<f64>() / share;
+        println!("{}: {few:?}, {:.2} % at many", scene.name, 100.0 * square.sqrt());
+        let ratio = few.rms / square.sqrt();
+        assert!((0.5..2.0).contains(&ratio), "{}: {few:?}, {ratio} of many", scene.name);
+    }
+}
+
+#[test]
+fn what_is_gathered_to_check_a_solution_is_right() {
+    let scene = Arc::new(between_blocks());
+    let mut session = Session::new(Arc::clone(&scene), at_tolerance(0.1)).unwrap();
+    session.step(0, 0.0).unwrap();
+    let points = session.frame().unwrap().errors(96);
+    let patch = |k: usize| &scene.patches[points[k].patch.0 as usize];
+    let sites: Vec<Site> =
+        (0..points.len()).map(|k| Site::point(points[k].at, patch(k).frame.normal)).collect();
+    let world = World::new(judged::polygons(&scene, 0.0));
+    let truth = path::irradiance(&world, &sites, 400, 1);
+    let all = |e: [f64; 3]| e.iter().sum::<f64>();
+    // Not in the gap of 1 cm below the blocks, in which what elements send is wrong already.
+    let mean = truth.iter().map(|t| all(t.irradiance)).sum::<f64>() / truth.len() as f64;
+    let lit = || points.iter().zip(&truth).filter(|(_, t)| all(t.irradiance) > 0.2 * mean);
+    let rms = |of: &dyn Fn(&PointError) -> f64| {
+        let square = |(p, t): (&PointError, &path::Estimate)| {
+            let right = all(t.irradiance);
+            let noise: f64 = t.standard_error.iter().map(|s| s * s).sum();
+            p.share * ((of(p) - right).powi(2) - 3.0 * noise) / of(p).max(right).powi(2)
+        };
+        let (sum, share) = (lit().map(square).sum::<f64>(), lit().map(|l| l.0.share).sum::<f64>());
+        (sum / share).max(0.0).sqrt()
+    };
+    let (mesh, gathered) = (rms(&|p| p.said), rms(&|p| p.arrives));
+    println!("mesh {:.2} %, gathered {:.2} %", 100.0 * mesh, 100.0 * gathered);
+    assert!(gathered < 0.4 * mesh, "{gathered} of {mesh}");
 }
 
 /// A closed room of 5 x 4 x 3 m in which every surface emits 1 W/m2 and reflects 0.8: with blocks that stand 0.3 m apart, all

@@ -18,6 +18,7 @@ mod gather;
 mod groups;
 mod incremental;
 mod kept;
+mod kinds;
 mod laws;
 mod lights;
 mod limits;

@@ -99,7 +99,7 @@ pub use relume_core::scene::{
 pub use relume_core::session::{
     Accuracy, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Flux,
     Frame, FrameReport, Gathered, Grouping, Hash, LampLight, Leaf, Memory, Mesh, Open, Options,
-    Oracle, PairCounts, Removed, RowSumError, Seconds, Sensor, Session, SessionError, Snapshot,
-    Update, Watch, Work,
+    Oracle, PairCounts, PointError, Removed, RowSumError, Seconds, Sensor, Session, SessionError,
+    Snapshot, Update, Watch, Work,
 };
 pub use relume_io::{ImportOptions, Log, LogError, import, read_environment};

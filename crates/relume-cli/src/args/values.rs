@@ -259,6 +259,30 @@ impl fmt::Display for Size {
     }
 }
 
+/// How the error of frames is estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum AccuracyFlag {
+    /// As far as a tenth of the time of a cold build goes.
+    Quick,
+    /// By walks at so many points.
+    Points(u32),
+    /// Not at all.
+    Off,
+}
+
+impl FromStr for AccuracyFlag {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<AccuracyFlag, String> {
+        match (text, text.parse()) {
+            ("quick", _) => Ok(AccuracyFlag::Quick),
+            ("off", _) => Ok(AccuracyFlag::Off),
+            (_, Ok(points @ 1..)) => Ok(AccuracyFlag::Points(points)),
+            _ => Err("write `off` or a number of points from 1 on".into()),
+        }
+    }
+}
+
 impl FromStr for ExposureFlag {
     type Err = String;
 

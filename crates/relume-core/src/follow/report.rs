@@ -110,7 +110,8 @@ impl Energy {
 
 /// Estimated errors of irradiance at some points, relative to the irradiance there (sum of the channels), dimensionless: of the
 /// mesh (`Snapshot::irradiance_at`), or of what sensors read (`Frame::irradiance_at`), as it was asked for. Estimated, not
-/// bounded.
+/// bounded. By `Frame::estimate` all but `largest` are relative to the larger of what is said and what arrives: a dark place that
+/// is said to be bright is wholly wrong, and no more.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Accuracy {
@@ -118,6 +119,8 @@ pub struct Accuracy {
     pub points: u32,
     /// Root mean square of the errors over the points.
     pub rms: f64,
+    /// Size of error that nine tenths of the points, each for the area that it stands for, do not exceed.
+    pub nine_tenths: f64,
     /// Root mean square error that these points and walks can tell from none: of what is below, `rms` says nothing.
     pub resolved: f64,
     /// Mean of the errors, with its sign: positive where the solution is too bright.

@@ -32,6 +32,27 @@ impl Bends<'_> {
         out
     }
 
+    /// The same of one leaf of a facet. Cost: a pass over the links of all elements above it.
+    pub(super) fn of_leaf(&self, facet: u32, leaf: u32) -> Linear {
+        let forest = &self.solved.space.forest;
+        let mut above = vec![leaf];
+        while let Some(&id) = above.last()
+            && id != facet
+            && let Some(ElementId(parent)) = forest.parent(ElementId(id))
+        {
+            above.push(parent);
+        }
+        let mut whole = Polynomial::default();
+        for pair in above.windows(2).rev() {
+            let [child, id] = [pair[0], pair[1]];
+            self.add_own(id, &mut whole);
+            let centroid = |id| forest.extent(ElementId(id)).centroid;
+            let to = centroid(child) - centroid(id);
+            whole = about(&whole, to.x, to.y);
+        }
+        over_leaf(forest, leaf, &whole)
+    }
+
     fn push(&self, id: u32, inherited: Polynomial, out: &mut Vec<Linear>) {
         let forest = &self.solved.space.forest;
         let children = forest.children(ElementId(id));

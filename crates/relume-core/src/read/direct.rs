@@ -26,6 +26,16 @@ pub(super) fn of(
     radiosity: &Radiosity,
     lamps: &[LampLight],
 ) -> Snapshot {
+    snapshot::take(solved, links, &self::radiosity(solved, links, radiosity, lamps))
+}
+
+/// That light, as the links have it.
+pub(super) fn radiosity(
+    solved: &Solved,
+    links: &Links,
+    radiosity: &Radiosity,
+    lamps: &[LampLight],
+) -> Radiosity {
     let mut emitted = vec![[0.0; 3]; solved.space.scene.patches.len()];
     lamps.iter().for_each(|lamp| emitted[lamp.patch.0 as usize] = lamp.exitance);
     let forest = &solved.space.forest;
@@ -40,6 +50,5 @@ pub(super) fn of(
             below.extend(forest.children(id).map(ElementId));
         }
     }
-    let direct = beginning.of_emission(&surfaces, links);
-    snapshot::take(solved, links, &direct)
+    beginning.of_emission(&surfaces, links)
 }

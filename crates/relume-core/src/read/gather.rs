@@ -17,7 +17,7 @@ use crate::transport::{
 use crate::space::{Solved, place_of};
 
 use super::choice::at_share;
-use super::tuning::{GAP_FAR, GATHER_FAR, GATHER_PART};
+use super::tuning::{CHECK_FAR, GAP_FAR, GATHER_FAR, GATHER_PART};
 use crate::read::tuning::SENSOR_SPLITS;
 
 /// A place and a direction at which irradiance is asked for.
@@ -43,6 +43,8 @@ pub(super) enum Purpose {
     Sensor,
     /// A point that a sensor sees: leaves are taken at their word.
     Beyond,
+    /// A point at which a solution is checked: as beyond, and what is far or brings little is taken as a whole.
+    Check,
 }
 
 /// A sensor looking at a solved scene.
@@ -60,6 +62,8 @@ pub(super) struct Look<'a> {
     reach_m: f64,
     /// Radius of a part over its distance, at most, outside gaps.
     part_size: f64,
+    /// Irradiance below which one ray tells if a patch is in view, W/m2, sum of channels; 0 where none does.
+    little_w_m2: f64,
 }
 
 /// What a point gathers.
@@ -124,7 +128,13 @@ impl<'a> Look<'a> {
             purpose,
             reach_m: 0.0,
             part_size: if purpose == Purpose::Sensor { GATHER_PART } else { 1.0 },
+            little_w_m2: 0.0,
         }
+    }
+
+    /// The same look, in which one ray tells if a patch that brings less than this is in view, W/m2, sum of channels.
+    pub(super) fn rougher_below(self, little_w_m2: f64) -> Look<'a> {
+        Look { little_w_m2, ..self }
     }
 
     /// The same look, that takes no leaf at its word up to a distance.
@@ -169,6 +179,9 @@ impl<'a> Look<'a> {
         if !before || polygon.corners.iter().all(|&c| self.tangent.distance(c) <= self.slack_m) {
             return;
         }
+        if self.little_w_m2 > 0.0 && self.add_little(root, out) {
+            return;
+        }
         let occluders = self.between(patch, rounding_m);
         let all: Vec<&Occluder> = occluders.iter().collect();
         let mut stack = vec![root];
@@ -178,6 +191,30 @@ impl<'a> Look<'a> {
                 _ => stack.extend(self.forest.children(id).rev().map(ElementId)),
             }
         }
+    }
+
+    /// Adds a patch that brings little, if it does: in view or not, as its middle is.
+    fn add_little(&self, root: ElementId, out: &mut Gathered) -> bool {
+        if self.forest.kind(root) != Kind::Element {
+            return false;
+        }
+        let e = WorldElement::new(&self.solved.space.view, self.forest, root, false);
+        let seen = self.in_front(&e);
+        if seen.len() < 3 {
+            return true;
+        }
+        let factor = form_factor_from_point(self.point, self.normal, &seen);
+        let b = self.solved.radiosity.radiosity(root.0).map(f64::from);
+        let brings = factor * b.iter().sum::<f64>();
+        if brings >= self.little_w_m2 {
+            return false;
+        }
+        let at = seen.iter().sum::<DVec3>() / seen.len() as f64;
+        let view = &self.solved.space.view;
+        if brings > 0.0 && segment_is_clear(view, self.forest, self.point, at, self.slack_m) {
+            (0..3).for_each(|c| out.sum[c] += factor * b[c]);
+        }
+        true
     }
 
     /// What stands between the point and a patch, in the order of the forest.
@@ -229,7 +266,11 @@ impl<'a> Look<'a> {
         let Some(in_the_way) = self.in_the_way(&seen, occluders) else { return };
         let children = self.forest.children(id);
         let distance = (e.centre - self.point).length();
-        let far = if self.reach_m > 0.0 { GAP_FAR } else { GATHER_FAR };
+        let far = match self.purpose {
+            Purpose::Check => CHECK_FAR,
+            _ if self.reach_m > 0.0 => GAP_FAR,
+            _ => GATHER_FAR,
+        };
         let as_one = in_the_way.is_empty() && e.radius < far * distance;
         if !children.is_empty() && !as_one {
             children.for_each(|child| self.add_element(ElementId(child), &in_the_way, out));
@@ -240,7 +281,8 @@ impl<'a> Look<'a> {
         if self.purpose == Purpose::Sensor && is_near {
             return self.add_parts(id, &seen, (&in_the_way, SENSOR_SPLITS), &mut out.parts);
         }
-        let (factor, b) = if in_the_way.is_empty() && !is_near {
+        let as_mean = in_the_way.is_empty() && !is_near && self.purpose != Purpose::Check;
+        let (factor, b) = if as_mean {
             let factor = form_factor_from_point(self.point, self.normal, &seen);
             (factor, self.solved.radiosity.radiosity(id.0))
         } else {
@@ -253,7 +295,7 @@ impl<'a> Look<'a> {
             return;
         }
         let sent = b.map(|b| factor * f64::from(b));
-        if is_near {
+        if is_near && self.purpose != Purpose::Check {
             out.near.push(Near { leaf: id, factor, sent });
             return;
         }

@@ -8,6 +8,7 @@ mod choice;
 mod coarse_values;
 mod compare;
 mod direct;
+mod estimate;
 mod events;
 mod factors;
 mod fluxes;
@@ -26,6 +27,7 @@ mod tuning;
 
 pub use coarse_values::{CoarseQuantity, CoarseValue};
 pub use compare::{Difference, RadiosityGap, Which, compare, radiosity_gap};
+pub use estimate::PointError;
 pub use events::{Event, EventKind};
 pub use factors::{Closure, Factors, Grouping, Open, PartFactors};
 pub use fluxes::Flux;

@@ -99,6 +99,64 @@ pub(super) const SEEN_MIN: f64 = 1e-3;
 /// - Smaller: time of sensors
 pub(super) const GATHER_FAR: f64 = 1.0 / 32.0;
 
+/// Radius of an element in plain view over its distance, up to which it is taken as a whole where a solution is checked.
+///
+/// - Unit: 1
+/// - Tried: 1/4
+/// - Larger: errors of estimates beside uneven surfaces
+/// - Smaller: time of estimates
+pub(super) const CHECK_FAR: f64 = 0.25;
+
+/// What a patch brings to a point at which a solution is checked, over tolerance and irradiance, below which one ray tells if it
+/// is in view.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: noise of estimates among many bodies
+/// - Smaller: time of estimates
+pub(super) const CHECK_LITTLE: f64 = 0.02;
+
+/// Points of the estimate that every frame gets, at least and at most.
+///
+/// - Unit: points
+/// - Tried: 16, 32, 64, 256 on the scenes of `tests/kinds`
+/// - Larger: time of frames
+/// - Smaller: errors in few places are missed
+pub(super) const CHECK_POINTS: (usize, usize) = (4, 128);
+
+/// Cost of that estimate over that of a cold build, which is counted in links, a point costing as many as the root of the leaves and
+/// `CHECK_COST_PER_PATCH` for each patch.
+///
+/// - Unit: 1
+/// - Tried: 1/10, as asked for
+/// - Larger: time of frames
+/// - Smaller: errors in few places are missed
+pub(super) const CHECK_SHARE: f64 = 0.1;
+
+/// Links that are judged in a cold build in the time in which a point looks for what may stand before one patch.
+///
+/// - Unit: links
+/// - Tried: fitted to a room of 19 patches and a hall of 368
+/// - Larger: fewer points among many patches
+/// - Smaller: time of frames among many patches
+pub(super) const CHECK_COST_PER_PATCH: f64 = 1.0 / 6.0;
+
+/// Share of the points of an estimate that is spread evenly over all lit leaves, the rest by squared slope of irradiance.
+///
+/// - Unit: 1
+/// - Tried: 0.3, 1 (one of four estimates within a factor of 1.5 at 64 points in place of three)
+/// - Larger: few points where errors are
+/// - Smaller: errors in leaves of even light are missed
+pub(super) const DRAWN_EVENLY: f64 = 0.3;
+
+/// Squared rise of irradiance over a leaf, relative, up to which it gets more points.
+///
+/// - Unit: 1
+/// - Tried: 4
+/// - Larger: all points in the darkest leaves
+/// - Smaller: few points where errors are
+pub(super) const DOUBT_MAX: f64 = 4.0;
+
 /// Radius of a part of a leaf over its distance from the sensor, at most: what leaves it is found at its middle.
 ///
 /// - Unit: 1

@@ -27,8 +27,8 @@ pub use crate::pair::Work;
 pub use crate::read::{
     Closure, CoarseQuantity, CoarseValue, Difference, ElementName, Elements, Event, EventKind,
     Factors, Flux, Frame, Gathered, Grouping, Hash, LampLight, Leaf, Mesh, Missed, Open,
-    PartFactors, RadiosityError, RadiosityGap, Sensor, Snapshot, Which, compare, missed,
-    radiosity_error, radiosity_gap,
+    PartFactors, PointError, RadiosityError, RadiosityGap, Sensor, Snapshot, Which, compare,
+    missed, radiosity_error, radiosity_gap,
 };
 
 use replant::{Edited, Start};

@@ -77,3 +77,38 @@ fn frames_of_white_rooms_agree_with_cold_builds() {
         }
     }
 }
+
+/// Light made of nothing by a lamp of both sides below a ceiling, over what it emits.
+fn made_below_a_ceiling(height_m: f64, turn: f64, thick_m: f64) -> f64 {
+    let mut b = SceneBuilder::new("lamp");
+    let wall = b.material("wall", [0.9; 3], [0.0; 3]);
+    let room = still(&mut b, "room");
+    b.cuboid_inward(room, "walls", wall, DVec3::ZERO, v(3.0, 4.0, 2.7));
+    let at = v(1.3, 1.1, 2.7 - height_m);
+    let lamp = b.node("lamp", None, at, DQuat::from_rotation_z(turn));
+    if thick_m > 0.0 {
+        let glow = b.material("glow", [0.3; 3], [30.0; 3]);
+        b.cuboid(lamp, "lamp", glow, v(-0.2, -0.25, -thick_m), v(0.2, 0.25, 0.0));
+    } else {
+        let glow = b.double_sided_material("glow", [0.3; 3], [30.0; 3]);
+        let corners = [(-0.2, -0.25), (0.2, -0.25), (0.2, 0.25), (-0.2, 0.25)];
+        b.polygon(lamp, "lamp", glow, &corners.map(|(x, y)| v(x, y, 0.0)));
+    }
+    let mut session = Session::new(b.build().unwrap(), at_tolerance(0.1)).unwrap();
+    let report = session.solve_at(0.0).unwrap().report().clone();
+    let energy = report.energy.unwrap();
+    let off = (energy.absorbed_w - energy.emitted_w) / energy.emitted_w;
+    println!("{height_m} m, turned by {turn}, {thick_m} m thick: {off:.5}, {} links", report.links);
+    off
+}
+
+#[test]
+fn lamps_close_below_a_ceiling_give_the_room_no_more_than_they_emit() {
+    let heights = [2e-4, 1e-3, 4e-3, 1.2e-2];
+    for (height_m, turn) in heights.iter().flat_map(|&h| [(h, 0.0), (h, 0.5)]) {
+        for thick_m in [0.0, 0.03] {
+            let off = made_below_a_ceiling(height_m, turn, thick_m);
+            assert!(off.abs() <= ASTRAY_MAX, "{height_m} m, turned by {turn}: {off}");
+        }
+    }
+}

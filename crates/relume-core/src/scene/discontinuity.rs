@@ -6,10 +6,10 @@
 
 use glam::{DVec2, DVec3};
 
-use super::gap::{PARALLEL, widest_m};
+use super::gap::PARALLEL;
 use super::{BodyId, Patch, PatchId, Scene};
 use crate::geometry::{Aabb, Plane, Pose, Segment, segment_within};
-use crate::scene::tuning::HINGE_INSTANTS;
+use crate::scene::tuning::{END_WITHIN, HINGE_INSTANTS};
 
 /// What lies this close to a plane, as a share of the largest coordinate, lies in it: a few roundings of 32-bit numbers.
 const IN_PLANE: f64 = 1e-6;
@@ -126,7 +126,7 @@ impl Scene {
         }
     }
 
-    /// Whether the polygon `by` lies before `of`, parallel to it, with a narrow gap between.
+    /// Whether the polygon `by` lies before `of`, parallel to it, close for their sizes.
     fn is_close_before(&self, (of, by): (&Placed, &Placed), slack_m: f64) -> bool {
         let [of_frame, by_frame] = [of, by].map(|p| self.patches[p.id.0 as usize].frame);
         let plane = Plane::through(of_frame.origin, of_frame.normal);
@@ -202,7 +202,7 @@ struct Placed {
     id: PatchId,
     corners: Vec<DVec3>,
     bounds: Aabb,
-    /// Width of the widest narrow gap that the patch may be at, metres.
+    /// Distance within which others end close before the patch, metres.
     widest_m: f64,
 }
 
@@ -212,7 +212,7 @@ impl Placed {
         let bounds = Aabb::of(corners.iter().copied());
         let n = corners.len();
         let border_m: f64 = (0..n).map(|k| corners[k].distance(corners[(k + 1) % n])).sum();
-        let widest_m = 0.1 * (4.0 * scene.patches[id.0 as usize].area_m2() / border_m);
+        let widest_m = END_WITHIN * 4.0 * scene.patches[id.0 as usize].area_m2() / border_m;
         Placed { id, corners, bounds, widest_m }
     }
 }

@@ -30,7 +30,7 @@ fn between_blocks() -> Scene {
     b.cuboid_inward(node, "room", grey, DVec3::ZERO, v(5.0, 4.0, 3.0));
     let add = |b: &mut SceneBuilder, k: u32, grey: MaterialId| {
         let x = 0.8 + 0.7 * f64::from(k);
-        b.cuboid(node, &format!("block {k}"), grey, v(x, 1.0, 0.01), v(x + 0.4, 3.0, 2.0));
+        b.cuboid(node, &format!("block {k}"), grey, v(x, 1.0, 0.0), v(x + 0.4, 3.0, 2.0));
     };
     (0..5).for_each(|k| add(&mut b, k, grey));
     b.polygon(node, "lamp", glow, &flipped(facing_up([0.5, 4.5], [0.2, 0.7], 2.9)));
@@ -138,7 +138,7 @@ fn what_is_gathered_to_check_a_solution_is_right() {
     let world = World::new(judged::polygons(&scene, 0.0));
     let truth = path::irradiance(&world, &sites, 400, 1);
     let all = |e: [f64; 3]| e.iter().sum::<f64>();
-    // Not in the gap of 1 cm below the blocks, in which what elements send is wrong already.
+    // Not where it is dark: what elements send there is wrong already.
     let mean = truth.iter().map(|t| all(t.irradiance)).sum::<f64>() / truth.len() as f64;
     let lit = || points.iter().zip(&truth).filter(|(_, t)| all(t.irradiance) > 0.2 * mean);
     let rms = |of: &dyn Fn(&PointError) -> f64| {

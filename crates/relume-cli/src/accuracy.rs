@@ -58,16 +58,17 @@ impl Estimates {
         let Accuracy { points, rms, nine_tenths, resolved, largest, largest_at, .. } = found;
         let [x, y, z] = largest_at;
         let percent = |error: f64| match error < resolved {
-            true => format!("less than {:.2} %", 100.0 * resolved),
-            false => format!("about {:.2} %", 100.0 * error),
+            true => format!("less than {}", in_percent(resolved)),
+            false => format!("about {}", in_percent(error)),
         };
         let mut line = format!(
-            "\nframe {frame}: irradiance is off by {} (RMS at {points} {}, nine tenths within {:.2} %, most near \
-             {x:.3},{y:.3},{z:.3}: {:+.1} %)",
+            "\nframe {frame}: irradiance is off by {} (RMS at {points} {}, nine tenths within {}, \
+             largest {} too {} at {x:.3},{y:.3},{z:.3})",
             percent(rms),
             self.where_,
-            100.0 * nine_tenths,
-            100.0 * largest
+            in_percent(nine_tenths),
+            in_percent(largest.abs()),
+            if largest > 0.0 { "bright" } else { "dark" },
         );
         if rms > tolerance && rms > resolved {
             line += &format!(
@@ -91,4 +92,13 @@ fn finer(tolerance: f64, rms: f64) -> f64 {
     let wanted = tolerance * (tolerance / rms).powi(2).clamp(0.2, 0.5);
     let unit = 10_f64.powf(wanted.log10().floor());
     unit * (wanted / unit).floor().max(1.0)
+}
+
+/// A share in per cent, to two digits.
+fn in_percent(share: f64) -> String {
+    match 100.0 * share {
+        x if x < 1.0 => format!("{x:.2} %"),
+        x if x < 10.0 => format!("{x:.1} %"),
+        x => format!("{x:.0} %"),
+    }
 }

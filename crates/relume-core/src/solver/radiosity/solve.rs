@@ -171,34 +171,63 @@ impl Radiosity {
         }
     }
 
-    /// Whether little light is made or lost. Of levelled leaves nothing escapes, and all that arrives was sent. Else facets whose rows
-    /// sum to more than 1 in this light may make little of nothing, and all facets together next to nothing.
+    /// Whether little light is made or lost.
     fn is_balanced(&self, surfaces: &impl Surfaces, links: &Links, rows: &RowScaling) -> bool {
+        match self.levels.is_none() {
+            true => self.makes_little(surfaces, links, rows),
+            false => self.levels_keep_light(surfaces, links, rows),
+        }
+    }
+
+    /// Whether facets whose rows sum to more than 1 in this light make little of nothing, and all facets together next to nothing.
+    fn makes_little(&self, surfaces: &impl Surfaces, links: &Links, rows: &RowScaling) -> bool {
         let mut emitted = self.light_arriving_w(surfaces, links);
-        let (mut made, mut of_all, mut closed, mut unaccounted) = (0.0, 0.0, 0.0, emitted);
+        let (mut made, mut of_all) = (0.0, 0.0);
         for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
-            let FacetMaterial { exitance, reflectance } = surfaces.material(facet.0);
+            let exitance = surfaces.material(facet.0).exitance;
             let mut of_facet = 0.0;
-            self.irradiances(surfaces, facet.0, &mut |leaf, h| {
-                let area = surfaces.area_m2(leaf);
-                let row = &rows.rows[leaf as usize];
-                let (b, carried) = (self.radiosity(leaf), self.carried(surfaces, leaf, row));
-                for c in 0..3 {
-                    let escapes = area * (f64::from(b[c]) - carried[c]);
-                    let absorbed = (1.0 - reflectance[c]) * h.mean[c].max(0.0);
-                    of_facet += area * (f64::from(row.mean) - 1.0) * f64::from(b[c]);
-                    emitted += area * f64::from(exitance[c]);
-                    unaccounted += area * f64::from(exitance[c] - absorbed) - escapes;
-                    closed += if self.levels.is_closed(leaf) { escapes } else { 0.0 };
+            for_each_below(surfaces, facet.0, &mut |leaf| {
+                if surfaces.children(leaf).is_empty() {
+                    let area = surfaces.area_m2(leaf);
+                    let excess = area * (f64::from(rows.rows[leaf as usize].mean) - 1.0);
+                    let b = self.radiosity(leaf);
+                    for c in 0..3 {
+                        of_facet += excess * f64::from(b[c]);
+                        emitted += area * f64::from(exitance[c]);
+                    }
                 }
             });
             made += of_facet.max(0.0);
             of_all += of_facet;
         }
-        if !self.levels.is_none() {
-            return closed.abs().max(unaccounted.abs()) <= ASTRAY_MAX * emitted;
-        }
         made.max(of_all) <= COARSE_MADE_MAX * emitted
+    }
+
+    /// Whether nothing escapes of levelled leaves, and all that arrives was sent, but for `ASTRAY_MAX` of what is emitted.
+    fn levels_keep_light(
+        &self,
+        surfaces: &impl Surfaces,
+        links: &Links,
+        rows: &RowScaling,
+    ) -> bool {
+        let mut emitted = self.light_arriving_w(surfaces, links);
+        let (mut closed, mut unaccounted) = (0.0, emitted);
+        for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
+            let FacetMaterial { exitance, reflectance } = surfaces.material(facet.0);
+            self.irradiances(surfaces, facet.0, &mut |leaf, h| {
+                let area = surfaces.area_m2(leaf);
+                let b = self.radiosity(leaf);
+                let carried = self.carried(surfaces, leaf, &rows.rows[leaf as usize]);
+                for c in 0..3 {
+                    let escapes = area * (f64::from(b[c]) - carried[c]);
+                    let absorbed = (1.0 - reflectance[c]) * h.mean[c].max(0.0);
+                    emitted += area * f64::from(exitance[c]);
+                    unaccounted += area * f64::from(exitance[c] - absorbed) - escapes;
+                    closed += if self.levels.is_closed(leaf) { escapes } else { 0.0 };
+                }
+            });
+        }
+        closed.abs().max(unaccounted.abs()) <= ASTRAY_MAX * emitted
     }
 
     /// Whether surfaces receive of each other what they send, but for `LOST_MAX` of what is emitted: with factors, as lines may

@@ -62,8 +62,8 @@ impl Estimates {
             false => format!("about {}", in_percent(error)),
         };
         let mut line = format!(
-            "\nframe {frame}: irradiance is off by {} (RMS at {points} {}, nine tenths within {}, \
-             largest {} too {} at {x:.3},{y:.3},{z:.3})",
+            "\nframe {frame}: irradiance is off by {} (RMS at {points} {}; nine tenths within {}; \
+             largest {} too {} at {x:.3} {y:.3} {z:.3})",
             percent(rms),
             self.where_,
             in_percent(nine_tenths),

@@ -412,12 +412,11 @@ pub(crate) struct ProbeArgs {
     /// many sensors, and wrong on either side of a shadow's edge. Sensors must lie on surfaces.
     #[arg(long)]
     pub(crate) interpolate: bool,
-    /// Estimate the error of the rows of each frame at so many of the sensors, by walks along rays, or `off`. Said at the end;
-    /// by default of the mesh, at few points.
+    /// Estimate the error of the rows of each frame at so many of the sensors, by walks along rays. Said at the end; `off` by default.
     #[arg(
         long,
         value_name = "SENSORS",
-        default_value = "quick",
+        default_value = "off",
         hide_default_value = true,
         conflicts_with = "interpolate"
     )]

@@ -139,12 +139,16 @@ fn document_of(bytes: &[u8]) -> &[u8] {
     }
 }
 
-/// Files that a `.gltf` or `.glb` names by `uri`, in the order of the document; none for other files.
+/// Files that a `.gltf` or `.glb` names by `uri`, or an `.obj` as its materials and their images, in the order of the document; none
+/// for other files.
 fn referred_files(scene: &Path, bytes: &[u8]) -> Vec<PathBuf> {
+    let directory = scene.parent().unwrap_or(Path::new(""));
+    if scene.extension().is_some_and(|kind| kind.eq_ignore_ascii_case("obj")) {
+        return files_of_materials(directory, bytes);
+    }
     let Ok(document) = serde_json::from_slice::<Value>(document_of(bytes)) else {
         return Vec::new();
     };
-    let directory = scene.parent().unwrap_or(Path::new(""));
     ["buffers", "images"]
         .iter()
         .filter_map(|kind| document.get(kind)?.as_array())
@@ -154,6 +158,34 @@ fn referred_files(scene: &Path, bytes: &[u8]) -> Vec<PathBuf> {
         // An absolute path takes the place of the directory.
         .map(|uri| directory.join(percent_decoded(uri.strip_prefix("file://").unwrap_or(uri))))
         .collect()
+}
+
+/// Libraries of materials that an `.obj` names, and the images that these name.
+fn files_of_materials(directory: &Path, obj: &[u8]) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for names in values(obj, |key| key == "mtllib") {
+        let all = std::iter::once(names.as_str()).chain(names.split_whitespace());
+        for library in all.map(|name| directory.join(name)) {
+            // A device or a pipe is no library, and opening one may wait for ever.
+            if files.contains(&library) || !library.is_file() {
+                continue;
+            }
+            let found = fs::read(&library).unwrap_or_default();
+            files.push(library);
+            let images = values(&found, |key| key.starts_with("map_"));
+            let name = |image: &String| image.split_whitespace().last().map(|n| directory.join(n));
+            files.extend(images.iter().filter_map(name));
+            files.extend(images.iter().map(|image| directory.join(image)));
+        }
+    }
+    files
+}
+
+/// What follows some key words at the beginnings of lines.
+fn values(text: &[u8], is_wanted: impl Fn(&str) -> bool) -> Vec<String> {
+    let text = String::from_utf8_lossy(text);
+    let lines = text.lines().filter_map(|line| line.trim().split_once(char::is_whitespace));
+    lines.filter(|(key, _)| is_wanted(key)).map(|(_, value)| value.trim().to_owned()).collect()
 }
 
 /// `%20` and its like as the characters they stand for.
@@ -251,6 +283,21 @@ mod tests {
         let mut report = report();
         change(&mut report);
         report
+    }
+
+    #[test]
+    fn an_edited_material_or_image_of_an_obj_is_noticed() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+        file("room.obj", "mtllib the room.mtl\nusemtl a\n");
+        file("the room.mtl", "newmtl a\nKd 1 1 1\n  map_Ke -clamp on glow.png\n");
+        file("glow.png", "one");
+        let hash = || content_hash(&dir.path().join("room.obj"), None).unwrap();
+        let first = hash();
+        file("glow.png", "two");
+        let second = hash();
+        file("the room.mtl", "newmtl a\nKd 1 0 1\n  map_Ke -clamp on glow.png\n");
+        assert!(first != second && second != hash() && first != hash());
     }
 
     fn refusal(change: impl FnOnce(&mut Report)) -> String {

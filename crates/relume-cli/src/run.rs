@@ -357,13 +357,14 @@ impl Job {
     /// Whether a frame's picture is there, undamaged and the one that was finished.
     fn picture_is_whole(&self, frame: u32, digest: Option<&str>) -> bool {
         let whole = |path: PathBuf| {
-            scene_file::read(&path).is_ok_and(|bytes| {
-                let is_whole = match self.format {
-                    FrameFormat::Png => picture::is_whole_png(&bytes),
-                    FrameFormat::Exr => picture::is_whole_exr(&bytes),
-                };
-                is_whole && digest.is_none_or(|digest| digest == resume::digest(&bytes))
-            })
+            path.is_file()
+                && scene_file::read(&path).is_ok_and(|bytes| {
+                    let is_whole = match self.format {
+                        FrameFormat::Png => picture::is_whole_png(&bytes),
+                        FrameFormat::Exr => picture::is_whole_exr(&bytes),
+                    };
+                    is_whole && digest.is_none_or(|digest| digest == resume::digest(&bytes))
+                })
         };
         self.picture_path(frame).is_none_or(whole)
     }

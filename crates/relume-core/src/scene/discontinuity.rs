@@ -17,10 +17,10 @@ const IN_PLANE: f64 = 1e-6;
 /// Lines on a patch across which radiosity jumps, in its frame, metres; outer edges of the patch are left out.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Discontinuities {
-    /// Where others meet its plane.
+    /// Where others meet its plane, and outlines of those that end close before it and are no lamps.
     pub(crate) met: Vec<Segment>,
-    /// Outlines of those that end close before it, without `spots`.
-    pub(crate) ends: Vec<Segment>,
+    /// Outlines of lamps close before it that shine towards it alone.
+    pub(crate) glows: Vec<Segment>,
     /// Outlines of lamps close before it that shine to both sides: it is many times as bright behind these as beside, in a room that they light
     /// all the same.
     pub(crate) spots: Vec<Segment>,
@@ -143,18 +143,19 @@ impl Scene {
         let corners: Vec<DVec2> = by.corners.iter().map(|&c| in_frame(patch, c)).collect();
         let sides = (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]]);
         let within = sides.filter_map(|side| segment_within(&patch.corners, side, slack_m));
-        match self.shines_both_ways(by.id) {
-            true => out.spots.extend(within),
-            false => out.ends.extend(within),
+        let lamp = &self.patches[by.id.0 as usize];
+        match (self.patch_emits(lamp), self.emits_away_from(lamp)) {
+            (true, true) => out.spots.extend(within),
+            (true, false) => out.glows.extend(within),
+            (false, _) => out.met.extend(within),
         }
     }
 
-    /// Whether a patch emits, and another of its body that looks away from it.
-    fn shines_both_ways(&self, id: PatchId) -> bool {
-        let patch = &self.patches[id.0 as usize];
+    /// Whether another patch of the body emits that looks away from a patch.
+    fn emits_away_from(&self, patch: &Patch) -> bool {
         let looks_away = |p: &Patch| p.frame.normal.dot(patch.frame.normal) <= -PARALLEL;
         let emits_away = |p: &Patch| looks_away(p) && self.patch_emits(p);
-        self.patch_emits(patch) && self.patches_of(patch.body).any(|(_, p)| emits_away(p))
+        self.patches_of(patch.body).any(|(_, p)| emits_away(p))
     }
 
     /// Adds where the polygon `by` meets the plane of `of` within that patch.
@@ -289,8 +290,8 @@ mod tests {
         assert!((found[0][0][0].distance(found[0][0][1]) - 2.0).abs() < 1e-9);
         assert!(door(0.01)[0].is_empty());
     }
-    /// How many outlines of others, and of lamps, are on a floor of 4 x 4 m below a panel of 1 x 1 m that is turned.
-    fn below_panel(height_m: f64, emits: [bool; 2], faces_down: bool) -> [usize; 2] {
+    /// How many lines of each sort are on a floor of 4 x 4 m below a panel of 1 x 1 m that is turned.
+    fn below_panel(height_m: f64, emits: [bool; 2], faces_down: bool) -> [usize; 3] {
         let mut b = SceneBuilder::new("panel");
         let grey = b.material("grey", [0.5; 3], [0.0; 3]);
         let materials =
@@ -308,22 +309,23 @@ mod tests {
         }
         b.polygon(node, "upper side", materials[1], &up.map(|c| c + DVec3::Z * 0.001));
         let found = b.build().unwrap().discontinuities();
-        assert!(found[1..].iter().all(|f| f.ends.is_empty() && f.spots.is_empty()));
-        [found[0].ends.len(), found[0].spots.len()]
+        let counts = |f: &super::Discontinuities| [f.met.len(), f.glows.len(), f.spots.len()];
+        assert!(found[1..].iter().all(|f| counts(f) == [0; 3]));
+        counts(&found[0])
     }
 
     #[test]
     fn a_panel_close_before_a_floor_ends_there() {
         let dark = [false; 2];
-        assert_eq!(below_panel(0.01, dark, true), [4, 0]);
-        assert_eq!(below_panel(0.01, dark, false), [0, 0]);
-        assert_eq!(below_panel(0.1, dark, true), [0, 0]);
+        assert_eq!(below_panel(0.01, dark, true), [4, 0, 0]);
+        assert_eq!(below_panel(0.01, dark, false), [0; 3]);
+        assert_eq!(below_panel(0.2, dark, true), [0; 3]);
     }
 
     #[test]
     fn a_lamp_that_shines_to_both_sides_throws_a_spot() {
-        assert_eq!(below_panel(0.01, [true, true], true), [0, 4]);
-        assert_eq!(below_panel(0.01, [true, false], true), [4, 0]);
-        assert_eq!(below_panel(0.01, [false, true], true), [4, 0]);
+        assert_eq!(below_panel(0.01, [true, true], true), [0, 0, 4]);
+        assert_eq!(below_panel(0.01, [true, false], true), [0, 4, 0]);
+        assert_eq!(below_panel(0.01, [false, true], true), [4, 0, 0]);
     }
 }

@@ -344,8 +344,8 @@ impl Forest {
         self.set(at, Kind::Element, cuts.patch);
         let shape = Shape::new(corners);
         let chart = Chart::of(&shape);
-        let Discontinuities { met, ends, spots } = cuts.lines;
-        let seams = chart.seams(&[&met[..], ends, spots].concat());
+        let Discontinuities { met, glows, spots } = cuts.lines;
+        let seams = chart.seams(&[&met[..], glows, spots].concat());
         let fixed = self.fixed_mut();
         fixed.charts[at as usize] = chart;
         if !seams.is_empty() {

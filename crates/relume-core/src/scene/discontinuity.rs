@@ -144,11 +144,12 @@ impl Scene {
         let sides = (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]]);
         let within = sides.filter_map(|side| segment_within(&patch.corners, side, slack_m));
         let lamp = &self.patches[by.id.0 as usize];
-        match (self.patch_emits(lamp), self.emits_away_from(lamp)) {
-            (true, true) => out.spots.extend(within),
-            (true, false) => out.glows.extend(within),
-            (false, _) => out.met.extend(within),
-        }
+        let lines = match self.patch_emits(lamp) {
+            false => &mut out.met,
+            true if self.emits_away_from(lamp) => &mut out.spots,
+            true => &mut out.glows,
+        };
+        lines.extend(within);
     }
 
     /// Whether another patch of the body emits that looks away from a patch.

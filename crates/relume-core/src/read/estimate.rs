@@ -2,7 +2,7 @@
 //!
 //! Most of the squared error of a mesh lies in few leaves, those over which light changes much: points are drawn in proportion
 //! to what leaves may err by, and count the less for it. What leaves send is taken at its word here; [`super::accuracy`] follows
-//! that too, along walks. Nothing is random: the same solution is always told the same.
+//! that too, along walks. Nothing is random: a solution always gets these numbers.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -58,7 +58,7 @@ struct Lit {
     said: Linear,
 }
 
-/// Errors of what the mesh says, at as many points as a tenth of a cold build has time for.
+/// Errors of the mesh's irradiance, at as many points as a tenth of a cold build has time for.
 pub(super) fn estimate(solved: &Solved) -> Accuracy {
     of_points(&errors(solved, points(solved), false))
 }

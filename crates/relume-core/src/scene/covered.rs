@@ -228,7 +228,10 @@ impl Group {
             let hi_x = gap_reach(&self.placed[one].bounds).hi.x;
             let may_be = |q: &usize| self.placed[*q].bounds.lo.x <= hi_x;
             let others = order[at + 1..].iter().copied().take_while(may_be).map(face);
-            let may_hold_lamp = |bounds: &Aabb| self.lamps.may_be_at(bounds);
+            let body = scene.patches[self.placed[one].id.0 as usize].body;
+            let may_hold_lamp = |bounds: &Aabb| {
+                self.lamps.may_be_at(&way(scene, body, bounds, scene.motion.span_s()))
+            };
             for part in dark_in_gaps(face(one), others, self.slack_m, self.is_own, may_hold_lamp) {
                 let covered = &mut out[part.patch.0 as usize];
                 part.add_to(scene, covered, left);

@@ -17,7 +17,7 @@ pub(super) const PARALLEL: f64 = 0.998;
 pub(super) struct Gap {
     /// In the frame of each face, convex, counter-clockwise, metres.
     pub(super) outlines: [Vec<DVec2>; 2],
-    /// Around both.
+    /// Around the gap and the strips along its open sides.
     pub(super) bounds: Aabb,
 }
 
@@ -75,7 +75,9 @@ pub(super) fn between(faces: [&Placed; 2], open: [u64; 2], slack_m: f64) -> Opti
     if on_p.len() < 3 || on_q.len() < 3 {
         return None;
     }
-    let bounds = Aabb::of(points(p, &on_p).into_iter().chain(points(q, &on_q)));
+    // A lamp in the strip lights the rest of the gap many times as much as what is beside the gap does.
+    let below = |c: &DVec2| p.point(*c) - q.normal * planes[1].distance(p.point(*c));
+    let bounds = Aabb::of(points(p, &over).into_iter().chain(over.iter().map(below)));
     Some(Gap { outlines: [on_p, on_q], bounds })
 }
 

@@ -2,7 +2,7 @@
 
 use crate::common::{Random, at_tolerance, sliding, still, v};
 use glam::{DQuat, DVec3};
-use relume_core::scene::{Scene, SceneBuilder};
+use relume_core::scene::{MaterialId, Scene, SceneBuilder};
 use relume_core::session::Session;
 
 /// Light made or lost, over what is emitted, at most. Without levels the first of these rooms made 0.018.
@@ -78,6 +78,13 @@ fn frames_of_white_rooms_agree_with_cold_builds() {
     }
 }
 
+/// Light made of nothing in a closed scene, over what is emitted.
+fn made(scene: Scene, tolerance: f64) -> f64 {
+    let mut session = Session::new(scene, at_tolerance(tolerance)).unwrap();
+    let energy = session.solve_at(0.0).unwrap().report().energy.unwrap();
+    (energy.absorbed_w - energy.emitted_w) / energy.emitted_w
+}
+
 /// Light made of nothing by a lamp of both sides below a ceiling, over what it emits.
 fn made_below_a_ceiling(height_m: f64, turn: f64, thick_m: f64) -> f64 {
     let mut b = SceneBuilder::new("lamp");
@@ -94,11 +101,8 @@ fn made_below_a_ceiling(height_m: f64, turn: f64, thick_m: f64) -> f64 {
         let corners = [(-0.2, -0.25), (0.2, -0.25), (0.2, 0.25), (-0.2, 0.25)];
         b.polygon(lamp, "lamp", glow, &corners.map(|(x, y)| v(x, y, 0.0)));
     }
-    let mut session = Session::new(b.build().unwrap(), at_tolerance(0.1)).unwrap();
-    let report = session.solve_at(0.0).unwrap().report().clone();
-    let energy = report.energy.unwrap();
-    let off = (energy.absorbed_w - energy.emitted_w) / energy.emitted_w;
-    println!("{height_m} m, turned by {turn}, {thick_m} m thick: {off:.5}, {} links", report.links);
+    let off = made(b.build().unwrap(), 0.1);
+    println!("{height_m} m, turned by {turn}, {thick_m} m thick: {off:.5}");
     off
 }
 
@@ -111,4 +115,47 @@ fn lamps_close_below_a_ceiling_give_the_room_no_more_than_they_emit() {
             assert!(off.abs() <= ASTRAY_MAX, "{height_m} m, turned by {turn}: {off}");
         }
     }
+}
+
+/// A white room with a hollow board of polygons that are seen from both sides, 1 cm below its ceiling, and the material of a lamp.
+fn board_below_a_ceiling(thin: bool, glides: bool) -> (SceneBuilder, MaterialId) {
+    let mut b = SceneBuilder::new("board");
+    let wall = b.material("wall", [0.94; 3], [0.0; 3]);
+    let white = b.double_sided_material("white", [0.95; 3], [0.0; 3]);
+    let glow = match thin {
+        true => b.double_sided_material("glow", [0.94; 3], [60.0; 3]),
+        false => b.material("glow", [0.2; 3], [60.0; 3]),
+    };
+    let room = still(&mut b, "room");
+    b.cuboid_inward(room, "walls", wall, v(-3.0, -2.5, 0.0), v(3.0, 2.5, 2.85));
+    let board = match glides {
+        true => sliding(&mut b, "board", DVec3::ZERO, v(0.1, 0.0, 0.0)),
+        false => still(&mut b, "board"),
+    };
+    b.cuboid(board, "board", white, v(-0.4, -1.2, 2.82), v(1.7, 0.5, 2.84));
+    (b, glow)
+}
+
+#[test]
+fn lamps_in_and_below_a_board_give_the_room_no_more_or_less_than_they_emit() {
+    // Below its lower side, in the plane of that, and within; all stick out of it by 2 cm.
+    for (height_m, tolerance) in [(2.815, 0.1), (2.815, 0.02), (2.82, 0.1), (2.825, 0.1)] {
+        let (mut b, glow) = board_below_a_ceiling(true, false);
+        let lamp = b.node("lamp", None, DVec3::ZERO, DQuat::IDENTITY);
+        let corners = [(-0.38, 0.08), (-0.18, 0.08), (-0.18, 0.52), (-0.38, 0.52)];
+        b.polygon(lamp, "lamp", glow, &corners.map(|(x, y)| v(x, y, height_m)));
+        let off = made(b.build().unwrap(), tolerance);
+        println!("at {height_m} m, {tolerance}: {off:.5}");
+        assert!(off.abs() <= ASTRAY_MAX, "at {height_m} m, {tolerance}: {off}");
+    }
+}
+
+#[test]
+fn a_board_that_glides_around_a_lamp_hides_none_of_its_light() {
+    let (mut b, glow) = board_below_a_ceiling(false, true);
+    let lamp = still(&mut b, "lamp");
+    b.cuboid(lamp, "lamp", glow, v(0.3, -0.5, 2.78), v(0.8, -0.3, 2.845));
+    let off = made(b.build().unwrap(), 0.1);
+    println!("gliding board: {off:.5}");
+    assert!(off.abs() <= 0.01, "{off}");
 }

@@ -14,6 +14,9 @@ pub struct Linear {
     pub gradient: [[f32; 3]; 2],
 }
 
+/// Difference that may be rounding, over the value: some units in the last place.
+const ROUNDED: f32 = 4.0 * f32::EPSILON;
+
 impl Linear {
     /// Value at an offset from the centroid (in the unit of the gradient), unclamped.
     #[inline]
@@ -70,7 +73,14 @@ impl Linear {
         of(0).max(of(1)).max(of(2))
     }
 
-    pub(super) fn difference(&self, other: &Linear) -> f32 {
+    /// Largest difference from the value before; none where it is rounding: in a scene of which the mean is a millionth as bright,
+    /// rounding is more than the residual, and a solution that follows it never settles.
+    pub(super) fn change_from(&self, before: &Linear) -> f32 {
+        let difference = self.difference(before);
+        if difference <= ROUNDED * self.most(1.0) { 0.0 } else { difference }
+    }
+
+    fn difference(&self, other: &Linear) -> f32 {
         let mut out = 0.0_f32;
         for c in 0..3 {
             out = out.max((self.mean[c] - other.mean[c]).abs());

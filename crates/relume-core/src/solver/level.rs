@@ -1,17 +1,18 @@
-//! Level of a leaf: its reflected light, as if its row were even and summed to 1.
+//! Level of a leaf: a line that its reflected light counts times, so that its row is even and sums to 1.
 
 use super::field::Linear;
+use super::place::Place;
 
-/// How the light that a leaf receives is levelled.
+/// How the light of a leaf is levelled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Level {
-    /// Whether the leaf is in closed surroundings; else nothing changes.
+    /// Whether the leaf is in closed surroundings; else its row stays as it is.
     pub(super) is_closed: bool,
-    /// Direct irradiance, W/m2.
+    /// Direct irradiance, W/m2; it counts as it is.
     pub(super) direct: Linear,
-    /// What reflected light is multiplied with, 1.
+    /// What reflected light is multiplied with at the centroid, 1.
     pub(super) factor: f32,
-    /// Gradient of the row over its sum, 1/m.
+    /// Share by which that factor falls, 1/m.
     pub(super) slope: [f32; 2],
 }
 
@@ -23,8 +24,9 @@ impl Level {
         slope: [0.0; 2],
     };
 
-    /// Irradiance as it is with an even row that sums to 1, from that over the links, W/m2 and per metre.
-    pub(super) fn of(&self, h: &Linear) -> Linear {
+    /// Irradiance as it is with an even row that sums to 1, from that over the links, W/m2 and per metre: of a level that counts for
+    /// what is received alone.
+    pub(super) fn evened(&self, h: &Linear) -> Linear {
         if !self.is_closed {
             return *h;
         }
@@ -33,5 +35,24 @@ impl Level {
             (0..3).for_each(|c| gradient[c] -= slope * reflected.mean[c]);
         }
         reflected.times(self.factor).plus(&self.direct)
+    }
+
+    /// Irradiance from that over the links, W/m2 and per metre: of a level that counts both ways.
+    pub(super) fn received(&self, h: &Linear, place: &Place, moment: f32) -> Linear {
+        self.weighed(&h.minus(&self.direct), place, moment).plus(&self.direct)
+    }
+
+    /// What a line over the leaf is times its level: the line that comes next to the product.
+    pub(super) fn weighed(&self, value: &Linear, place: &Place, moment: f32) -> Linear {
+        let mut out = *value;
+        let scale = place.radius * moment;
+        for c in 0..3 {
+            let first = place.first_moments(value.gradient.map(|g| g[c] * place.radius), moment);
+            for (k, slope) in self.slope.into_iter().enumerate() {
+                out.mean[c] -= scale * slope * first[k];
+                out.gradient[k][c] -= slope * value.mean[c];
+            }
+        }
+        out.times(self.factor)
     }
 }

@@ -46,6 +46,8 @@ pub(super) struct Below<'a, S> {
     pub(super) factors: &'a [f32],
     /// Level of each leaf; empty where there are none.
     pub(super) levels: &'a [Level],
+    /// Whether levels count for what is sent as for what is received.
+    pub(super) both_ways: bool,
     pub(super) surfaces: &'a S,
     pub(super) material: &'a FacetMaterial,
     pub(super) limit: f32,
@@ -70,7 +72,7 @@ impl<S: Surfaces> Below<'_, S> {
         let b = if children.is_empty() {
             match (self.factors.get(id as usize), self.levels.get(id as usize)) {
                 (Some(&factor), _) => self.reflect(&h.times(factor), place).times(factor),
-                (None, Some(level)) => self.reflect(&level.of(&h), place),
+                (None, Some(level)) => self.reflect(&self.levelled(level, &h, place), place),
                 (None, None) => self.reflect(&h, place),
             }
         } else {
@@ -98,7 +100,7 @@ impl<S: Surfaces> Below<'_, S> {
             }
             fit.linear(place, moment)
         };
-        let difference = b.difference(&self.radiosity.get(id));
+        let difference = b.change_from(&self.radiosity.get(id));
         if difference > self.limit || self.path.is_none() {
             out.changed.push((id, b, difference));
         }
@@ -142,20 +144,40 @@ impl<S: Surfaces> Below<'_, S> {
         (self.deferred[id as usize] - below.fold(0.0, f32::max)).max(0.0)
     }
 
+    /// Irradiance of which a leaf sends what it reflects.
+    fn levelled(&self, level: &Level, h: &Linear, place: &Place) -> Linear {
+        if !self.both_ways {
+            return level.evened(h);
+        }
+        let moment = self.surfaces.source_moment();
+        let mut received = level.received(h, place, moment);
+        received.mean = received.mean.map(|mean| mean.max(0.0));
+        level.weighed(&received, place, moment)
+    }
+
     /// Radiosity of a leaf, with first moments, from its irradiance, with a gradient per metre.
     fn reflect(&self, h: &Linear, place: &Place) -> Linear {
-        let moment = self.surfaces.source_moment();
-        let mut b = Linear::default();
-        for c in 0..3 {
-            let rho = self.material.reflectance[c];
-            // A gradient pushed down a long way may reach below zero; light does not.
-            b.mean[c] = self.material.exitance[c] + rho * h.mean[c].max(0.0);
-            let slope = [0, 1].map(|axis| rho * h.gradient[axis][c] * place.radius);
-            let moments = place.first_moments(slope, moment);
-            (b.gradient[0][c], b.gradient[1][c]) = (moments[0], moments[1]);
-        }
-        b
+        reflected(h, self.material, place, self.surfaces.source_moment())
     }
+}
+
+/// Radiosity, with first moments, from irradiance, with a gradient per metre.
+pub(super) fn reflected(
+    h: &Linear,
+    material: &FacetMaterial,
+    place: &Place,
+    moment: f32,
+) -> Linear {
+    let mut b = Linear::default();
+    for c in 0..3 {
+        let rho = material.reflectance[c];
+        // A gradient pushed down a long way may reach below zero; light does not.
+        b.mean[c] = material.exitance[c] + rho * h.mean[c].max(0.0);
+        let slope = [0, 1].map(|axis| rho * h.gradient[axis][c] * place.radius);
+        let moments = place.first_moments(slope, moment);
+        (b.gradient[0][c], b.gradient[1][c]) = (moments[0], moments[1]);
+    }
+    b
 }
 
 /// Mean and first moments over an element from those over its children: exact.

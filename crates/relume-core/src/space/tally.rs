@@ -13,7 +13,7 @@ use super::tuning::UNBALANCED;
 /// Row sums and energies: a pass over all links and elements.
 pub(super) fn balance(solved: &Solved) -> Balance {
     let (rows, energy) = flux(solved);
-    let is_off = energy.unbalanced() > UNBALANCED || !solved.radiosity.is_linear();
+    let is_off = energy.unbalanced() > UNBALANCED || solved.radiosity.loses_light();
     Balance { rows, energy, suspects: if is_off { suspects(solved) } else { Vec::new() } }
 }
 

@@ -5,11 +5,15 @@
 //! down as lines, err by. It errs in one sense with brightness, since a leaf with too high a row is too bright and sends by that same
 //! row: in white rooms that makes light of nothing, 1 to 2 % at tolerance 0.1 with reflectance 0.95. So reflected light counts
 //! as if the row were 1, and even. Direct light, of which each link errs little, stays as it is.
+//!
+//! What a leaf receives is divided by its row; what it sends goes by its row as it is, so that light is lost or made where leaves with
+//! low rows are brighter than others. *Both ways*, what is sent counts times the same line as what is received: lines with which every row
+//! sums to 1 are found by symmetric scaling (Sinkhorn and Knopp 1967), and light is neither made nor lost.
 
 use fearless_simd::dispatch;
 use rayon::prelude::*;
 
-use super::scaling::RowScaling;
+use super::scaling::{CLOSE, RowScaling, pull};
 use super::solve::CHUNK;
 use crate::element::Renumbering;
 use crate::solver::field::{Field, Linear};
@@ -17,13 +21,21 @@ use crate::solver::gather::gather_some;
 use crate::solver::level::Level;
 use crate::solver::links::Links;
 use crate::solver::push::push;
-use crate::solver::surfaces::{Surfaces, for_each_below};
-use crate::solver::tuning::{CLOSED, LEVEL_MOST};
+use crate::solver::settle::reflected;
+use crate::solver::surfaces::{FacetMaterial, Surfaces, for_each_below};
+use crate::solver::tuning::{CLOSED, FACTOR_LEAST, LEVEL_MOST, SCALING_ROUNDS};
 use crate::transport;
 
-/// Levels of leaves, by element; of no meaning for what is no leaf. None where nothing is white.
+/// Most by which the line of a level that counts both ways falls over the radius of its leaf: it stays above zero.
+const SLOPE_MOST: f32 = 0.5;
+
+/// Levels of leaves. None where nothing is white.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Levels(Vec<Level>);
+pub(super) struct Levels {
+    /// By element; of no meaning for what is no leaf.
+    leaves: Vec<Level>,
+    both_ways: bool,
+}
 
 impl Levels {
     /// Levels of all leaves; `sources` has what sources that are no surfaces send.
@@ -33,29 +45,109 @@ impl Levels {
         rows: &RowScaling,
         sources: &Field,
     ) -> Levels {
-        let direct = direct(surfaces, links, sources);
-        let mut leaves = vec![Level::NONE; surfaces.len()];
+        let direct = direct(surfaces, links, sources, rows.is_linear());
+        let of = |&direct: &Linear| Level { direct, ..Level::NONE };
+        let mut leaves: Vec<Level> = direct.iter().map(of).collect();
         for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
             let closed = Closed { surfaces, rows };
             closed.find(facet.0, &mut |leaf| {
                 let row = &rows.rows[leaf as usize];
                 let factor = (1.0 / row.mean).clamp(1.0 / LEVEL_MOST, LEVEL_MOST);
                 let slope = row.gradient.map(|g| g / row.mean);
-                let direct = direct[leaf as usize];
-                leaves[leaf as usize] = Level { is_closed: true, direct, factor, slope };
+                let level = &mut leaves[leaf as usize];
+                *level = Level { is_closed: true, factor, slope, ..*level };
             });
         }
-        Levels(leaves)
+        Levels { leaves, both_ways: false }
+    }
+
+    /// Levels of these leaves that count both ways, with which rows outside closed surroundings sum to as much as `rows`.
+    pub(super) fn both_ways(
+        mut self,
+        surfaces: &impl Surfaces,
+        links: &Links,
+        rows: &RowScaling,
+    ) -> Levels {
+        self.both_ways = true;
+        for level in &mut self.leaves {
+            (level.factor, level.slope) = (1.0, [0.0; 2]);
+        }
+        for _ in 0..SCALING_ROUNDS {
+            if self.even_out(surfaces, links, rows) < CLOSE {
+                break;
+            }
+        }
+        self
+    }
+
+    /// A round of symmetric scaling: each leaf's line over the root of its row. By how much factors change, 1.
+    fn even_out(&mut self, surfaces: &impl Surfaces, links: &Links, rows: &RowScaling) -> f32 {
+        let moment = surfaces.source_moment();
+        let gathered = self.gathered_of_one(surfaces, links, rows.is_linear());
+        let own = |id: u32| gathered[id as usize];
+        let mut change = 0.0_f32;
+        for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
+            let place = surfaces.place(facet.0);
+            push(surfaces, facet.0, &place, &Linear::default(), &own, &mut |leaf, h| {
+                let level = &mut self.leaves[leaf as usize];
+                let place = surfaces.place(leaf);
+                let row = level.weighed(h, &place, moment);
+                let wanted = if level.is_closed { 1.0 } else { rows.rows[leaf as usize].mean };
+                let sum = row.mean[0] / wanted;
+                if wanted <= 0.0 || sum <= 0.0 {
+                    return;
+                }
+                let before = level.factor;
+                level.factor = (before / sum.sqrt()).clamp(FACTOR_LEAST, 1.0 / FACTOR_LEAST);
+                change = change.max((level.factor / before - 1.0).abs());
+                if !level.is_closed {
+                    return;
+                }
+                let most = SLOPE_MOST / place.radius;
+                for (slope, gradient) in level.slope.iter_mut().zip(row.gradient) {
+                    *slope = (*slope + 0.5 * gradient[0] / sum).clamp(-most, most);
+                }
+            });
+        }
+        change
+    }
+
+    /// What every element gathers where each leaf sends the line of its level.
+    fn gathered_of_one(
+        &self,
+        surfaces: &impl Surfaces,
+        links: &Links,
+        linear: bool,
+    ) -> Vec<Linear> {
+        let one = Linear { mean: [1.0; 3], ..Linear::default() };
+        let mirror = FacetMaterial { reflectance: [1.0; 3], exitance: [0.0; 3] };
+        let moment = surfaces.source_moment();
+        let mut sent = Field::default();
+        sent.extend(surfaces.len());
+        for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
+            let leaf = |id: u32, _: &Linear| {
+                let place = surfaces.place(id);
+                let line = self.leaves[id as usize].weighed(&one, &place, moment);
+                reflected(&line, &mirror, &place, moment)
+            };
+            pull(surfaces, facet.0, &leaf, &mut sent);
+        }
+        gathered_from(&sent, surfaces, links, linear)
+    }
+
+    /// Whether they count for what is sent as for what is received.
+    pub(super) fn are_both_ways(&self) -> bool {
+        self.both_ways
     }
 
     /// Level of an element; none where nothing is levelled, and of elements that came since.
     pub(super) fn get(&self, id: u32) -> Option<&Level> {
-        self.0.get(id as usize)
+        self.leaves.get(id as usize)
     }
 
     /// Whether nothing is levelled.
     pub(super) fn is_none(&self) -> bool {
-        self.0.is_empty()
+        self.leaves.is_empty()
     }
 
     /// Whether a leaf is in closed surroundings, as far as is known.
@@ -65,7 +157,7 @@ impl Levels {
 
     /// Levels by element.
     pub(super) fn all(&self) -> &[Level] {
-        &self.0
+        &self.leaves
     }
 
     /// The leaves that have another one than before; `None` where there were none before, or are none now.
@@ -92,15 +184,15 @@ impl Levels {
 
     /// Follows elements to their new ids.
     pub(super) fn renumber(&mut self, to: &Renumbering) {
-        if !self.0.is_empty() {
-            let of = |&old: &u32| self.0.get(old as usize).copied().unwrap_or(Level::NONE);
-            self.0 = to.old_of().iter().map(of).collect();
+        if !self.leaves.is_empty() {
+            let of = |&old: &u32| self.leaves.get(old as usize).copied().unwrap_or(Level::NONE);
+            self.leaves = to.old_of().iter().map(of).collect();
         }
     }
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> u64 {
-        (self.0.capacity() * size_of::<Level>()) as u64
+        (self.leaves.capacity() * size_of::<Level>()) as u64
     }
 }
 
@@ -144,7 +236,7 @@ impl<S: Surfaces> Closed<'_, S> {
 }
 
 /// Direct irradiance of all leaves, by element.
-fn direct(surfaces: &impl Surfaces, links: &Links, sources: &Field) -> Vec<Linear> {
+fn direct(surfaces: &impl Surfaces, links: &Links, sources: &Field, linear: bool) -> Vec<Linear> {
     let mut sent = Field::default();
     sent.extend(surfaces.len());
     for facet in surfaces.facets() {
@@ -158,7 +250,7 @@ fn direct(surfaces: &impl Surfaces, links: &Links, sources: &Field) -> Vec<Linea
     for id in (0..surfaces.len() as u32).filter(|&id| !surfaces.is_surface(id)) {
         sent.set(id, &sources.get(id));
     }
-    let gathered = gathered_from(&sent, surfaces, links, true);
+    let gathered = gathered_from(&sent, surfaces, links, linear);
     let own = |id: u32| gathered[id as usize];
     let mut direct = vec![Linear::default(); surfaces.len()];
     for facet in surfaces.facets() {

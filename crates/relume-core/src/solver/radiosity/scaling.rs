@@ -52,6 +52,11 @@ impl RowScaling {
         scaling
     }
 
+    /// Whether rows are taken as lines.
+    pub(super) fn is_linear(&self) -> bool {
+        self.linear
+    }
+
     /// Whether there are none.
     pub(super) fn is_none(&self) -> bool {
         self.factors.is_empty()
@@ -174,6 +179,11 @@ impl Radiosity {
         !self.constant
     }
 
+    /// Whether leaves have factors with constant elements: the last resort, which may lose light.
+    pub fn loses_light(&self) -> bool {
+        self.constant && !self.scaling.is_none()
+    }
+
     /// Sum of the form factors from a leaf as it should be where rows are scaled, so that light that factors lose counts as
     /// unaccounted for; else what its links sum to.
     pub fn row(&self, leaf: u32, links: &RowSum) -> RowSum {
@@ -223,7 +233,7 @@ fn raised(rows: &[LeafRow]) -> f64 {
 }
 
 /// Sets what leaves send to what `leaf` makes of it, and what elements above them send, with first moments.
-fn pull(
+pub(super) fn pull(
     surfaces: &impl Surfaces,
     id: u32,
     leaf: &dyn Fn(u32, &Linear) -> Linear,

@@ -102,4 +102,4 @@ pub use relume_core::session::{
     Oracle, PairCounts, PointError, Removed, RowSumError, Seconds, Sensor, Session, SessionError,
     Snapshot, Update, Watch, Work,
 };
-pub use relume_io::{ImportOptions, Log, LogError, import, read_environment};
+pub use relume_io::{ImportOptions, Log, LogError, PEAK_LUMENS_PER_WATT, import, read_environment};

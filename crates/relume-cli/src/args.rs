@@ -215,12 +215,8 @@ pub(crate) struct FlatArgs {
     /// Directory for report.json and a drawing of each frame (SVG); made if missing.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
-    /// Frames, inclusive: 0-24, 0-24x6 or 3,7 [default: the whole animation].
-    #[arg(long, value_name = "FRAMES")]
-    pub(crate) frames: Option<FrameSpec>,
-    /// Frames a second.
-    #[arg(long, value_name = "FPS", default_value = "24", value_parser = parse_fps, allow_negative_numbers = true)]
-    pub(crate) fps: f64,
+    #[command(flatten)]
+    pub(crate) time: FrameFlags,
     /// Largest form factor of a link.
     #[arg(long, value_name = "EPS", default_value = "0.05", allow_negative_numbers = true)]
     pub(crate) epsilon: f64,
@@ -490,9 +486,9 @@ pub(crate) struct CheckArgs {
     pub(crate) verbose: bool,
 }
 
-/// What is solved, and how finely: what every command that solves takes.
+/// The frames of an animation, of space or of the plane.
 #[derive(Clone, Debug, Args)]
-pub(crate) struct ClipFlags {
+pub(crate) struct FrameFlags {
     /// Frames to solve, inclusive: 0-24, every sixth 0-24x6, a list 3,7. Frame k is the time k / fps
     /// [default: the whole animation].
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
@@ -500,6 +496,13 @@ pub(crate) struct ClipFlags {
     /// Frames a second.
     #[arg(long, value_name = "FPS", default_value = "24", value_parser = parse_fps, allow_negative_numbers = true)]
     pub(crate) fps: f64,
+}
+
+/// What is solved, and how finely: what every command that solves takes.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ClipFlags {
+    #[command(flatten)]
+    pub(crate) time: FrameFlags,
     #[command(flatten)]
     pub(crate) animation: AnimationFlag,
     /// Relative error of irradiance aimed at (root mean square), between 0 and 1: 0.1 is quick and enough for
@@ -529,8 +532,7 @@ pub(crate) struct ClipFlags {
 impl Default for ClipFlags {
     fn default() -> ClipFlags {
         ClipFlags {
-            frames: None,
-            fps: 24.0,
+            time: FrameFlags { frames: None, fps: 24.0 },
             animation: AnimationFlag::default(),
             tolerance: None,
             oracle: OracleFlag::Error,

@@ -105,10 +105,14 @@ impl Clip {
         (tolerance, at_least): (f64, u32),
     ) -> Result<Clip, Failure> {
         let tolerance = flags.tolerance.unwrap_or(tolerance);
-        let scene = flags.outside.light(scene, flags.fps, tolerance)?;
-        let frames =
-            frames::resolve(flags.frames.as_ref(), scene.motion.duration_s, flags.fps, at_least)
-                .map_err(|error| Failure::new(error).help("`relume info` lists the frames"))?;
+        let scene = flags.outside.light(scene, flags.time.fps, tolerance)?;
+        let frames = frames::resolve(
+            flags.time.frames.as_ref(),
+            scene.motion.duration_s,
+            flags.time.fps,
+            at_least,
+        )
+        .map_err(|error| Failure::new(error).help("`relume info` lists the frames"))?;
         Ok(Clip {
             scene: Arc::new(scene),
             frames,
@@ -206,12 +210,12 @@ impl Clip {
 
     /// Frames a second.
     pub(crate) fn fps(&self) -> f64 {
-        self.flags.fps
+        self.flags.time.fps
     }
 
     /// Time of a frame, seconds.
     pub(crate) fn time_of(&self, frame: u32) -> f64 {
-        frames::time_of(frame, self.flags.fps)
+        frames::time_of(frame, self.flags.time.fps)
     }
 
     /// What the engine is asked for; `balance` says whether its reports hold row sums and energies.
@@ -248,8 +252,8 @@ impl Clip {
 
 /// The frames that flags ask for.
 fn instants(flags: &ClipFlags) -> Instants {
-    let frames = flags.frames.as_ref().map_or(Vec::new(), FrameSpec::ranges);
-    Instants { fps: flags.fps, frames }
+    let frames = flags.time.frames.as_ref().map_or(Vec::new(), FrameSpec::ranges);
+    Instants { fps: flags.time.fps, frames }
 }
 
 /// The message of a step that failed; `kept` says what stays of the frames before it, if anything.

@@ -325,8 +325,8 @@ impl Job {
         });
         let flags = &self.solve.clip;
         RunOptions {
-            frames: flags.frames.as_ref().map_or("all".into(), ToString::to_string),
-            fps: flags.fps,
+            frames: flags.time.frames.as_ref().map_or("all".into(), ToString::to_string),
+            fps: flags.time.fps,
             animation: flags.animation.name.clone(),
             edits: flags.animation.described(),
             tolerance: clip.tolerance,
@@ -586,8 +586,9 @@ impl Run<'_> {
                 return Ok(Outcome::Interrupted);
             }
             let before = wanted.iter().rev().find(|&&earlier| earlier < frame);
-            self.session
-                .count_motion_from(before.map(|&f| frames::time_of(f, self.job.solve.clip.fps)));
+            self.session.count_motion_from(
+                before.map(|&f| frames::time_of(f, self.job.solve.clip.time.fps)),
+            );
             self.frame(frame)?;
             if let Some((mut meanwhile, path)) = meanwhile.take() {
                 meanwhile.end(&path);
@@ -603,7 +604,7 @@ impl Run<'_> {
         self.progress.start(frame, self.links, self.session.memory_bytes());
         let mut entry = self
             .session
-            .step(frame, frames::time_of(frame, self.job.solve.clip.fps))
+            .step(frame, frames::time_of(frame, self.job.solve.clip.time.fps))
             .map_err(|error| self.session_failure(error))?;
         self.links = entry.links;
         self.energy = entry.energy;
@@ -659,7 +660,7 @@ impl Run<'_> {
         let options = self.finished().report.options.picture.clone();
         let parts = (&self.views, options, &self.job.picture);
         let (Some(views), Some(options), Some((_, flags))) = parts else { return Ok(None) };
-        let view = views.at(self.session.scene(), frame, self.job.solve.clip.fps)?;
+        let view = views.at(self.session.scene(), frame, self.job.solve.clip.time.fps)?;
         Ok(Some((view, options, flags)))
     }
 
@@ -673,7 +674,7 @@ impl Run<'_> {
         if !self.exposure_is_open() {
             return Ok(());
         }
-        let fps = self.job.solve.clip.fps;
+        let fps = self.job.solve.clip.time.fps;
         let scene = Arc::clone(self.session.scene());
         let frame = brightest_frame(&scene, fps).unwrap_or(next);
         if frame == next {

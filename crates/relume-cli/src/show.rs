@@ -9,6 +9,7 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use glam::{DVec2, DVec3};
+use relume::PEAK_LUMENS_PER_WATT;
 use relume::element::ElementId;
 use relume::scene::{BodyId, PatchId, Scene};
 use relume::session::{Frame, Leaf, Session, Snapshot};
@@ -101,8 +102,6 @@ impl fmt::Display for ScaleFlag {
     }
 }
 
-/// Lumens in a watt, as glTF reckons.
-const LUMENS_PER_WATT: f64 = 683.0;
 /// Highest level of the colours.
 const LEVELS: f64 = 10.0;
 /// Numbers beside the colours, where levels are not counted.
@@ -168,9 +167,10 @@ impl ShowFlags {
                 self.coloured(&picture::numbers_of(&layers(), of), 2.0 * white, "H W/M2")
             }
             Shown::Illuminance => {
-                let of = |seen: &picture::Seen| LUMENS_PER_WATT as f32 * luminance(seen.irradiance);
+                let of =
+                    |seen: &picture::Seen| PEAK_LUMENS_PER_WATT as f32 * luminance(seen.irradiance);
                 let numbers = picture::numbers_of(&layers(), of);
-                self.coloured(&numbers, 2.0 * LUMENS_PER_WATT * white, "E LX")
+                self.coloured(&numbers, 2.0 * PEAK_LUMENS_PER_WATT * white, "E LX")
             }
             Shown::Error => {
                 let anew = solved(session).reconstruction();

@@ -115,11 +115,15 @@ fn elements_are_named_by_patch_and_path() {
     says(found, &[", element "]);
 }
 
-/// A plate of a reflectance under a lamp.
+/// A plate of a reflectance under a lamp of 10 W/m2.
 fn lamp_over_plate(reflectance: f64, corners: usize) -> Arc<Scene> {
+    plate_under_lamp([reflectance, 10.0], corners)
+}
+
+fn plate_under_lamp([reflectance, exitance]: [f64; 2], corners: usize) -> Arc<Scene> {
     let mut b = SceneBuilder::new("plate");
     let grey = b.material("grey", [reflectance; 3], [0.0; 3]);
-    let lamp = b.material("lamp", [0.0; 3], [10.0; 3]);
+    let lamp = b.material("lamp", [0.0; 3], [exitance; 3]);
     let node = b.node("plate", None, v(0.0, 0.0, 0.0), DQuat::IDENTITY);
     let turn = std::f64::consts::TAU / corners as f64;
     let rim = (0..corners).map(|k| libm::sincos(turn * k as f64)).map(|(s, c)| v(c, s, 0.0));
@@ -140,6 +144,16 @@ fn radiosities_are_compared_though_all_links_are_equal() {
     let found = says(compare(one.solved().unwrap(), two.solved().unwrap()), &words);
     assert!(matches!(found, Difference::Radiosity { .. }));
     assert_eq!(radiosity_gap(one.solved().unwrap(), two.solved().unwrap()), Err(found));
+}
+
+/// Four times the light has the same links: verdicts weigh errors by ratios of brightness.
+#[test]
+fn coarse_solutions_are_compared_though_all_links_are_equal() {
+    let lit = |exitance| at(&plate_under_lamp([0.5, exitance], 8), &at_tolerance(0.2), &[0.0]);
+    let (one, two) = (lit(10.0), lit(40.0));
+    assert_eq!(one.frame().unwrap().hash(), two.frame().unwrap().hash());
+    let found = compare(one.solved().unwrap(), two.solved().unwrap());
+    assert!(matches!(found, Some(Difference::Coarse { .. })), "{found:?}");
 }
 
 #[test]

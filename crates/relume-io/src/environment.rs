@@ -1,6 +1,6 @@
 //! Environments from files: Radiance .hdr and OpenEXR.
 //!
-//! Must not know what becomes of them.
+//! Must not know how a sky of polygons is made of them.
 
 use std::io::Cursor;
 use std::path::Path;

@@ -1,10 +1,12 @@
 //! Relume: diffuse interreflection (radiosity) in scenes whose objects and lights move.
 //!
-//! A [`Scene`] is read from a file ([`import`]) or built in code ([`SceneBuilder`]). A [`Session`] solves it, frame by
-//! frame or command by command, and pays for what changed; whatever came before, the links are those of a cold build,
-//! bit for bit, on any number of threads. A [`Frame`] is what is read from a solution.
+//! Surfaces are divided into elements, and pairs of elements that exchange light are joined by links (hierarchical radiosity,
+//! Hanrahan et al. 1991). A [`Scene`] is read from a file ([`import`]) or built in code ([`SceneBuilder`]). A [`Session`]
+//! solves it, frame by frame or command by command, and evaluates again only the links that a change concerns. The links do not
+//! depend on what was solved before: they equal those of a new session, bit for bit, on any number of threads. A [`Frame`]
+//! gives access to a solution.
 //!
-//! A clip, and the irradiance at a sensor in each of its frames:
+//! A clip, and the irradiance at a point of the room in each of its frames:
 //!
 //! ```
 //! use relume::{ImportOptions, Options, Session, import};
@@ -14,7 +16,7 @@
 //! let mut session = Session::new(scene, Options { tolerance: 0.1, ..Options::default() })?;
 //! for k in 0..3 {
 //!     let frame = session.solve_at(f64::from(k) / 24.0)?;
-//!     let [red, green, blue] = frame.irradiance_at([0.5, 0.3, 0.2], [0.0, 1.0, 0.0]);
+//!     let [red, green, blue] = frame.irradiance_at([0.5, 0.3, 0.2], [0.0, 1.0, 0.0]); // a point, a unit normal
 //!     println!("{k}: {red:.3} {green:.3} {blue:.3} W/m2");
 //! }
 //! # Ok(())
@@ -26,32 +28,32 @@
 //! ```
 //! use relume::{Command, Options, Pose, SceneBuilder, Session};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # fn cube(half: f64, inward: bool) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
-//! #     let corner = |k: u32| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { half } else { -half });
-//! #     let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-//! #     let turned = |[a, b, c]: [u32; 3]| if inward { [a, c, b] } else { [a, b, c] };
-//! #     let of_side = |[a, b, c, d]: [u32; 4]| [turned([a, b, c]), turned([a, c, d])];
-//! #     ((0..8).map(corner).collect(), sides.into_iter().flat_map(of_side).collect())
-//! # }
-//! # let (room_corners, room_triangles) = cube(1.0, true);
-//! # let (lamp_corners, lamp_triangles) = cube(0.1, false);
+//! # let corner = |k: u32| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { 1.0 } else { -1.0 });
+//! # let sides = [[2, 6, 4, 0], [5, 7, 3, 1], [4, 5, 1, 0], [3, 7, 6, 2], [1, 3, 2, 0], [6, 7, 5, 4]];
+//! # let room_corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
+//! # let room_triangles: Vec<[u32; 3]> = sides.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+//! // An octahedron: corners in metres, and triangles, counter-clockwise seen from outside.
+//! let r = 0.1;
+//! let lamp_corners = [[r, 0.0, 0.0], [-r, 0.0, 0.0], [0.0, r, 0.0], [0.0, -r, 0.0], [0.0, 0.0, r], [0.0, 0.0, -r]];
+//! let lamp_triangles = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+//!
 //! let mut b = SceneBuilder::new("two");
 //! let grey = b.material("grey", [0.5; 3], [0.0; 3]); // reflectance, exitance in W/m2
 //! let glow = b.material("glow", [0.0; 3], [1.0; 3]);
 //! let room = b.body("room");
 //! let ball = b.body("ball");
-//! b.mesh(room, "walls", grey, &room_corners, &room_triangles); // &[[f64; 3]] in metres, &[[u32; 3]]
+//! b.mesh(room, "walls", grey, &room_corners, &room_triangles); // a cube of side 2 about the origin, seen from inside
 //! b.mesh(ball, "lamp", glow, &lamp_corners, &lamp_triangles);
 //! let mut session = Session::new(b.build()?, Options { tolerance: 0.1, ..Options::default() })?;
-//! let first = session.solve()?.hash();
+//! let first = session.solve()?.hash(); // of all links
 //!
-//! let undo = session.apply(Command::set_pose(ball, Pose::translation([0.1, 0.0, 0.0])))?;
-//! let frame = session.solve()?; // only what changed
+//! let undo = session.apply(Command::set_pose(ball, Pose::translation([0.1, 0.0, 0.0])))?; // by 10 cm
+//! let frame = session.solve()?; // evaluates only what the move changed
 //! println!("{} links, {:?} W/m2", frame.report().links, frame.irradiance_at([0.0, -1.0, 0.0], [0.0, 1.0, 0.0]));
 //!
 //! session.apply(undo)?;
 //! assert_eq!(session.solve()?.hash(), first);
-//! let mesh = session.solve()?.snapshot(); // flat arrays, an entry a leaf: corners, radiosity, patch; and revision
+//! let mesh = session.solve()?.snapshot(); // corners, radiosity and patch of each undivided element; revision
 //! # assert_eq!(mesh.corners.len(), mesh.radiosity.len());
 //! # Ok(())
 //! # }
@@ -59,6 +61,9 @@
 //!
 //! Triangles are counter-clockwise seen from their front, the side that is lit and shines: the walls of a room are seen from inside,
 //! a lamp from outside. The back is black and hides what is behind it; [`SceneBuilder::double_sided_material`] makes both sides fronts.
+//!
+//! [`Options`] has the tolerance: the relative error of irradiance that is aimed at, 0.02 unless given. Refusals are [`SceneError`],
+//! [`CommandError`] and [`SessionError`]; they name the thing and the remedy.
 //!
 //! Lengths are metres, times seconds, light is radiometric (W, W/m2, W/sr) in three linear channels. Work is done on
 //! rayon's global pool; inside `ThreadPool::install` on that pool. Results are the same on any. [`Session::watch`] shows a
@@ -102,4 +107,4 @@ pub use relume_core::session::{
     Oracle, PairCounts, PointError, Removed, RowSumError, Seconds, Sensor, Session, SessionError,
     Snapshot, Update, Watch, Work,
 };
-pub use relume_io::{ImportOptions, Log, LogError, import, read_environment};
+pub use relume_io::{ImportOptions, Log, LogError, PEAK_LUMENS_PER_WATT, import, read_environment};

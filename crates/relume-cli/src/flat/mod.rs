@@ -87,7 +87,7 @@ pub(crate) fn flat(args: &FlatArgs) -> Result<(), Failure> {
             100.0 * BRIGHT
         ));
     }
-    let frames = resolve(args.frames.as_ref(), scene.duration_s(), args.fps, 1)
+    let frames = resolve(args.time.frames.as_ref(), scene.duration_s(), args.time.fps, 1)
         .map_err(|error| Failure::new(error).help("choose other --frames"))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let run = Run { scene: Arc::new(scene), name, args, frames };
@@ -161,7 +161,7 @@ impl Run<'_> {
                 constant: self.args.constant,
                 residual: FlatOptions::default().residual,
                 update: self.args.update.name(),
-                fps: self.args.fps,
+                fps: self.args.time.fps,
             },
             frames: &reports,
         };
@@ -194,7 +194,7 @@ impl Sequence for Run<'_> {
     }
 
     fn time_of(&self, frame: u32) -> f64 {
-        time_of(frame, self.args.fps)
+        time_of(frame, self.args.time.fps)
     }
 
     fn tolerance(&self) -> Option<f64> {

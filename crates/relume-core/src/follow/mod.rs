@@ -1,7 +1,7 @@
 //! The frame loop: a solved state ([`Follower`]) and the phases that bring it to another instant.
 //!
-//! `phases` has the order of a frame (`Follower::frame`). Everything about places, emission and reflection is asked of the
-//! follower's `Space`, which space and plane implement. Must not know polygons, segments, scenes or files.
+//! `phases` has the order of a frame (`Follower::frame`). Places, emission and reflection come from a trait, `Space`, which the
+//! rooms `space` (polygons) and `flat` (segments in the plane) implement. Must not know polygons, segments, scenes or files.
 
 mod budget;
 mod clock;

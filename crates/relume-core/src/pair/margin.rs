@@ -1,8 +1,8 @@
 //! Margins of verdicts: the change of brightness of a pair's ends up to which its verdict cannot change.
 //!
-//! Margins are a cache, not part of the state: a pair whose margin covers a change of brightness is not judged again. All numbers are logarithms in steps of 1/240 of an octave, rounded to the safe side when a pair is
-//! judged; changes of brightness are added to them exactly, so that what brightens and darkens again leaves
-//! them as they were.
+//! Margins are a cache, not part of the state: a pair whose margin covers a change of brightness is not judged again. All numbers
+//! are logarithms in steps of 1/240 of an octave, rounded to the safe side when a pair is judged. Changes of brightness are
+//! added exactly: an end that brightens and darkens again has the margin that it had.
 
 use super::brightness::Brightness;
 use crate::transport::Side;

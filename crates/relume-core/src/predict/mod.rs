@@ -1,4 +1,4 @@
-//! Prediction: what the known motion allows within the coming time, and until when.
+//! Prediction: bounds of the known motion of bodies over the coming time.
 //!
 //! [`MotionBounds`] say how far bodies can get until coming ticks ([`Ticks`]): certificates rest on them. [`History`] draws a
 //! line through the last evaluations of a pair: extrapolation rests on it. Must not know pairs or light.

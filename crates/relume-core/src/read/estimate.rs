@@ -24,6 +24,7 @@ use super::tuning::{
 
 /// Irradiance that the mesh says at a point of a surface, beside what arrives there if all else is right.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct PointError {
     /// The patch that it is on.
     pub patch: PatchId,

@@ -1,6 +1,6 @@
 //! Readers of a solution: snapshots, sensors, tables, errors, comparisons.
 //!
-//! All of them take a solved state and change nothing. Must not know what led to it: sessions, commands or clips.
+//! All of them take a solved state and change nothing. Must not know sessions, commands or clips.
 
 mod accuracy;
 mod bends;

@@ -1,4 +1,4 @@
-//! What is lit: bodies, patches, materials, lights, cameras and their motion.
+//! Scenes: bodies, patches, materials, lights, cameras and their motion.
 //!
 //! A [`Scene`] is validated when it is made and immutable afterwards; every pose is a pure
 //! function of time. Scenes are built in code ([`SceneBuilder`]) or from what a reader of files hands over

@@ -1,9 +1,9 @@
 //! Estimate of pairs, memory and time of a frame before it is solved.
 //!
-//! The estimate follows from the number of pairs of patches face each other that are in no group: all of them are judged, whatever the
-//! tolerance, and most of them become links. Half of them meet each part of what is distant, or their groups do. What refinement adds
-//! is small for many patches, and large for few. Patches of groups cost a number of pairs each. The numbers were fitted to scenes measured (docs/performance.md). Nothing that is solved depends on an
-//! estimate.
+//! The estimate follows from the number of pairs of patches that face each other and are in no group: all of them are judged, at any
+//! tolerance, and most of them become links. Half of these patches, or of their groups, have a pair with each distant polygon.
+//! Refinement adds few pairs to many patches, and many to few. Each patch of a group costs a number of pairs. The numbers were
+//! fitted to measured scenes (docs/performance.md). No solution depends on an estimate.
 
 use glam::DVec3;
 use rayon::prelude::*;

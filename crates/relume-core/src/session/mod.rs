@@ -1,4 +1,4 @@
-//! The session owns all mutable state: commands go in, frames come out.
+//! The session: owner of all mutable state, which takes commands and gives access to solved frames.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

@@ -1,6 +1,6 @@
-//! Space as followers see it: polygons on bodies, their places in a world, and their light.
+//! Polygons on bodies, their places in a world and their light, as the frame loop (`follow`) asks for them.
 //!
-//! [`Solved`] is a solved state of a scene: what everything that reads a solution takes. Must not know commands or clips.
+//! [`Solved`] is a solved state of a scene; everything that reads a solution takes one. Must not know commands or clips.
 
 mod bed;
 mod coarse;

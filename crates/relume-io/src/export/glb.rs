@@ -18,6 +18,7 @@ use relume_core::scene::{
 use serde_json::{Map, Value, json};
 
 use super::write_atomically;
+use crate::photometry::PEAK_LUMENS_PER_WATT;
 
 /// Near plane written for cameras, metres: glTF demands one and a [`Scene`] has none.
 const CAMERA_NEAR_M: f64 = 0.01;
@@ -552,7 +553,7 @@ impl Lamp {
     }
 
     fn of_light(light: &Light) -> Lamp {
-        Lamp::new(light.intensity, light.glow.as_ref(), LUMENS_PER_WATT)
+        Lamp::new(light.intensity, light.glow.as_ref(), PEAK_LUMENS_PER_WATT)
     }
 
     /// Of an emission in a unit that is `per_unit` of the file's.
@@ -590,9 +591,6 @@ fn colour_and_strength(value: [f64; 3]) -> ([f64; 3], f64) {
         (value.map(|v| v / largest), largest)
     }
 }
-
-/// Lumens a watt: the definition of the candela at 540 THz, used by glTF exporters for all colours.
-const LUMENS_PER_WATT: f64 = 683.0;
 
 fn punctual(light: &Light) -> Value {
     let Lamp { colour, strength, .. } = Lamp::of_light(light);

@@ -10,10 +10,8 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use super::animation::GlowKeys;
 use super::document::Document;
 use super::{json, note};
+use crate::photometry::PEAK_LUMENS_PER_WATT;
 use relume_core::scene::{Light, LightKind, NodeId, Note, Projection, SceneError, Severity};
-
-/// Lumens in a watt at 555 nm.
-const LUMENS_PER_WATT: f64 = 683.0;
 
 /// The light `index` of the file on a node.
 pub(super) fn light(
@@ -27,7 +25,7 @@ pub(super) fn light(
     let kind = kind_of(document, light, name)?;
     let colour = light.color.unwrap_or([1.0; 3]);
     let stated = light.intensity.unwrap_or(1.0);
-    let intensity = colour.map(|c| c * stated / LUMENS_PER_WATT);
+    let intensity = colour.map(|c| c * stated / PEAK_LUMENS_PER_WATT);
     if intensity.iter().any(|i| !i.is_finite() || *i < 0.0) {
         return Err(document.malformed(format!(
             "light `{name}` has the intensity {stated} and the colour {colour:?}"
@@ -44,7 +42,7 @@ pub(super) fn light(
     if light.range.is_some() {
         conversion.push_str("; its range is ignored");
     }
-    let glow = keys.glow((colour, stated), [1.0 / LUMENS_PER_WATT; 3]);
+    let glow = keys.glow((colour, stated), [1.0 / PEAK_LUMENS_PER_WATT; 3]);
     if glow.is_some() {
         conversion.push_str("; it changes over time");
     }

@@ -1,5 +1,5 @@
-//! How surfaces of files look: images and vertex colours on triangles, as polygons with their means and what pictures
-//! show on them.
+//! Reflectance and emission of surfaces of files: images and vertex colours on triangles, as means over polygons for the solver and
+//! as texture coordinates for pictures.
 //!
 //! Must not know formats of scenes, or materials.
 

@@ -162,3 +162,78 @@ fn difference<T: PartialEq>(
     out.extend(one.iter().filter(|part| !two.contains(part)).map(&bounds));
     out.extend(two.iter().filter(|part| !one.contains(part)).map(&bounds));
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+
+    use super::*;
+    use crate::scene::SceneBuilder;
+
+    /// A room with two boxes, each sunk into the floor and into one of two walls that face each other.
+    fn room() -> Scene {
+        let mut b = SceneBuilder::new("sunk");
+        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let room = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+        b.cuboid_inward(room, "room", grey, DVec3::ZERO, DVec3::new(4.0, 2.0, 3.0));
+        for (name, x) in [("left", 0.1), ("right", 3.8)] {
+            let node = b.node(name, None, DVec3::new(x, 0.1, 1.0), DQuat::IDENTITY);
+            b.cuboid(node, name, grey, DVec3::splat(-0.5), DVec3::splat(0.5));
+        }
+        b.build().unwrap()
+    }
+
+    /// Elements of the side of the room that looks along `normal`, divided `depth` times.
+    fn elements(forest: &mut Forest, scene: &Scene, normal: DVec3, depth: u32) -> Vec<ElementId> {
+        let is = |p: &PatchId| scene.patches[p.0 as usize].frame.normal.dot(normal) > 0.9;
+        let area_m2 = |p: &PatchId| scene.patches[p.0 as usize].area_m2();
+        let patches = (0..scene.patches.len() as u32).map(PatchId).filter(is);
+        let root = patches.max_by(|p, q| area_m2(p).total_cmp(&area_m2(q))).unwrap();
+        let (mut stack, mut all) = (vec![(forest.patch_root(root), depth)], Vec::new());
+        while let Some((id, depth)) = stack.pop() {
+            let parts = match forest.kind(id) {
+                Kind::Element if depth == 0 => {
+                    all.push(id);
+                    continue;
+                }
+                Kind::Element => (forest.split(id).0, depth - 1),
+                // A patch that is cut along lines of contact: facets.
+                _ => (forest.children(id), depth),
+            };
+            stack.extend(parts.0.map(|id| (ElementId(id), parts.1)));
+        }
+        all
+    }
+
+    #[test]
+    fn only_elements_that_reach_into_one_body_may_be_inside_alike() {
+        let scene = room();
+        let mut forest = Forest::new(&scene);
+        let mut of = |normal| elements(&mut forest, &scene, normal, 2);
+        let (floor, left, right) = (of(DVec3::Y), of(DVec3::X), of(DVec3::NEG_X));
+        let bodies = |id: ElementId| -> Vec<_> {
+            forest.parts_inside(id).into_iter().map(|part| part.of.0).collect()
+        };
+        let mut counts = [0; 2];
+        let pairs = |with: &[ElementId]| -> Vec<(ElementId, ElementId)> {
+            floor.iter().flat_map(|a| with.iter().map(|b| (*a, *b))).collect()
+        };
+        for (a, b) in [pairs(&left), pairs(&right)].concat() {
+            let may = forest.may_be_inside_alike(a, b);
+            assert_eq!(may, forest.may_be_inside_alike(b, a));
+            let of_b = bodies(b);
+            let is = bodies(a).iter().any(|of| of_b.contains(of));
+            assert!(may || !is, "{a:?} and {b:?} share a body");
+            counts[usize::from(may)] += 1;
+        }
+        // Few parts of the floor and of a wall are near one box.
+        assert!(counts[1] > 0 && 4 * counts[1] < counts[0], "{counts:?}");
+        let near = |all: &[ElementId]| -> Vec<ElementId> {
+            all.iter().copied().filter(|id| !bodies(*id).is_empty()).collect()
+        };
+        let (left, right) = (near(&left), near(&right));
+        assert!(!left.is_empty() && !right.is_empty());
+        let across = left.iter().any(|a| right.iter().any(|b| forest.may_be_inside_alike(*a, *b)));
+        assert!(!across, "they lie in different boxes");
+    }
+}

@@ -32,6 +32,7 @@ pub enum Closure {
 
 /// Error: a row sum differs from 1 by more than links err; closure needs a closed scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Open {
     /// The row furthest from 1.
     pub group: u32,

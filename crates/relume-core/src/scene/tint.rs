@@ -28,7 +28,7 @@ impl Scene {
     /// Which patches emit light at any time, with exitances in hand, W/m2, beside those of the scene. Patches are lamps from
     /// `LAMP_LEAST` times the mean exitance of what the scene was made of, at the most of all time: where everything glows nothing lights
     /// its neighbours more than the rest does. Cost: proportional to the patches.
-    pub fn glowing(&self, by_hand: &dyn Fn(&Patch) -> [f64; 3]) -> Glowing {
+    pub(crate) fn glowing(&self, by_hand: &dyn Fn(&Patch) -> [f64; 3]) -> Glowing {
         let sum = |exitance: [f64; 3]| exitance.iter().sum::<f64>();
         let made = self.patches.iter().filter(|patch| self.is_made(patch));
         let flux_w: f64 = made.map(|p| sum(self.most_exitance(p)) * p.area_m2()).sum();

@@ -11,7 +11,7 @@ use super::groups::{Group, Groups};
 use super::ids::{ElementId, ElementKey, Kind, Renumbering};
 use super::split::{Chart, Extent, Place, Seam, Shape, overlap};
 use crate::geometry::Aabb;
-use crate::scene::{BodyId, Covered, Covering, Enclosure, PatchId, Solid, Solids};
+use crate::scene::{BodyId, Covered, Covering, Enclosure, Glowing, PatchId, Solid, Solids};
 
 mod cover;
 mod grouping;
@@ -140,11 +140,11 @@ struct Fixed {
     covering: Covering,
     /// Box around the unit normals of the patches at or below each node, in their bodies' frames.
     normals: Vec<Aabb>,
-    /// Whether a patch emits light at any time, by patch.
-    glows: Vec<bool>,
-    /// Whether any patch at or below a node does, by id.
-    may_glow: Vec<bool>,
-    /// Whether a patch does, or there is a punctual light.
+    /// Which patches emit light.
+    glowing: Glowing,
+    /// Whether any patch at or below a node is a lamp, by id.
+    may_hold_lamp: Vec<bool>,
+    /// Whether a patch emits light at any time, or there is a punctual light.
     shines: bool,
     /// Area of the patches connected with each patch, itself among them, by patch, m2.
     connected_m2: Vec<f64>,
@@ -527,32 +527,33 @@ impl Forest {
         self.fixed.solids.enclosures[patch.0 as usize]
     }
 
-    /// Whether a patch emits light at any time.
-    pub fn glows(&self, patch: PatchId) -> bool {
-        self.fixed.glows[patch.0 as usize]
+    /// Whether a patch is a lamp: at some time it emits far more than surfaces do on average.
+    pub fn is_lamp(&self, patch: PatchId) -> bool {
+        self.fixed.glowing.as_lamp[patch.0 as usize]
     }
 
-    /// Whether any patch at or below a node of the fixed part does.
-    pub fn may_glow(&self, id: ElementId) -> bool {
-        self.fixed.may_glow[id.0 as usize]
+    /// Whether any patch at or below a node of the fixed part is a lamp.
+    pub fn may_hold_lamp(&self, id: ElementId) -> bool {
+        self.fixed.may_hold_lamp[id.0 as usize]
     }
 
-    /// Says which patches emit light at any time. Whether that differs from before.
-    pub fn set_glows(&mut self, glows: Vec<bool>) -> bool {
-        let differs = self.fixed.glows != glows;
+    /// Says which patches emit light. Whether that differs from before.
+    pub fn set_glowing(&mut self, glowing: Glowing) -> bool {
+        let differs = self.fixed.glowing != glowing;
         if differs {
             let lights = (0..self.fixed_len).any(|id| self.kind(ElementId(id)) == Kind::Light);
-            let mut may_glow = vec![false; self.fixed_len as usize];
+            let mut may_hold_lamp = vec![false; self.fixed_len as usize];
             for id in (0..self.fixed_len).rev() {
-                let glowing = self.patch(ElementId(id)).is_some_and(|p| glows[p.0 as usize]);
-                may_glow[id as usize] |= glowing;
-                if let Some(parent) = self.parent(ElementId(id)).filter(|_| may_glow[id as usize]) {
-                    may_glow[parent.0 as usize] = true;
+                let patch = self.patch(ElementId(id));
+                may_hold_lamp[id as usize] |= patch.is_some_and(|p| glowing.as_lamp[p.0 as usize]);
+                let parent = self.parent(ElementId(id));
+                if let Some(parent) = parent.filter(|_| may_hold_lamp[id as usize]) {
+                    may_hold_lamp[parent.0 as usize] = true;
                 }
             }
-            self.fixed_mut().may_glow = may_glow;
-            self.fixed_mut().shines = lights || glows.contains(&true);
-            self.fixed_mut().glows = glows;
+            self.fixed_mut().may_hold_lamp = may_hold_lamp;
+            self.fixed_mut().shines = lights || glowing.at_all.contains(&true);
+            self.fixed_mut().glowing = glowing;
         }
         differs
     }
@@ -567,7 +568,7 @@ impl Forest {
     pub fn is_as_displaced(&self, other: &Forest) -> bool {
         let (own, others) = (&self.fixed, &other.fixed);
         own.covered == others.covered
-            && own.glows == others.glows
+            && own.glowing == others.glowing
             && own.subjects == others.subjects
             && own.groups.ids == others.groups.ids
     }

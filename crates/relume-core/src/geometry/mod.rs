@@ -3,6 +3,7 @@
 //! This room must not know what a scene, a light or a frame is.
 
 mod bounds;
+mod box_tree;
 mod convex;
 mod cut;
 mod hull;
@@ -11,6 +12,7 @@ mod region;
 mod tuning;
 
 pub use bounds::{Aabb, Interval, ShaftOfBoxes, shaft_meets_box};
+pub use box_tree::BoxTree;
 pub use convex::{ConvexPolygon, Plane, polygon_area, split_convex};
 pub use cut::{Segment, cut_along, segment_within};
 pub use hull::is_outside_hull;

@@ -213,7 +213,7 @@ impl SpaceCertificateTests<'_> {
             return false;
         }
         // A lamp matters wherever it is in the shaft.
-        if self.forest.glows(patch) {
+        if self.forest.is_lamp(patch) {
             return true;
         }
         let Some((a, b)) = ends.places else { return true };

@@ -120,7 +120,7 @@ impl<'a> BoxShaft<'a> {
         if self.view.is_hidden_twin(patch) {
             return true;
         }
-        let is_behind = |end| !self.forest.glows(patch) && self.is_behind(patch, end);
+        let is_behind = |end| !self.forest.is_lamp(patch) && self.is_behind(patch, end);
         self.patches.iter().flatten().any(|&end| patch == end || is_behind(end))
     }
 

@@ -10,13 +10,18 @@ use super::placed::{IN_PLANE, Placed};
 use super::topology::{Polygon, components, matched, sides_of};
 use super::weld::Weld;
 use super::{BodyId, InPlane, PatchId, Scene, Sheet, Solids};
-use crate::geometry::{Aabb, Moments, Plane, Pose, Segment, common, difference, within_outlines};
+use crate::geometry::{
+    Aabb, BoxTree, Moments, Plane, Pose, Segment, common, difference, within_outlines,
+};
 use crate::scene::tuning::{
     COVERED_CUTS_MAX, COVERED_PARTS_MAX, COVERED_WHOLLY, COVERING_POLYGONS_MAX,
 };
 
 /// Bodies are cut this far above a patch to see what they cover, in roundings.
 const ABOVE: f64 = 4.0;
+
+/// Lamps further from the box of a body, in roundings, neither are in it nor touch it.
+const REACH: f64 = 16.0;
 
 /// Parts of less than this share of a patch are rounding.
 const SLIVER: f64 = 1e-9;
@@ -67,8 +72,10 @@ impl Scene {
             .filter(|&body| !self.is_distant(body))
             .partition(|&b| self.moves(b) || is_displaced(b));
         let mut cuts_left = COVERED_CUTS_MAX;
+        let lamps = Lamps::of(self);
         let mut cover = |bodies: &[BodyId], is_own: bool| {
-            Group::new(self, bodies, is_own).cover((self, solids), &mut out, &mut cuts_left);
+            let group = Group::new(self, &lamps, bodies, is_own);
+            group.cover((self, solids), &mut out, &mut cuts_left);
         };
         cover(&at_rest, false);
         moving.into_iter().for_each(|body| cover(&[body], true));
@@ -81,10 +88,12 @@ impl Scene {
 }
 
 /// Patches that share a frame.
-struct Group {
+struct Group<'a> {
     placed: Vec<Placed>,
+    /// Their boxes.
+    boxes: BoxTree,
     hulls: Vec<Hull>,
-    lamps: Lamps,
+    lamps: OfBodies<'a>,
     slack_m: f64,
     /// Whether they are those of a body that moves, in its frame.
     is_own: bool,
@@ -92,46 +101,62 @@ struct Group {
 
 /// Where what emits can get in the whole animation, in the world.
 struct Lamps {
+    /// Ascending.
     patches: Vec<(PatchId, Aabb)>,
+    /// Over their boxes.
+    tree: BoxTree,
     lights: Vec<Aabb>,
+    /// By body.
+    ways: Vec<Way>,
 }
 
 impl Lamps {
-    /// As some bodies may hold them: those of the scene as it was made, and their own.
-    fn of(scene: &Scene, bodies: &[BodyId]) -> Lamps {
-        let counts = |body| !scene.is_inserted(body) || bodies.contains(&body);
-        let emits = |id: &u32| {
-            let patch = &scene.patches[*id as usize];
-            scene.patch_emits(patch) && counts(patch.body)
-        };
-        let [from, to] = scene.motion.span_s();
-        let patch = |id: u32| {
-            let patch = &scene.patches[id as usize];
+    fn of(scene: &Scene) -> Lamps {
+        let bodies = (0..scene.bodies.len() as u32).map(BodyId);
+        let ways: Vec<Way> = bodies.map(|body| Way::of(scene, body)).collect();
+        let shining = (0..scene.patches.len() as u32).map(PatchId).zip(&scene.patches);
+        let of_patch = |(id, patch): (PatchId, &super::Patch)| {
             let bounds = Aabb::of(patch.corners_in_body());
-            (PatchId(id), way(scene, patch.body, &bounds, [from, to]))
+            (id, ways[patch.body.0 as usize].around(&bounds))
         };
+        let patches: Vec<(PatchId, Aabb)> =
+            shining.filter(|(_, patch)| scene.patch_emits(patch)).map(of_patch).collect();
+        let [from, to] = scene.motion.span_s();
         let light = |l: &super::Light| {
             let at = scene.motion.place(l.node, from).translation;
             Aabb::of([at]).sum(&scene.motion.drift(l.node, 0.0, [from, to]).reach())
         };
-        Lamps {
-            patches: (0..scene.patches.len() as u32).filter(emits).map(patch).collect(),
-            lights: scene.lights.iter().map(light).collect(),
-        }
+        let tree = BoxTree::new(patches.iter().map(|p| p.1));
+        Lamps { patches, tree, lights: scene.lights.iter().map(light).collect(), ways }
+    }
+}
+
+/// Lamps as some bodies may hold them: those of the scene as it was made, and their own.
+struct OfBodies<'a> {
+    scene: &'a Scene,
+    all: &'a Lamps,
+    bodies: &'a [BodyId],
+}
+
+impl OfBodies<'_> {
+    fn counts(&self, lamp: usize) -> bool {
+        let body = self.scene.patches[self.all.patches[lamp].0.0 as usize].body;
+        !self.scene.is_inserted(body) || self.bodies.contains(&body)
     }
 
     /// Whether a lamp is or may get into a box.
     fn may_be_at(&self, bounds: &Aabb) -> bool {
-        self.lights.iter().chain(self.patches.iter().map(|p| &p.1)).any(|lamp| lamp.meets(bounds))
+        self.all.lights.iter().any(|light| light.meets(bounds))
+            || self.all.tree.any(bounds, |lamp| self.counts(lamp))
     }
 
     /// Whether a lamp is or may get among the polygons of a body. An inner side that emits counts; touching is enough where they are
     /// two-sided and it may look in: a lamp that lies flush in a ceiling.
-    fn may_be_in(&self, scene: &Scene, (placed, hull): (&[Placed], &Hull), slack_m: f64) -> bool {
-        let own = |id: PatchId, of: &[usize]| of.iter().any(|&k| placed[k].id == id);
+    fn may_be_in(&self, (placed, hull): (&[Placed], &Hull), slack_m: f64) -> bool {
+        let scene = self.scene;
         let is_two_sided = !hull.twins.is_empty();
         let body = scene.patches[placed[hull.polygons[0]].id.0 as usize].body;
-        let bounds = way(scene, body, &hull.bounds, scene.motion.span_s());
+        let bounds = self.all.ways[body.0 as usize].around(&hull.bounds);
         let within = |lamp: &Aabb, touching: bool| {
             let [by, before] = if touching { [4.0, 2.0] } else { [2.0, 4.0] };
             let lamp = lamp.grown(by * slack_m);
@@ -139,31 +164,42 @@ impl Lamps {
             least.all() && (scene.moves(body) || !hull.is_before(placed, &lamp, before * slack_m))
         };
         // Of those in the same frame it is known how they lie.
-        let there = |id: PatchId| placed.binary_search_by_key(&id, |p| p.id).ok();
-        let shines_in = |id: PatchId, lamp: &Aabb| match there(id) {
-            Some(k) => within(lamp, false) || hull.is_lit_by(placed, &placed[k], slack_m),
-            None => within(lamp, is_two_sided),
-        };
-        self.lights.iter().any(|light| within(light, is_two_sided))
-            || self.patches.iter().any(|(id, lamp)| match own(*id, &hull.polygons) {
-                true => is_two_sided,
-                false => shines_in(*id, lamp),
+        let may_be_in =
+            |&(id, ref lamp): &(PatchId, Aabb)| match placed.binary_search_by_key(&id, |p| p.id) {
+                Ok(k) if hull.polygons.binary_search(&k).is_ok() => is_two_sided,
+                Ok(k) => within(lamp, false) || hull.is_lit_by(placed, &placed[k], slack_m),
+                Err(_) => within(lamp, is_two_sided),
+            };
+        let patches = &self.all.patches;
+        self.all.lights.iter().any(|light| within(light, is_two_sided))
+            || self.all.tree.any(&bounds.grown(REACH * slack_m), |lamp| {
+                self.counts(lamp) && may_be_in(&patches[lamp])
             })
     }
 }
 
-/// Where something of a body can get from one time to another, in the world.
-fn way(scene: &Scene, body: BodyId, bounds: &Aabb, [from, to]: [f64; 2]) -> Aabb {
-    if !scene.moves(body) {
-        return *bounds;
+/// Where a body can get in the whole animation: its pose at the start, and how far its points get from there; `None` if it rests.
+struct Way(Option<(Pose, Aabb)>);
+
+impl Way {
+    /// Cost: proportional to the patches of the body.
+    fn of(scene: &Scene, body: BodyId) -> Way {
+        let [from, to] = scene.motion.span_s();
+        let node = scene.bodies[body.0 as usize].node;
+        let way = || (scene.motion.place(node, from), scene.drift(body, [from, to]).reach());
+        Way(scene.moves(body).then(way))
     }
-    let pose = scene.motion.place(scene.bodies[body.0 as usize].node, from);
-    let corner = |k: u32| {
-        let pick = |axis: u32, lo: f64, hi: f64| if k >> axis & 1 == 0 { lo } else { hi };
-        let (lo, hi) = (bounds.lo, bounds.hi);
-        pose.point(DVec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z)))
-    };
-    Aabb::of((0..8).map(corner)).sum(&scene.drift(body, [from, to]).reach())
+
+    /// A box around something of the body on all of its way, in the world.
+    fn around(&self, bounds: &Aabb) -> Aabb {
+        let Some((pose, reach)) = &self.0 else { return *bounds };
+        let corner = |k: u32| {
+            let pick = |axis: u32, lo: f64, hi: f64| if k >> axis & 1 == 0 { lo } else { hi };
+            let (lo, hi) = (bounds.lo, bounds.hi);
+            pose.point(DVec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z)))
+        };
+        Aabb::of((0..8).map(corner)).sum(reach)
+    }
 }
 
 /// Polygons of a body that hang together along sides.
@@ -182,8 +218,8 @@ pub(super) struct Hull {
     pub(super) of: (BodyId, u32),
 }
 
-impl Group {
-    fn new(scene: &Scene, bodies: &[BodyId], is_own: bool) -> Group {
+impl<'a> Group<'a> {
+    fn new(scene: &'a Scene, all: &'a Lamps, bodies: &'a [BodyId], is_own: bool) -> Group<'a> {
         let mut placed = Vec::new();
         let mut hulls = Vec::new();
         for &body in bodies {
@@ -193,26 +229,31 @@ impl Group {
             hulls_of(scene, (&placed, first), &mut hulls);
         }
         let slack_m = IN_PLANE * placed.iter().map(|p| reach_m(&p.bounds)).fold(0.0, f64::max);
-        let lamps = Lamps::of(scene, bodies);
-        hulls.retain(|hull: &Hull| !lamps.may_be_in(scene, (&placed, hull), slack_m));
-        Group { placed, hulls, lamps, slack_m, is_own }
+        let lamps = OfBodies { scene, all, bodies };
+        hulls.retain(|hull: &Hull| !lamps.may_be_in((&placed, hull), slack_m));
+        let boxes = BoxTree::new(placed.iter().map(|p| p.bounds));
+        Group { placed, boxes, hulls, lamps, slack_m, is_own }
     }
 
     fn cover(&self, (scene, solids): (&Scene, &Solids), out: &mut [Covered], left: &mut usize) {
         let mut order: Vec<usize> = (0..self.placed.len()).collect();
         let low = |k: &usize| self.placed[*k].bounds.lo.x;
         order.sort_by(|p, q| low(p).total_cmp(&low(q)).then(p.cmp(q)));
-        for (at, &one) in order.iter().enumerate() {
-            let end = self.placed[one].bounds.hi.x + self.slack_m;
-            let beside = order[at + 1..].iter().take_while(|q| low(q) <= end);
-            for &other in beside.filter(|&&q| self.may_touch(one, q)) {
-                self.touch((scene, solids), [one, other], out, left);
+        let mut ranks = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(rank, &k)| ranks[k] = rank);
+        let order = Order { order, ranks };
+        for &one in &order.order {
+            let reach = self.placed[one].bounds.grown(self.slack_m);
+            for other in order.after(one, &self.boxes, &reach) {
+                if self.may_touch(one, other) {
+                    self.touch((scene, solids), [one, other], out, left);
+                }
             }
         }
         for hull in &self.hulls {
-            let grown = hull.bounds.grown(self.slack_m);
-            for (k, patch) in self.placed.iter().enumerate() {
-                if patch.bounds.meets(&grown) && !hull.holds(k) {
+            for k in self.boxes.meeting(&hull.bounds.grown(self.slack_m)) {
+                let patch = &self.placed[k];
+                if !hull.holds(k) {
                     self.stand(scene, hull, patch, (&mut out[patch.id.0 as usize], left));
                 }
             }
@@ -220,18 +261,16 @@ impl Group {
         self.narrow(scene, &order, out, left);
     }
 
-    /// What of patches lies in narrow gaps; their numbers are in the order of their lowest coordinates.
-    fn narrow(&self, scene: &Scene, order: &[usize], out: &mut [Covered], left: &mut usize) {
+    /// What of patches lies in narrow gaps.
+    fn narrow(&self, scene: &Scene, order: &Order, out: &mut [Covered], left: &mut usize) {
         let open = open_sides(&self.placed);
         let face = |k: usize| Face { placed: &self.placed[k], open: open[k] };
-        for (at, &one) in order.iter().enumerate() {
-            let hi_x = gap_reach(&self.placed[one].bounds).hi.x;
-            let may_be = |q: &usize| self.placed[*q].bounds.lo.x <= hi_x;
-            let others = order[at + 1..].iter().copied().take_while(may_be).map(face);
+        for &one in &order.order {
+            let reach = gap_reach(&self.placed[one].bounds);
+            let others = order.after(one, &self.boxes, &reach).into_iter().map(face);
             let body = scene.patches[self.placed[one].id.0 as usize].body;
-            let may_hold_lamp = |bounds: &Aabb| {
-                self.lamps.may_be_at(&way(scene, body, bounds, scene.motion.span_s()))
-            };
+            let way = &self.lamps.all.ways[body.0 as usize];
+            let may_hold_lamp = |bounds: &Aabb| self.lamps.may_be_at(&way.around(bounds));
             for part in dark_in_gaps(face(one), others, self.slack_m, self.is_own, may_hold_lamp) {
                 let covered = &mut out[part.patch.0 as usize];
                 part.add_to(scene, covered, left);
@@ -283,6 +322,23 @@ impl Group {
     /// What a body covers of a patch that it stands on or sticks in.
     fn stand(&self, scene: &Scene, hull: &Hull, patch: &Placed, out: (&mut Covered, &mut usize)) {
         stand(scene, (&self.placed, hull), (patch, self.is_own), self.slack_m, out);
+    }
+}
+
+/// Patches by their lowest coordinates.
+struct Order {
+    order: Vec<usize>,
+    /// Places in the order, by patch.
+    ranks: Vec<usize>,
+}
+
+impl Order {
+    /// Those after one of them whose boxes meet a box, in their order.
+    fn after(&self, one: usize, boxes: &BoxTree, bounds: &Aabb) -> Vec<usize> {
+        let mut out = boxes.meeting(bounds);
+        out.retain(|&k| self.ranks[k] > self.ranks[one]);
+        out.sort_unstable_by_key(|&k| self.ranks[k]);
+        out
     }
 }
 

@@ -11,7 +11,7 @@ use super::covered::{Face, Hull, dark_in_gaps, hulls_of, reach_m, stand};
 use super::gap::{open_sides, widest_m};
 use super::placed::{IN_PLANE, Placed};
 use super::{BodyId, Covered, Patch, PatchId, Scene};
-use crate::geometry::{Aabb, Pose};
+use crate::geometry::{Aabb, BoxTree, Pose};
 use crate::scene::tuning::{COVERING_CUTS_MAX, GAP_PAIRS_MAX};
 
 /// Bodies that may cover or be covered where one of them is moved.
@@ -151,22 +151,19 @@ impl Covering {
         (out, left): (&mut BTreeMap<PatchId, Covered>, &mut usize),
     ) {
         let Pair { scene, polygons, bodies: [one, other], .. } = *pair;
+        let patches = placed(scene, other.body, &other.pose);
+        let boxes = BoxTree::new(patches.iter().map(|patch| patch.bounds));
         for hull in hulls {
             let bounds = moved(&hull.bounds, &one.pose);
             let slack_m = IN_PLANE * reach_m(&bounds);
-            let reach = bounds.grown(slack_m);
-            let near = |(id, patch): (PatchId, &Patch)| {
-                let there = Placed::new(id, patch, &other.pose);
-                there.bounds.meets(&reach).then_some(there)
-            };
-            let near: Vec<Placed> = scene.patches_of(other.body).filter_map(near).collect();
+            let near = boxes.meeting(&bounds.grown(slack_m));
             if near.is_empty() || Covering::may_hold_light(pair, (hull, &bounds), present, slack_m)
             {
                 continue;
             }
             let border = hull.border.iter().map(|&c| one.pose.point(c)).collect();
             let hull = Hull { border, bounds, ..hull.clone() };
-            for patch in &near {
+            for patch in near.into_iter().map(|k| &patches[k]) {
                 let covered =
                     out.entry(patch.id).or_insert_with(|| rest[patch.id.0 as usize].clone());
                 stand(scene, (polygons, &hull), (patch, false), slack_m, (covered, left));
@@ -215,7 +212,7 @@ fn narrow(
     (known, present): (&Bodies, &[Present]),
     (out, left): (&mut BTreeMap<PatchId, Covered>, &mut usize),
 ) {
-    let mut lamps: Option<Vec<Aabb>> = None;
+    let mut lamps: Option<BoxTree> = None;
     for (k, one) in present.iter().enumerate() {
         for other in present[k + 1..].iter().filter(|other| one.is_moved || other.is_moved) {
             let size = |b: &Present| widest_m((b.bounds.hi - b.bounds.lo).max_element());
@@ -236,7 +233,7 @@ fn narrow(
             let open = |of: &Present, at: usize| known.open[of.body.0 as usize][at];
             let mut may_hold_lamp = |bounds: &Aabb| {
                 let lamps = lamps.get_or_insert_with(|| lamps_of(scene, now, present));
-                now.lights.iter().chain(&*lamps).any(|lamp| lamp.meets(bounds))
+                now.lights.iter().any(|lamp| lamp.meets(bounds)) || lamps.any(bounds, |_| true)
             };
             for (i, p) in &of_one {
                 let face = Face { placed: p, open: open(one, *i) };
@@ -254,12 +251,12 @@ fn narrow(
 }
 
 /// Boxes around what emits at any time, where it is.
-fn lamps_of(scene: &Scene, now: &Instant<'_>, present: &[Present]) -> Vec<Aabb> {
+fn lamps_of(scene: &Scene, now: &Instant<'_>, present: &[Present]) -> BoxTree {
     let of_body = |of: &Present| {
         let glowing = scene.patches_of(of.body).filter(|(id, _)| now.glows[id.0 as usize]);
         glowing.map(|(id, patch)| Placed::new(id, patch, &of.pose).bounds).collect::<Vec<_>>()
     };
-    present.iter().flat_map(of_body).collect()
+    BoxTree::new(present.iter().flat_map(of_body))
 }
 
 /// Largest coordinate of bodies, metres.

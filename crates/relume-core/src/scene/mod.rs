@@ -69,7 +69,7 @@ pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
 pub use print::{Print, Printed};
 pub use rigid::check_track;
 pub use solid::{Enclosure, Solid, SolidEdge, SolidFace, Solids};
-pub use tint::Tint;
+pub use tint::{Glowing, Tint};
 pub use world::{Held, World};
 
 /// Index of a [`Body`] in [`Scene::bodies`].
@@ -405,10 +405,14 @@ impl Scene {
     /// Sum of the areas of the bodies that the scene was made with, removed ones among them, m2: the scale that sizes are
     /// measured by, which no body changes that comes or goes.
     pub fn made_area_m2(&self) -> f64 {
-        let is_again = |p: &Patch| self.bodies[p.body.0 as usize].again;
-        let is_made =
-            |p: &&Patch| !self.is_distant(p.body) && !self.is_inserted(p.body) && !is_again(p);
-        self.patches.iter().filter(is_made).map(Patch::area_m2).sum()
+        self.patches.iter().filter(|p| self.is_made(p)).map(Patch::area_m2).sum()
+    }
+
+    /// Whether a patch is one of the surfaces that the scene was made of: not distant, not inserted, and no body's second shape.
+    fn is_made(&self, patch: &Patch) -> bool {
+        let body = patch.body;
+        let is_again = self.bodies[body.0 as usize].again;
+        !self.is_distant(body) && !self.is_inserted(body) && !is_again
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! The one place to ask about the light of a patch. Must not know where tints come from.
 
+use super::tuning::LAMP_LEAST;
 use super::{Material, MaterialId, Patch, Scene, TintId};
 
 /// Reflectance and emission of patches on which textures or vertex colours make them differ from their
@@ -14,7 +15,32 @@ pub struct Tint {
     pub emission: [f64; 3],
 }
 
+/// Which patches emit light; by patch.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Glowing {
+    /// Whether it emits at any time.
+    pub at_all: Vec<bool>,
+    /// Whether it is a lamp: at some time it emits far more than surfaces do on average.
+    pub as_lamp: Vec<bool>,
+}
+
 impl Scene {
+    /// Which patches emit light at any time, with exitances in hand, W/m2, beside those of the scene. Patches are lamps from
+    /// `LAMP_LEAST` times the mean exitance of what the scene was made of, at the most of all time: where everything glows nothing lights
+    /// its neighbours more than the rest does. Cost: proportional to the patches.
+    pub(crate) fn glowing(&self, by_hand: &dyn Fn(&Patch) -> [f64; 3]) -> Glowing {
+        let sum = |exitance: [f64; 3]| exitance.iter().sum::<f64>();
+        let made = self.patches.iter().filter(|patch| self.is_made(patch));
+        let flux_w: f64 = made.map(|p| sum(self.most_exitance(p)) * p.area_m2()).sum();
+        let least = LAMP_LEAST * flux_w / self.made_area_m2().max(f64::MIN_POSITIVE);
+        let most = |p: &Patch| sum(self.most_exitance(p)).max(sum(by_hand(p)));
+        let most: Vec<f64> = self.patches.iter().map(most).collect();
+        Glowing {
+            at_all: most.iter().map(|&m| m > 0.0).collect(),
+            as_lamp: most.iter().map(|&m| m > 0.0 && m >= least).collect(),
+        }
+    }
+
     /// Diffuse reflectance of a patch, linear RGB.
     pub fn reflectance(&self, patch: &Patch) -> [f64; 3] {
         self.tint(patch).map_or(self.material(patch).reflectance, |tint| tint.reflectance)
@@ -74,5 +100,41 @@ impl Scene {
             Some(tint) => [0, 1, 2].map(|c| exitance[c] * tint.emission[c]),
             None => exitance,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+    use crate::scene::{MaterialId, SceneBuilder};
+
+    /// Which of a large square and a small one of a hundredth of its area glow, and which are lamps, if they emit that much.
+    fn glowing(large: f64, small: f64, by_hand: [f64; 2]) -> Glowing {
+        let mut b = SceneBuilder::new("squares");
+        let node = b.node("node", None, DVec3::ZERO, DQuat::IDENTITY);
+        for (name, size, exitance) in [("large", 1.0, large), ("small", 0.1, small)] {
+            let material = b.material(name, [0.5; 3], [exitance; 3]);
+            let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+            let corners = corners.map(|(x, y)| DVec3::new(size * x, size * y, size));
+            b.polygon(node, name, material, &corners);
+        }
+        let scene = b.build().expect("a whole scene");
+        let first = scene.patches[0].material;
+        let in_hand = |m: MaterialId| by_hand[usize::from(m != first)];
+        scene.glowing(&|patch| [in_hand(patch.material); 3])
+    }
+
+    #[test]
+    fn lamps_outshine_the_mean_of_all_surfaces() {
+        let lamps = |large, small, by_hand| glowing(large, small, by_hand).as_lamp;
+        assert_eq!(lamps(0.0, 1.0, [0.0; 2]), [false, true]);
+        assert_eq!(lamps(1.0, 3.0, [0.0; 2]), [false, false], "all of it glows");
+        assert_eq!(lamps(1.0, 5.0, [0.0; 2]), [false, true]);
+        // Hands change themselves alone.
+        assert_eq!(lamps(0.0, 1.0, [1e3, 0.0]), [true, true]);
+        assert_eq!(lamps(0.0, 0.0, [0.0, 1.0]), [false, true]);
+        assert_eq!(glowing(1.0, 3.0, [0.0; 2]).at_all, [true, true]);
     }
 }

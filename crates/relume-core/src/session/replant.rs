@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use crate::element::{ElementId, Forest, Seeds, WorldView, old_coarse_numbers};
 use crate::geometry::Pose;
-use crate::scene::{BodyId, Held, Patch, Scene};
+use crate::scene::{BodyId, Glowing, Held, Scene};
 use crate::space::{Bed, Before, Solved, SpaceState, group_links, replanted_links};
 
 use super::{Session, Update};
@@ -70,9 +70,9 @@ impl Session {
     pub(super) fn follow_hands(&mut self) -> Start {
         let displaced = self.displaced_now();
         if self.is_planted && displaced == self.displaced {
-            let glows = glows(&self.bed.scene, &self.held);
+            let glowing = glowing(&self.bed.scene, &self.held);
             let last = self.solved.take();
-            let is_other = self.bed.seed.set_glows(glows);
+            let is_other = self.bed.seed.set_glowing(glowing);
             return Start { last: last.filter(|_| !is_other), remains: None };
         }
         let scene = Arc::clone(&self.bed.scene);
@@ -109,7 +109,7 @@ impl Session {
         held: &Held,
     ) -> Bed {
         let mut bed = Bed::new(scene, displaced, self.options.bedding());
-        bed.seed.set_glows(glows(&bed.scene, held));
+        bed.seed.set_glowing(glowing(&bed.scene, held));
         bed
     }
 
@@ -176,14 +176,13 @@ fn ends_anew(space: &SpaceState) -> BTreeSet<ElementId> {
     out
 }
 
-/// Whether each patch of a scene emits at any time, with this in hand.
-fn glows(scene: &Scene, held: &Held) -> Vec<bool> {
-    let emits_by_hand = |patch: &Patch| {
-        let Some(exitance) = held.exitances.get(&patch.material) else { return false };
+/// Which patches of a scene emit light at any time, with this in hand.
+fn glowing(scene: &Scene, held: &Held) -> Glowing {
+    scene.glowing(&|patch| {
+        let Some(exitance) = held.exitances.get(&patch.material) else { return [0.0; 3] };
         let share = scene.emission_share(patch);
-        (0..3).any(|c| exitance[c] * share[c] > 0.0)
-    };
-    scene.patches.iter().map(|p| scene.patch_emits(p) || emits_by_hand(p)).collect()
+        [0, 1, 2].map(|c| exitance[c] * share[c])
+    })
 }
 
 /// A state on its way from one scene to another.

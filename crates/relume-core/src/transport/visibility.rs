@@ -213,7 +213,7 @@ impl<'a> Shaft<'a> {
         let occluder =
             if own { self.view.occluder_in_body(patch) } else { self.view.occluder(patch) };
         // A lamp beside the ends lights the one unevenly, though it blocks nothing.
-        let unseen = if self.forest.glows(patch) { Standing::Beside } else { Standing::Out };
+        let unseen = if self.forest.is_lamp(patch) { Standing::Beside } else { Standing::Out };
         let (above_a, above_b) = (span(&occluder, &a.plane), span(&occluder, &b.plane));
         let is_near = |above: Interval| above.lo >= -wide_margin && above.hi <= wide_margin;
         let (passes_wide, passes) = if is_near(above_a) || is_near(above_b) {
@@ -425,13 +425,13 @@ impl<'a> Shaft<'a> {
                 out.push(id.0);
                 match self.forest.patch(id) {
                     Some(patch) => self.meet((patch, standing), listed_max, &mut found),
-                    None if found.is_crowd && !self.forest.may_glow(id) => {}
+                    None if found.is_crowd && !self.forest.may_hold_lamp(id) => {}
                     None => {
                         self.walk(&shafts, id, -1.0, &mut |below, standing| {
                             if let Some(patch) = self.forest.patch(below) {
                                 self.meet((patch, standing), listed_max, &mut found);
                             }
-                            !found.is_crowd || self.forest.may_glow(id)
+                            !found.is_crowd || self.forest.may_hold_lamp(id)
                         });
                     }
                 }
@@ -450,7 +450,7 @@ impl<'a> Shaft<'a> {
                 found.blockers.clear();
             }
         }
-        if self.forest.glows(patch) {
+        if self.forest.is_lamp(patch) {
             found.lamps.push(patch);
         }
     }

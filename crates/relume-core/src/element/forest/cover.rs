@@ -39,7 +39,7 @@ impl Forest {
         let now = Instant {
             poses: world.poses(),
             lights: lights.map(|pose| Aabb::of([pose.translation])).collect(),
-            glows: &self.fixed.glows,
+            glows: &self.fixed.glowing.at_all,
         };
         let now = self.fixed.covering.at(scene, &self.fixed.covered, &now);
         self.set_covered_now(now)

@@ -172,7 +172,7 @@ impl Forest {
         self.sum_areas();
         self.fixed_mut().normals = self.boxes_of_normals(scene);
         self.fixed_mut().shines = !scene.lights.is_empty();
-        self.set_glows(scene.patches.iter().map(|patch| scene.patch_emits(patch)).collect());
+        self.set_glowing(scene.glowing(&|_| [0.0; 3]));
         self.fixed_mut().connected_m2 = scene.connected_areas_m2();
     }
 

@@ -6,7 +6,7 @@
 use super::{
     BodyId, ChildRange, ElementId, Forest, NONE, Node, Renumbering, STAGE, Siblings, exposed_m2,
 };
-use crate::scene::FIRST_NAME;
+use crate::scene::{FIRST_NAME, Glowing};
 
 /// Initial forests of two scenes.
 #[derive(Clone, Copy)]
@@ -84,7 +84,10 @@ impl Forest {
             (Some(a), Some(b)) => a.centre == b.centre && a.radius == b.radius,
             _ => self.is_of_stage(own) != other.is_of_stage(id),
         };
-        let glows = |forest: &Forest, id| forest.patch(id).map(|patch| forest.glows(patch));
+        let glows = |forest: &Forest, id| {
+            let Glowing { at_all, as_lamp } = &forest.fixed.glowing;
+            forest.patch(id).map(|patch| [at_all, as_lamp].map(|of| of[patch.0 as usize]))
+        };
         // What was inserted has other numbers of patches and bodies.
         let subject = |forest: &Forest, id: ElementId| {
             let subject = forest.fixed.subjects.get(id.0 as usize).copied();

@@ -202,7 +202,7 @@ impl Radiosity {
         for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
             let material = surfaces.material(facet.0);
             self.irradiances(surfaces, facet.0, &mut |leaf, h| {
-                own[leaf as usize] = reflected(h, &material, &surfaces.place(leaf), moment);
+                own[leaf as usize] = reflected(h, material, &surfaces.place(leaf), moment);
             });
             let leaf = |id: u32, _: &Linear| own[id as usize];
             pull(surfaces, facet.0, &leaf, &mut self.radiosity);

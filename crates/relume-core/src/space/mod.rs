@@ -6,6 +6,7 @@ mod bed;
 mod coarse;
 mod emission;
 mod groups;
+mod importance;
 mod inner;
 mod phases;
 mod promise;
@@ -17,8 +18,8 @@ mod tuning;
 pub(crate) use bed::{Bed, Bedding};
 pub(crate) use groups::{Before, group_links, replanted_links};
 pub(crate) use phases::Goal;
-pub use state::SpaceState;
 pub(crate) use state::Tuning;
+pub use state::{Aim, SpaceState};
 pub(crate) use surfaces::{LitForest, place_of};
 pub(crate) use tally::row_sums_of;
 

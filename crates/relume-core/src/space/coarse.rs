@@ -9,8 +9,7 @@ use crate::solver::{Dirty, Link, Links, Radiosity, Stop, Surfaces};
 
 use crate::follow::set_pairs;
 
-use super::importance::weigh_by_points;
-use super::state::Aim;
+use super::importance::{Aim, weigh_by_points};
 use super::surfaces::{CoarseReceivers, CoarseSurfaces, LitForest};
 use super::tuning::{
     COARSE_SHARE, COARSE_SWEEPS, DARK_FLOOR, LOST, REFERENCE_SHARE, UNEVEN_AT_POINTS,

@@ -12,6 +12,18 @@ use crate::solver::{Link, Links, Surfaces};
 use super::surfaces::CoarseSurfaces;
 use super::tuning::{COARSE_SWEEPS, POINTS_NEAR, POINTS_SHARE};
 
+/// What the tolerance is about: whose irradiance is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Aim {
+    /// The irradiance that elements have: what pictures, exported light and snapshots show.
+    #[default]
+    Mesh,
+    /// The irradiance that is gathered at points ([`Frame::irradiance_at`](crate::session::Frame::irradiance_at)): sensors. It
+    /// finds lamps' light and shadows itself, so elements only need to send the right light: at the same tolerance with a
+    /// tenth to a half of the links. Elements themselves then err by several times the tolerance.
+    Points,
+}
+
 /// Weighs coarse elements (by number, `known` with unrounded brightness) by what errors on them do to points: their irradiance
 /// is replaced by one over the larger of two weights.
 ///

@@ -17,9 +17,10 @@ mod tuning;
 
 pub(crate) use bed::{Bed, Bedding};
 pub(crate) use groups::{Before, group_links, replanted_links};
+pub use importance::Aim;
 pub(crate) use phases::Goal;
+pub use state::SpaceState;
 pub(crate) use state::Tuning;
-pub use state::{Aim, SpaceState};
 pub(crate) use surfaces::{LitForest, place_of};
 pub(crate) use tally::row_sums_of;
 

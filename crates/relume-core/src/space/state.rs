@@ -9,20 +9,9 @@ use crate::solver::GroupLinks;
 use crate::transport::Simd;
 
 use super::coarse::Coarse;
+use super::importance::Aim;
 use super::surfaces::LitForest;
 use super::tuning::REFERENCE_SHARE;
-
-/// What the tolerance is about: whose irradiance is read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Aim {
-    /// The irradiance that elements have: what pictures, exported light and snapshots show.
-    #[default]
-    Mesh,
-    /// The irradiance that is gathered at points ([`Frame::irradiance_at`](crate::session::Frame::irradiance_at)): sensors. It
-    /// finds lamps' light and shadows itself, so elements only need to send the right light: at the same tolerance with a
-    /// tenth to a half of the links. Elements themselves then err by several times the tolerance.
-    Points,
-}
 
 /// What a scene is solved with.
 #[derive(Clone, Copy, Debug)]

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use indicatif::HumanBytes;
 use relume::scene::{Instants, Scene};
-use relume::session::{Frame, Options, Oracle, Session, SessionError, Snapshot};
+use relume::session::{Aim, Frame, Options, Oracle, Session, SessionError, Snapshot};
 use relume_picture::picture::{self, Exposure, Settings};
 
 use crate::args::{
@@ -230,6 +230,7 @@ impl Clip {
         let update = update.asked_for()?;
         Ok(Options {
             tolerance: self.tolerance,
+            aim: Aim::Mesh,
             oracle,
             update,
             groups: true,

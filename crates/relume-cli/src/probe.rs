@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use relume::scene::{BodyId, Scene};
-use relume::session::{Frame, Sensor, Session};
+use relume::session::{Aim, Frame, Options, Sensor, Session};
 
 use crate::accuracy::Estimates;
 use crate::args::{AccuracyFlag, ProbeArgs};
@@ -36,7 +36,10 @@ pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
     // A sensor in a dark shell reads nothing, whether its walls are there or not; on the mesh it needs them.
     let clip = if args.interpolate { clip } else { clip.without_dark_sides() };
     let mut sink = Sink::open(args.output.as_deref())?;
-    let mut session = clip.session(args.update, false)?;
+    // Gathered readings need no more than the right light from elements.
+    let aim = if args.interpolate { Aim::Mesh } else { Aim::Points };
+    let options = Options { aim, ..clip.options(args.update, false)? };
+    let mut session = clip.session_with(options)?;
     let size = Size::of(&clip, session.options());
     if !args.clip.quiet {
         size.warn(&clip, clip.frames.len(), "");

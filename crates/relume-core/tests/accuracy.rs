@@ -3,7 +3,7 @@
 use crate::common::{at_tolerance, facing_up, flipped, judged, lit_room, v};
 use glam::{DQuat, DVec3};
 use relume_core::scene::{MaterialId, Scene, SceneBuilder};
-use relume_core::session::{PointError, Sensor, Session};
+use relume_core::session::{Aim, Options, PointError, Sensor, Session};
 use relume_judge::path::{self, Site};
 use relume_judge::{Random, World};
 
@@ -101,6 +101,40 @@ fn a_solution_knows_its_own_error() {
         }
     }
     assert!(found_alike.iter().all(|alike| *alike), "{found_alike:?}");
+}
+
+#[test]
+fn a_solution_made_for_points_has_few_links_and_reads_within_the_tolerance() {
+    let all = |e: [f64; 3]| e.iter().sum::<f64>();
+    for scene in [lit_room(), behind_a_slit(), between_blocks()] {
+        let scene = Arc::new(scene);
+        let solved = |tolerance: f64, aim: Aim| {
+            let options = Options { aim, ..at_tolerance(tolerance) };
+            let mut session = Session::new(Arc::clone(&scene), options).unwrap();
+            session.step(0, 0.0).unwrap();
+            session
+        };
+        let sensors = places(&scene, 96, &mut Random::of_part(7, 0));
+        let fine = solved(0.01, Aim::Mesh).frame().unwrap().irradiances_at(&sensors);
+        let mean = fine.iter().map(|&e| all(e)).sum::<f64>() / fine.len() as f64;
+        let links = |session: &Session| session.frame().unwrap().report().links;
+        for tolerance in [0.1, 0.02] {
+            let session = solved(tolerance, Aim::Points);
+            let found = session.frame().unwrap().irradiances_at(&sensors);
+            let lit = found.iter().zip(&fine).filter(|(_, right)| all(**right) > 1e-3 * mean);
+            let squares: Vec<f64> =
+                lit.map(|(&e, &right)| (all(e) / all(right) - 1.0).powi(2)).collect();
+            let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+            let (made, of_mesh) = (links(&session), links(&solved(tolerance, Aim::Mesh)));
+            println!(
+                "{} at {tolerance}: {made} links of {of_mesh}, RMS {:.2} %",
+                scene.name,
+                100.0 * rms
+            );
+            assert!(rms < tolerance, "{} at {tolerance}: {rms}", scene.name);
+            assert!(10 * made < 7 * of_mesh, "{}: {made} links of {of_mesh}", scene.name);
+        }
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::common::{at_tolerance, form_factor_oracle, lit_room, shipped};
 use relume_core::scene::Scene;
-use relume_core::session::{FrameReport, Options, Session, Update};
+use relume_core::session::{Aim, FrameReport, Options, Session, Update};
 
 /// Frames are checked at this rate.
 const FRAMES_PER_SECOND: f64 = 30.0;
@@ -21,9 +21,11 @@ fn pair_of(scene: &Arc<Scene>, options: &Options) -> (Session, Session) {
 #[test]
 fn there_and_back_again_equals_cold_builds() {
     let scene = Arc::new(lit_room());
-    for (name, options) in
-        [("error", at_tolerance(0.1)), ("form factor", form_factor_oracle(0.05, 1e-3))]
-    {
+    for (name, options) in [
+        ("error", at_tolerance(0.1)),
+        ("error at points", Options { aim: Aim::Points, ..at_tolerance(0.05) }),
+        ("form factor", form_factor_oracle(0.05, 1e-3)),
+    ] {
         let (mut warm, mut cold) = pair_of(&scene, &options);
         for (k, time) in [0.0, 0.05, 0.1, 0.2, 1.0, 0.5, 0.1, 0.1, 0.0].into_iter().enumerate() {
             let one = warm.step(k as u32, time).unwrap();

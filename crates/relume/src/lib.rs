@@ -102,9 +102,9 @@ pub use relume_core::scene::{
     SceneError, Severity, Surface, SurfaceId, Track, World, outside,
 };
 pub use relume_core::session::{
-    Accuracy, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors, Flux,
-    Frame, FrameReport, Gathered, Grouping, Hash, LampLight, Leaf, Memory, Mesh, Open, Options,
-    Oracle, PairCounts, PointError, Removed, RowSumError, Seconds, Sensor, Session, SessionError,
-    Snapshot, Update, Watch, Work,
+    Accuracy, Aim, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors,
+    Flux, Frame, FrameReport, Gathered, Grouping, Hash, LampLight, Leaf, Memory, Mesh, Open,
+    Options, Oracle, PairCounts, PointError, Removed, RowSumError, Seconds, Sensor, Session,
+    SessionError, Snapshot, Update, Watch, Work,
 };
 pub use relume_io::{ImportOptions, Log, LogError, PEAK_LUMENS_PER_WATT, import, read_environment};

@@ -110,8 +110,8 @@ impl Energy {
 
 /// Estimated errors of irradiance at some points, relative to the irradiance there (sum of the channels), dimensionless: of the
 /// mesh (`Snapshot::irradiance_at`), or of what sensors read (`Frame::irradiance_at`), as it was asked for. Estimated, not
-/// bounded. By `Frame::estimate` all but `largest` are relative to the larger of what is said and what arrives: a dark place that
-/// is said to be bright is wholly wrong, and no more.
+/// bounded. By `Frame::estimate` all are relative to the larger of what is said and what arrives: a dark place that is said to be
+/// bright is wholly wrong, and no more.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Accuracy {

@@ -965,7 +965,8 @@ impl Places {
 
 /// Norm of the error oracle.
 fn norm_of(brightness: &CoarseBrightness, threshold: f64) -> Norm {
-    Norm { reference_area_m2: brightness.reference_area_m2(), threshold }
+    let reference_area_m2 = brightness.reference_area_m2();
+    Norm { reference_area_m2, threshold, uneven: brightness.uneven() }
 }
 
 /// A link that is partly hidden is looked at from more points, the more so the larger its `error`: how far V

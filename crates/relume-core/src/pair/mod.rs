@@ -29,7 +29,7 @@ mod world_change;
 pub use crate::transport::Side;
 pub use brightness::Brightness;
 pub use certificate_tests::Finding;
-pub use coarse_brightness::CoarseBrightness;
+pub use coarse_brightness::{CoarseBrightness, coarsen};
 pub use hash::{PairHash, pair_key};
 pub use judge::{SpaceJudge, Stage};
 pub use margin::{Margin, Shift};

@@ -200,8 +200,7 @@ fn of_points(found: &[PointError]) -> Accuracy {
     let mean_of = |of: &dyn Fn(&PointError) -> f64| {
         found.iter().map(|f| f.share * of(f)).sum::<f64>() / whole
     };
-    let over_what_arrives = |f: &PointError| f.said / f.arrives - 1.0;
-    let size = |f: &&PointError| over_what_arrives(f).abs();
+    let size = |f: &&PointError| f.relative().abs();
     let worst = found.iter().max_by(|a, b| size(a).total_cmp(&size(b)));
     Accuracy {
         points: found.len() as u32,
@@ -210,7 +209,7 @@ fn of_points(found: &[PointError]) -> Accuracy {
         // Nothing scatters.
         resolved: 0.0,
         mean: mean_of(&PointError::relative),
-        largest: worst.map_or(0.0, over_what_arrives),
+        largest: worst.map_or(0.0, PointError::relative),
         largest_at: worst.map_or([0.0; 3], |f| f.at.to_array()),
     }
 }

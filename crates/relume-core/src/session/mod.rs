@@ -17,7 +17,7 @@ mod tuning;
 
 pub use command::{Command, CommandError, Removed};
 pub use estimate::Estimate;
-pub use options::{Options, Oracle};
+pub use options::{Aim, Options, Oracle};
 
 pub use crate::follow::{
     Accuracy, Energy, Follower, FrameReport, LinkKinds, Memory, PairCounts, RowSumError, Seconds,
@@ -280,8 +280,8 @@ impl Session {
 
     /// A step to a world, in the present scene.
     fn goal<'a>(&'a self, world: &'a World, held: &'a Held, from: Option<&'a World>) -> Goal<'a> {
-        let Options { tolerance, .. } = self.options;
-        let tuning = Tuning { tolerance, oracle: self.options.pair_oracle(), simd: self.simd };
+        let Options { tolerance, aim, .. } = self.options;
+        let tuning = Tuning { tolerance, aim, oracle: self.options.pair_oracle(), simd: self.simd };
         Goal { bed: &self.bed, world, held, from, tuning }
     }
 

@@ -1,6 +1,7 @@
 //! Options of a session.
 
 use crate::follow::Update;
+pub use crate::space::Aim;
 use crate::space::Bedding;
 
 use super::tuning::LINK_SHARE;
@@ -10,6 +11,8 @@ use super::tuning::LINK_SHARE;
 pub struct Options {
     /// Relative error of irradiance aimed at (RMS), in (0, 1). Default 0.02.
     pub tolerance: f64,
+    /// What the tolerance is about, with the error oracle.
+    pub aim: Aim,
     /// Criterion by which a pair becomes a link.
     pub oracle: Oracle,
     /// Strategy by which the pair tree follows motion.
@@ -29,6 +32,7 @@ impl Default for Options {
     fn default() -> Self {
         Options {
             tolerance: 0.02,
+            aim: Aim::Mesh,
             oracle: Oracle::Error,
             update: Update::Certificate,
             groups: true,

@@ -9,8 +9,11 @@ use crate::solver::{Dirty, Link, Links, Radiosity, Stop, Surfaces};
 
 use crate::follow::set_pairs;
 
+use super::importance::{Aim, weigh_by_points};
 use super::surfaces::{CoarseReceivers, CoarseSurfaces, LitForest};
-use super::tuning::{COARSE_SHARE, COARSE_SWEEPS, DARK_FLOOR, LOST, REFERENCE_SHARE};
+use super::tuning::{
+    COARSE_SHARE, COARSE_SWEEPS, DARK_FLOOR, LOST, REFERENCE_SHARE, UNEVEN_AT_POINTS,
+};
 
 /// Splits facets down to coarse elements, numbers them and keeps them for good; returns their ids
 /// by number.
@@ -72,7 +75,13 @@ impl Coarse {
     }
 
     /// Solves over the coarse links as the scene shines in a world; `coarse` are the coarse elements of `seed` by number.
-    pub(super) fn solve(&mut self, (scene, now): (&Scene, &World), seed: &Forest, coarse: &[u32]) {
+    pub(super) fn solve(
+        &mut self,
+        (scene, now): (&Scene, &World),
+        seed: &Forest,
+        coarse: &[u32],
+        aim: Aim,
+    ) {
         for &id in coarse {
             self.links.sort(id);
             self.open.sort(id);
@@ -84,15 +93,15 @@ impl Coarse {
             self.radiosity.set(group.0, surfaces.material(group.0).exitance);
         }
         self.radiosity.solve(&surfaces, &self.links, Dirty::All, Stop::Sweeps(COARSE_SWEEPS));
-        self.brightness = self.measure((scene, now), seed, coarse, &surfaces);
+        self.brightness = self.measure((scene, now), (seed, coarse), &surfaces, aim);
     }
 
     fn measure(
         &self,
         (scene, now): (&Scene, &World),
-        seed: &Forest,
-        coarse: &[u32],
+        (seed, coarse): (&Forest, &[u32]),
         surfaces: &CoarseSurfaces<'_>,
+        aim: Aim,
     ) -> CoarseBrightness {
         let total_area = seed.made_m2();
         let mean = |v: [f32; 3]| v.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
@@ -126,7 +135,12 @@ impl Coarse {
         let open =
             |&id: &u32| surfaces.area_m2(id) * self.open.of(id).iter().map(brings).sum::<f64>();
         let known = if arriving > LOST * coarse.iter().map(open).sum::<f64>() {
-            coarse.iter().zip(&irradiance).map(light_of).collect()
+            let mut known: Vec<Brightness> = coarse.iter().zip(&irradiance).map(light_of).collect();
+            if aim == Aim::Points {
+                let scene = (&self.links, seed, coarse);
+                weigh_by_points(scene, surfaces, &mut known);
+            }
+            known
         } else {
             // Nothing emits, or all is hidden: every surface and light weighs the same, and errors are relative to row sums.
             lights.iter_mut().for_each(|i| *i = f64::from(u8::from(*i > 0.0)));
@@ -137,7 +151,9 @@ impl Coarse {
             };
             coarse.iter().map(uniform).collect()
         };
-        CoarseBrightness::new(known, lights, total_area * REFERENCE_SHARE)
+        // Also in the dark: margins do not know how verdicts would change with it.
+        let uneven = if aim == Aim::Points { UNEVEN_AT_POINTS } else { 1.0 };
+        CoarseBrightness::new(known, lights, total_area * REFERENCE_SHARE, uneven)
     }
 
     /// Follows elements of a seed to their new ids, and coarse elements to other numbers; what is no longer one loses its links.

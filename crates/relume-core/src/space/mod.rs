@@ -6,6 +6,7 @@ mod bed;
 mod coarse;
 mod emission;
 mod groups;
+mod importance;
 mod inner;
 mod phases;
 mod promise;
@@ -16,6 +17,7 @@ mod tuning;
 
 pub(crate) use bed::{Bed, Bedding};
 pub(crate) use groups::{Before, group_links, replanted_links};
+pub use importance::Aim;
 pub(crate) use phases::Goal;
 pub use state::SpaceState;
 pub(crate) use state::Tuning;

@@ -170,7 +170,7 @@ impl Space for SpaceState {
             return;
         }
         let before = std::mem::take(&mut self.coarse.brightness);
-        self.coarse.solve((scene, &self.world), seed, coarse_ids);
+        self.coarse.solve((scene, &self.world), seed, coarse_ids, goal.tuning.aim);
         if let Some(change) = change {
             let shifts = self.coarse.brightness.shifts(&before);
             change.set_brightness_shifts(seed, coarse_ids, shifts);

@@ -9,6 +9,7 @@ use crate::solver::GroupLinks;
 use crate::transport::Simd;
 
 use super::coarse::Coarse;
+use super::importance::Aim;
 use super::surfaces::LitForest;
 use super::tuning::REFERENCE_SHARE;
 
@@ -17,6 +18,8 @@ use super::tuning::REFERENCE_SHARE;
 pub(crate) struct Tuning {
     /// Relative error of irradiance aimed at.
     pub(crate) tolerance: f64,
+    /// What the tolerance is about.
+    pub(crate) aim: Aim,
     /// What decides on pairs.
     pub(crate) oracle: Oracle,
     /// Vector instructions.

@@ -14,7 +14,7 @@ use self::judge::{Seen, agree, follow, reduced};
 use self::recipe::{Flavour, Recipe};
 use crate::common::Random;
 use crate::common::audit::{Audit, audit};
-use relume_core::session::Session;
+use relume_core::session::{Aim, Session};
 
 /// Steps of each draw.
 const STEPS: usize = 16;
@@ -84,6 +84,17 @@ fn steady_motion() {
     use Flavour::{Contact, Families, Free, Glows, Jumps, Lights};
     for flavour in [Free, Contact, Jumps, Lights, Families, Glows] {
         check_steady(flavour, 0..8);
+    }
+}
+
+#[test]
+fn solutions_for_points() {
+    use Flavour::{Contact, Families, Free, Glows, Jumps, Lights};
+    for flavour in [Free, Contact, Jumps, Lights, Families, Glows] {
+        check_recipes(flavour, 100..103, |seed| {
+            let drawn = Recipe::draw(flavour, seed, STEPS);
+            Recipe { aim: Aim::Points, solve: Ok([0.05, 0.1, 0.2][seed as usize % 3]), ..drawn }
+        });
     }
 }
 

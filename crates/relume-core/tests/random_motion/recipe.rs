@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3};
 use relume_core::scene::{
     Interpolation, LightKind, MaterialId, NodeId, RotationTrack, Scene, SceneBuilder, Track,
 };
-use relume_core::session::Options;
+use relume_core::session::{Aim, Options};
 
 use crate::common::{Random, at_tolerance, facing_up, form_factor_oracle, still, v};
 
@@ -69,6 +69,8 @@ pub(crate) struct Recipe {
     pub(crate) glow: Vec<f64>,
     /// Tolerance of the error oracle, or the form-factor oracle with epsilon and least area.
     pub(crate) solve: Result<f64, (f64, f64)>,
+    /// What the tolerance is about.
+    pub(crate) aim: Aim,
     pub(crate) times_s: Vec<f64>,
 }
 
@@ -130,7 +132,7 @@ impl Recipe {
         if flavour == Flavour::Glows && r.unit() < 0.3 {
             things.iter_mut().for_each(|thing| (thing.slides, thing.turns) = (false, false));
         }
-        Recipe { place, things, dark, glow, solve, times_s }
+        Recipe { place, things, dark, glow, solve, aim: Aim::Mesh, times_s }
     }
 
     /// The same scene, at times that go steadily on, with a pause, an odd step or a step back now and
@@ -156,7 +158,7 @@ impl Recipe {
 
     pub(crate) fn options(&self) -> Options {
         match self.solve {
-            Ok(tolerance) => at_tolerance(tolerance),
+            Ok(tolerance) => Options { aim: self.aim, ..at_tolerance(tolerance) },
             Err((epsilon, min_area)) => {
                 Options { tolerance: 0.1, ..form_factor_oracle(epsilon, min_area) }
             }

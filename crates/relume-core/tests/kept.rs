@@ -83,7 +83,8 @@ fn steps_without_memory_go_back_to_the_last_solution() {
     for seed in 0..6 {
         failures += run_out_of_memory(&room(), seed, Update::Certificate, 0.0);
     }
-    for seed in 0..2 {
+    // Of 12 and 13 coarse links that a failed step had woken stayed.
+    for seed in [0, 1, 12, 13] {
         let scene = shipped("cornell_moving_box_and_lamp.glb");
         failures += run_out_of_memory(&scene, seed, Update::Reinspect, 0.0);
     }

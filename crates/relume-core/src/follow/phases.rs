@@ -204,7 +204,12 @@ impl<S: Space> Follower<S> {
         coarse: Changes,
     ) -> Result<Changes, OutOfMemory> {
         let mut all = coarse;
-        let fine = self.bring(step, Level::Fine, change, &all.refined)?;
+        let fine = self.bring(step, Level::Fine, change, &all.refined);
+        if fine.is_err() {
+            // Pairs that were woken keep their state until they are judged here, and on the way back nobody sees that they were.
+            self.space.forget_coarse_links(step.goal, &all.coarse_links);
+        }
+        let fine = fine?;
         all.work.add_after_coarse(fine.work);
         all.edits.extend(fine.edits);
         all.apart.extend(fine.apart);

@@ -1,7 +1,7 @@
 //! The interface between the frame loop and a space: polygons in space, or segments in the plane.
 
 use crate::element::{ElementId, Renumbering};
-use crate::pair::{Changes, Judge, PairId, PairTree};
+use crate::pair::{Changes, CoarseLink, Judge, PairId, PairTree};
 use crate::solver::{Dirty, Radiosity, Surfaces};
 
 use super::follower::{Follower, Why};
@@ -118,6 +118,8 @@ pub(crate) trait Space: Sized + Send {
 
     // Edit.
 
+    /// Takes back coarse links that a frame made which failed after that; the frame back finds again those that were there before.
+    fn forget_coarse_links(&mut self, _goal: &Self::Goal<'_>, _links: &[CoarseLink]) {}
     /// Links to be set again although no verdict on them changed.
     fn remade(&self, _was: &Self::Was, _tree: &PairTree) -> Vec<PairId> {
         Vec::new()

@@ -12,7 +12,6 @@ pub struct CoarseBrightness {
     coarse: Vec<Brightness>,
     lights: Vec<f64>,
     reference_area_m2: f64,
-    uneven: f64,
 }
 
 /// Changes of canonical brightness; `None` where there is none.
@@ -25,13 +24,12 @@ pub struct BrightnessShifts {
 }
 
 impl CoarseBrightness {
-    /// From the brightness of each coarse element, the mean intensity of each punctual light, the area below which
-    /// elements weigh less than others, m2, and the weight of errors over a receiver that leave its mean as it is. Values are rounded down to 1, 1.5, 2, 3, 4 ..., so that they seldom change.
+    /// From the brightness of each coarse element, the mean intensity of each punctual light, and the area below which
+    /// elements weigh less than others, m2. Values are rounded down to 1, 1.5, 2, 3, 4 ..., so that they seldom change.
     pub fn new(
         coarse: Vec<Brightness>,
         lights: Vec<f64>,
         reference_area_m2: f64,
-        uneven: f64,
     ) -> CoarseBrightness {
         let step = |l: Brightness| Brightness {
             radiosity: coarsen(l.radiosity),
@@ -42,7 +40,6 @@ impl CoarseBrightness {
             coarse: coarse.into_iter().map(step).collect(),
             lights: lights.into_iter().map(coarsen).collect(),
             reference_area_m2,
-            uneven,
         }
     }
 
@@ -87,11 +84,6 @@ impl CoarseBrightness {
     pub fn reference_area_m2(&self) -> f64 {
         self.reference_area_m2
     }
-
-    /// Weight of errors over a receiver that leave its mean as it is, 1: the same at all times.
-    pub(super) fn uneven(&self) -> f64 {
-        self.uneven
-    }
 }
 
 /// Rounds down to 1, 1.5, 2, 3, 4, 6, 8 ...: all but the first bit of the mantissa is dropped.
@@ -106,8 +98,7 @@ mod tests {
 
     #[test]
     fn no_margin_withstands_the_next_change_of_an_element_that_had_no_number() {
-        let uniform =
-            |count| CoarseBrightness::new(vec![Brightness::UNIFORM; count], vec![], 1.0, 1.0);
+        let uniform = |count| CoarseBrightness::new(vec![Brightness::UNIFORM; count], vec![], 1.0);
         let mut before = uniform(1);
         assert!(before.is_known());
         before.renumber(&[Some(0), None]);

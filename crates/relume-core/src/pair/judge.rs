@@ -965,8 +965,7 @@ impl Places {
 
 /// Norm of the error oracle.
 fn norm_of(brightness: &CoarseBrightness, threshold: f64) -> Norm {
-    let reference_area_m2 = brightness.reference_area_m2();
-    Norm { reference_area_m2, threshold, uneven: brightness.uneven() }
+    Norm { reference_area_m2: brightness.reference_area_m2(), threshold }
 }
 
 /// A link that is partly hidden is looked at from more points, the more so the larger its `error`: how far V

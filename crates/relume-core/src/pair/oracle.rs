@@ -48,8 +48,6 @@ pub(super) struct Norm {
     pub(super) reference_area_m2: f64,
     /// Error that a link may make, relative.
     pub(super) threshold: f64,
-    /// Weight of errors over a receiver that leave its mean as it is.
-    pub(super) uneven: f64,
 }
 
 /// Errors of a link, each relative to its threshold's unit.
@@ -101,7 +99,7 @@ pub(super) fn estimate(
     v: &Visibility,
     [a, b]: [&End; 2],
     blockers: &BlockerSizes,
-    &Norm { reference_area_m2, threshold, uneven }: &Norm,
+    &Norm { reference_area_m2, threshold }: &Norm,
 ) -> Estimate {
     // Fewer than a bundle: clipped, without noise.
     let noise = if v.segments < SEGMENTS as u32 {
@@ -131,7 +129,6 @@ pub(super) fn estimate(
         shadow: SHADOW_AREAS * blockers.all_m2,
         reference_area: reference_area_m2,
         threshold,
-        uneven,
         leverage: blockers.leverage[0],
     };
     let back = LinkSize { leverage: blockers.leverage[1], ..link };
@@ -160,8 +157,6 @@ struct LinkSize {
     shadow: f64,
     reference_area: f64,
     threshold: f64,
-    /// Weight of errors over a receiver that leave its mean as it is.
-    uneven: f64,
     /// Leverage: largest motion of a shadow's edge over the source per motion of its point on the receiver: 1.
     leverage: f64,
 }
@@ -237,7 +232,7 @@ fn one_way(
     let alike = EDGE * link.alike(receiver, source).max(in_shadow);
     let edge = alike * (radiosity - reflected) + alike.max(EDGE_REFLECTED) * reflected;
     let uneven = length(radiosity * over_receiver.bend * whole, edge * over_receiver.edge * finer);
-    let by_receiver = link.uneven * per_radiosity * uneven;
+    let by_receiver = per_radiosity * uneven;
     // The edges of what is hidden run through as many sources as it is long: all err in the same sense.
     let along = whole.sqrt();
     let (spot, jump) = (over_source.spot * along, over_source.edge * over_source.jump * along);

@@ -11,9 +11,7 @@ use crate::follow::set_pairs;
 
 use super::importance::{Aim, weigh_by_points};
 use super::surfaces::{CoarseReceivers, CoarseSurfaces, LitForest};
-use super::tuning::{
-    COARSE_SHARE, COARSE_SWEEPS, DARK_FLOOR, LOST, REFERENCE_SHARE, UNEVEN_AT_POINTS,
-};
+use super::tuning::{COARSE_SHARE, COARSE_SWEEPS, DARK_FLOOR, LOST, REFERENCE_SHARE};
 
 /// Splits facets down to coarse elements, numbers them and keeps them for good; returns their ids
 /// by number.
@@ -72,6 +70,16 @@ impl Coarse {
         self.links.tidy();
         self.open.tidy();
         !changes.dropped_coarse_links.is_empty() || !changes.coarse_links.is_empty()
+    }
+
+    /// Takes links out again.
+    pub(super) fn forget(&mut self, seed: &Forest, made: &[CoarseLink]) {
+        let seed = &CoarseReceivers(seed);
+        for links in [&mut self.links, &mut self.open] {
+            let pairs = made.iter().map(|link| (link.a, link.b));
+            set_pairs(links, seed, pairs, std::iter::empty());
+            links.tidy();
+        }
     }
 
     /// Solves over the coarse links as the scene shines in a world; `coarse` are the coarse elements of `seed` by number.
@@ -151,9 +159,7 @@ impl Coarse {
             };
             coarse.iter().map(uniform).collect()
         };
-        // Also in the dark: margins do not know how verdicts would change with it.
-        let uneven = if aim == Aim::Points { UNEVEN_AT_POINTS } else { 1.0 };
-        CoarseBrightness::new(known, lights, total_area * REFERENCE_SHARE, uneven)
+        CoarseBrightness::new(known, lights, total_area * REFERENCE_SHARE)
     }
 
     /// Follows elements of a seed to their new ids, and coarse elements to other numbers; what is no longer one loses its links.

@@ -6,7 +6,9 @@ use crate::element::{ElementId, Forest, Kind, Renumbering, WorldView};
 use crate::follow::{
     Balance, Clocked, Follower, FrameReport, Level, Motion, Prediction, Space, Update, Void, Why,
 };
-use crate::pair::{self, Changes, Oracle, PairId, PairTree, SpaceJudge, Stage, WorldChange};
+use crate::pair::{
+    self, Changes, CoarseLink, Oracle, PairId, PairTree, SpaceJudge, Stage, WorldChange,
+};
 use crate::scene::{BodyId, Held, LightId, World};
 use crate::solver::{Dirty, GroupLinks, Radiosity};
 
@@ -152,6 +154,10 @@ impl Space for SpaceState {
 
     fn has_coarse(goal: &Goal<'_>) -> bool {
         !goal.bed.coarse_ids.is_empty()
+    }
+
+    fn forget_coarse_links(&mut self, goal: &Goal<'_>, links: &[CoarseLink]) {
+        self.coarse.forget(&goal.bed.seed, links);
     }
 
     fn weigh(

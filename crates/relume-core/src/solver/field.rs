@@ -163,3 +163,17 @@ pub(super) fn grow(values: &mut Vec<f32>, len: usize) {
     }
     values.resize(len, 0.0);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_by_roundings_is_none() {
+        let of = |mean: f32| Linear { mean: [mean; 3], ..Linear::default() };
+        let (before, next) = (of(569.577_9), of(f32::from_bits(569.577_9_f32.to_bits() + 2)));
+        assert!(next.difference(&before) > 0.0);
+        assert_eq!(next.change_from(&before), 0.0);
+        assert_eq!(of(569.7).change_from(&before), of(569.7).difference(&before));
+    }
+}

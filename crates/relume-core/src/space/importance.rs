@@ -10,7 +10,7 @@ use crate::pair::{Brightness, coarsen};
 use crate::solver::{Link, Links, Surfaces};
 
 use super::surfaces::CoarseSurfaces;
-use super::tuning::{COARSE_SWEEPS, POINTS_NEAR, POINTS_SHARE};
+use super::tuning::{COARSE_SWEEPS, POINTS_MOST, POINTS_NEAR, POINTS_SHARE};
 
 /// What the tolerance is about: whose irradiance is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,7 +20,7 @@ pub enum Aim {
     Mesh,
     /// The irradiance that is gathered at points ([`Frame::irradiance_at`](crate::session::Frame::irradiance_at)): sensors. It
     /// finds lamps' light and shadows itself, so elements only need to send the right light: at the same tolerance with a
-    /// tenth to a half of the links. Elements themselves then err by several times the tolerance.
+    /// fifth to nine tenths of the links. Elements themselves may then err by several times the tolerance.
     Points,
 }
 
@@ -29,8 +29,8 @@ pub enum Aim {
 ///
 /// One is their importance, times `POINTS_SHARE`: what errs in one sense wherever light comes from there. What counts for more
 /// than is typical of the scene, as the few elements that light goes through on its way into another room, counts for more by as
-/// much again. The other is what they do where they are most of what is seen, as in a gap, times `POINTS_NEAR`. Neither is more than
-/// their weight for the mesh.
+/// much again, up to `POINTS_MOST` times their weight for the mesh. The other is what they do where they are most of what is seen, as in
+/// a gap, times `POINTS_NEAR`, up to their weight for the mesh.
 pub(super) fn weigh_by_points(
     (links, forest, coarse): (&Links, &Forest, &[u32]),
     surfaces: &CoarseSurfaces<'_>,
@@ -50,9 +50,11 @@ pub(super) fn weigh_by_points(
     for ((light, importance), nearby) in known.iter_mut().zip(&importance).zip(&nearby) {
         if light.irradiance.is_finite() {
             let beside_typical = importance * light.irradiance / typical;
-            let weight = (POINTS_SHARE * importance * beside_typical).max(POINTS_NEAR * nearby);
-            // No more than for the mesh.
-            light.irradiance /= (weight * light.irradiance).clamp(LEAST, 1.0);
+            // Over the weight for the mesh.
+            let over_mesh = |weight: f64, most: f64| (weight * light.irradiance).min(most);
+            let reflected = over_mesh(POINTS_SHARE * importance * beside_typical, POINTS_MOST);
+            let near = over_mesh(POINTS_NEAR * nearby, 1.0);
+            light.irradiance /= reflected.max(near).max(LEAST);
         }
     }
 }

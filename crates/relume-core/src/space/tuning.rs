@@ -28,6 +28,14 @@ pub(super) const REFERENCE_SHARE: f64 = 1.0 / 512.0;
 /// - Smaller: sensors behind narrow openings err by more than the tolerance
 pub(super) const POINTS_SHARE: f64 = 0.2;
 
+/// Most that weight may be, over that for the mesh.
+///
+/// - Unit: 1
+/// - Tried: 1 (sensors behind a slit err by 1.24 of tolerance 0.02), 2, 4, no limit (a cove: 1.4 times the links of the mesh, for nothing)
+/// - Larger: more links than sensors need
+/// - Smaller: sensors behind narrow openings err by more than the tolerance
+pub(super) const POINTS_MOST: f64 = 2.0;
+
 /// Weight of an error of one element where irradiance is gathered at points, over its root mean square effect there; at most its
 /// weight for the mesh.
 ///

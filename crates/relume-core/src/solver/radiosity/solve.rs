@@ -87,6 +87,26 @@ struct Swept {
     limit: f32,
 }
 
+/// The solution of a frame that keeps light best, of those that keep it well.
+#[derive(Default)]
+struct Best {
+    /// Light made or lost, over what is emitted.
+    share: f64,
+    light: Option<Radiosity>,
+}
+
+impl Best {
+    /// Takes a solution in, by the `share` of light that it makes or loses; whether none is needed beyond it.
+    fn settles_for(&mut self, light: &Radiosity, share: f64) -> bool {
+        let is_better = share <= ASTRAY_MAX && (self.light.is_none() || share < self.share);
+        let is_enough = share <= LEVELLED_ASTRAY_MAX;
+        if is_better && !is_enough {
+            *self = Best { share, light: Some(light.clone()) };
+        }
+        is_enough
+    }
+}
+
 /// Receivers gathered by one task.
 pub(super) const CHUNK: usize = 256;
 
@@ -112,16 +132,12 @@ impl Radiosity {
         let rows = is_white(surfaces).then(|| RowScaling::none(surfaces, links, true));
         let dirty = self.level(surfaces, links, dirty, rows.as_ref().filter(|_| rows_are_close));
         let gain = if rows.is_some() { RowScaling::gain(surfaces, links) } else { 0.0 };
-        let astray = |light: &Radiosity| match &rows {
-            _ if !light.has_settled() => f64::INFINITY,
-            Some(rows) if rows_are_close || gain > GAIN_SURE => light.astray(surfaces, links, rows),
-            _ => 0.0,
-        };
+        let looked_at = rows.as_ref().filter(|_| rows_are_close || gain > GAIN_SURE);
         let (is_anew, mut grows) = (self.sweeps == 0, false);
         if gain <= GAIN_MAX {
             let dirty = if was_scaled { Dirty::All } else { dirty };
             self.solve(surfaces, links, dirty, stop);
-            if astray(self) <= LEVELLED_ASTRAY_MAX {
+            if self.astray(surfaces, links, looked_at) <= LEVELLED_ASTRAY_MAX {
                 return;
             }
             // What grew from nothing would again.
@@ -129,34 +145,45 @@ impl Radiosity {
         }
         // Light that hardly loses anything settles slowly: begun as a cold build does, it ends where that ends.
         let stop = Stop::Bounded { residual: SCALED_RESIDUAL * from_nothing, mean_w_m2 };
-        let mut best: Option<(f64, Radiosity)> = None;
-        let is_best = |best: &mut Option<(f64, Radiosity)>, light: &Radiosity, share: f64| {
-            if share <= ASTRAY_MAX && best.as_ref().is_none_or(|best| share < best.0) {
-                *best = Some((share, light.clone()));
-            }
-            share <= LEVELLED_ASTRAY_MAX
-        };
+        let mut best = Best::default();
         if !grows {
             self.start_anew(surfaces);
             self.solve(surfaces, links, Dirty::All, stop);
-            let share = astray(self);
-            if is_best(&mut best, self, share) {
+            let share = self.astray(surfaces, links, looked_at);
+            if best.settles_for(self, share) {
                 return;
             }
         }
-        let is_levelled = !self.levels.is_none();
-        for linear in [true, false].into_iter().filter(|_| is_levelled) {
-            if linear || best.is_none() {
+        if !self.levels.is_none() && self.solve_both_ways(surfaces, links, &mut best, stop) {
+            return;
+        }
+        match best.light {
+            Some(light) => *self = light,
+            None => self.solve_with_factors(surfaces, links, stop),
+        }
+    }
+
+    /// Solves with levels that count both ways, and if too much light is lost or made so, with constant elements; whether that stands.
+    fn solve_both_ways(
+        &mut self,
+        surfaces: &impl Surfaces,
+        links: &Links,
+        best: &mut Best,
+        stop: Stop,
+    ) -> bool {
+        for linear in [true, false] {
+            if linear || best.light.is_none() {
                 let share = self.solve_levelled_both_ways(surfaces, links, linear, stop);
-                if is_best(&mut best, self, share) {
-                    return;
+                if best.settles_for(self, share) {
+                    return true;
                 }
             }
         }
-        if let Some((_, best)) = best {
-            *self = best;
-            return;
-        }
+        false
+    }
+
+    /// Solves with factors of leaves, and if lines reach below zero even so, with constant elements and factors that lose light.
+    fn solve_with_factors(&mut self, surfaces: &impl Surfaces, links: &Links, stop: Stop) {
         self.levels = Levels::default();
         for (linear, strict) in [(true, false), (false, false), (false, true)] {
             self.constant = !linear;
@@ -189,10 +216,7 @@ impl Radiosity {
         self.start_anew(surfaces);
         self.solve(surfaces, links, Dirty::All, stop);
         self.set_to_received(surfaces);
-        match self.has_settled() {
-            true => self.astray(surfaces, links, &rows),
-            false => f64::INFINITY,
-        }
+        self.astray(surfaces, links, Some(&rows))
     }
 
     /// Sets the radiosity of leaves to what they emit and reflect, whatever of that counted as sent.
@@ -229,12 +253,20 @@ impl Radiosity {
         }
     }
 
-    /// Light made or lost, over what is emitted; with the paper's oracle all or nothing.
-    fn astray(&self, surfaces: &impl Surfaces, links: &Links, rows: &RowScaling) -> f64 {
-        match self.levels.is_none() {
-            true if self.makes_little(surfaces, links, rows) => 0.0,
-            true => f64::INFINITY,
-            false => self.astray_of_levels(surfaces, links, rows),
+    /// Light made or lost, over what is emitted, by rows that are `looked_at`; with the paper's oracle all or nothing, and all in what did
+    /// not settle.
+    fn astray(
+        &self,
+        surfaces: &impl Surfaces,
+        links: &Links,
+        looked_at: Option<&RowScaling>,
+    ) -> f64 {
+        match looked_at {
+            _ if !self.has_settled() => f64::INFINITY,
+            None => 0.0,
+            Some(rows) if !self.levels.is_none() => self.astray_of_levels(surfaces, links, rows),
+            Some(rows) if self.makes_little(surfaces, links, rows) => 0.0,
+            Some(_) => f64::INFINITY,
         }
     }
 
@@ -859,13 +891,16 @@ mod tests {
         for leaf in [0, 2, 3] {
             assert!((scaling.rows[leaf].mean - 1.0).abs() < 1e-3, "{:?}", scaling.rows);
         }
-        let mut b = Radiosity::new(&plates);
-        let bounds =
-            Bounds { residual: 1e-7, from_nothing: 1e-7, mean_w_m2: 2e2, rows_are_close: true };
-        b.solve_bounded(&plates, &links, Dirty::All, bounds);
-        assert!(!b.scaling.is_none() && b.has_settled());
-        for id in 0..4 {
-            assert!((b.radiosity(id)[0] - 100.0).abs() < 0.5, "{id}: {:?}", b.radiosity(id));
+        for rows_are_close in [true, false] {
+            let mut b = Radiosity::new(&plates);
+            let bounds =
+                Bounds { residual: 1e-7, from_nothing: 1e-7, mean_w_m2: 2e2, rows_are_close };
+            b.solve_bounded(&plates, &links, Dirty::All, bounds);
+            assert!(b.has_settled() && b.scaling.is_none() == rows_are_close);
+            assert_eq!(b.levels.are_both_ways(), rows_are_close);
+            for id in 0..4 {
+                assert!((b.radiosity(id)[0] - 100.0).abs() < 0.5, "{id}: {:?}", b.radiosity(id));
+            }
         }
     }
 

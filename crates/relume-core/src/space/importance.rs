@@ -29,8 +29,9 @@ pub enum Aim {
 ///
 /// One is their importance, times `POINTS_SHARE`: what errs in one sense wherever light comes from there. What counts for more
 /// than is typical of the scene, as the few elements that light goes through on its way into another room, counts for more by as
-/// much again, up to `POINTS_MOST` times their weight for the mesh. The other is what they do where they are most of what is seen, as in
-/// a gap, times `POINTS_NEAR`, up to their weight for the mesh.
+/// much again. It is at most their weight for the mesh; where they count for more than twice what is typical, up to `POINTS_MOST`
+/// times that. The other is what they do where they are most of what is seen, as in a gap, times `POINTS_NEAR`, up to their
+/// weight for the mesh.
 pub(super) fn weigh_by_points(
     (links, forest, coarse): (&Links, &Forest, &[u32]),
     surfaces: &CoarseSurfaces<'_>,
@@ -52,7 +53,9 @@ pub(super) fn weigh_by_points(
             let beside_typical = importance * light.irradiance / typical;
             // Over the weight for the mesh.
             let over_mesh = |weight: f64, most: f64| (weight * light.irradiance).min(most);
-            let reflected = over_mesh(POINTS_SHARE * importance * beside_typical, POINTS_MOST);
+            // In a white room all count for much, and all alike.
+            let most = (0.5 * beside_typical).clamp(1.0, POINTS_MOST);
+            let reflected = over_mesh(POINTS_SHARE * importance * beside_typical, most);
             let near = over_mesh(POINTS_NEAR * nearby, 1.0);
             light.irradiance /= reflected.max(near).max(LEAST);
         }

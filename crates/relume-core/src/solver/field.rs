@@ -80,7 +80,7 @@ impl Linear {
         if difference <= ROUNDED * self.most(1.0) { 0.0 } else { difference }
     }
 
-    fn difference(&self, other: &Linear) -> f32 {
+    pub(super) fn difference(&self, other: &Linear) -> f32 {
         let mut out = 0.0_f32;
         for c in 0..3 {
             out = out.max((self.mean[c] - other.mean[c]).abs());

@@ -100,12 +100,13 @@ impl<S: Surfaces> Below<'_, S> {
             }
             fit.linear(place, moment)
         };
-        let difference = b.change_from(&self.radiosity.get(id));
+        let before = self.radiosity.get(id);
+        let difference = b.change_from(&before);
         if difference > self.limit || self.path.is_none() {
             out.changed.push((id, b, difference));
         }
         if difference <= self.limit {
-            out.small = out.small.max(difference);
+            out.small = out.small.max(b.difference(&before));
         }
         if self.path.is_some() {
             out.deferred.push((id, deferred));

@@ -169,7 +169,8 @@ impl Levels {
         if self.is_none() != before.is_none() {
             return None;
         }
-        let of = |levels: &Levels, id: u32| levels.get(id).copied().unwrap_or(Level::NONE);
+        // Where nothing is levelled, direct light is of no meaning.
+        let of = |levels: &Levels, id: u32| levels.get(id).filter(|l| l.is_closed).copied();
         let mut changed = Vec::new();
         let facets = surfaces.facets().iter().filter(|_| !self.is_none());
         for facet in facets {

@@ -128,11 +128,13 @@ fn board_below_a_ceiling(thin: bool, glides: bool) -> (SceneBuilder, MaterialId)
     };
     let room = still(&mut b, "room");
     b.cuboid_inward(room, "walls", wall, v(-3.0, -2.5, 0.0), v(3.0, 2.5, 2.85));
+    // In a frame of its own that is not the world's.
+    let at = if glides { v(0.5, 0.3, 1.0) } else { DVec3::ZERO };
     let board = match glides {
-        true => sliding(&mut b, "board", DVec3::ZERO, v(0.1, 0.0, 0.0)),
+        true => sliding(&mut b, "board", at, at + v(0.1, 0.0, 0.0)),
         false => still(&mut b, "board"),
     };
-    b.cuboid(board, "board", white, v(-0.4, -1.2, 2.82), v(1.7, 0.5, 2.84));
+    b.cuboid(board, "board", white, v(-0.4, -1.2, 2.82) - at, v(1.7, 0.5, 2.84) - at);
     (b, glow)
 }
 

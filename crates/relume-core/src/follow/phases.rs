@@ -206,7 +206,7 @@ impl<S: Space> Follower<S> {
         let mut all = coarse;
         let fine = self.bring(step, Level::Fine, change, &all.refined);
         if fine.is_err() {
-            // Pairs that were woken keep their state until they are judged here, and on the way back nobody sees that they were.
+            // A culled pair that the coarse update woke keeps its state until this one: the way back finds it culled and drops no link.
             self.space.forget_coarse_links(step.goal, &all.coarse_links);
         }
         let fine = fine?;

@@ -118,7 +118,7 @@ pub(crate) trait Space: Sized + Send {
 
     // Edit.
 
-    /// Takes back coarse links that a frame made which failed after that; the frame back finds again those that were there before.
+    /// Removes coarse links that were set in a frame which then failed; the frame that leads back sets those of the last solution again.
     fn forget_coarse_links(&mut self, _goal: &Self::Goal<'_>, _links: &[CoarseLink]) {}
     /// Links to be set again although no verdict on them changed.
     fn remade(&self, _was: &Self::Was, _tree: &PairTree) -> Vec<PairId> {

@@ -73,8 +73,8 @@ impl Linear {
         of(0).max(of(1)).max(of(2))
     }
 
-    /// Largest difference from the value before; none where it is rounding: in a scene of which the mean is a millionth as bright,
-    /// rounding is more than the residual, and a solution that follows it never settles.
+    /// Largest difference from the value before; none where it is rounding: where an element is a million times as bright as the
+    /// mean, its rounding exceeds the residual, and a solve that follows it never settles.
     pub(super) fn change_from(&self, before: &Linear) -> f32 {
         let difference = self.difference(before);
         if difference <= ROUNDED * self.most(1.0) { 0.0 } else { difference }

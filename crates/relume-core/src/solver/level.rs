@@ -12,7 +12,7 @@ pub(super) struct Level {
     pub(super) direct: Linear,
     /// What reflected light is multiplied with at the centroid, 1.
     pub(super) factor: f32,
-    /// Share by which that factor falls, 1/m.
+    /// Share by which that factor falls along the axes of the patch, 1/m.
     pub(super) slope: [f32; 2],
 }
 
@@ -42,7 +42,7 @@ impl Level {
         self.weighed(&h.minus(&self.direct), place, moment).plus(&self.direct)
     }
 
-    /// What a line over the leaf is times its level: the line that comes next to the product.
+    /// Product of a linear function over the leaf and its level, without the quadratic part: mean and gradient, in the unit of `value`.
     pub(super) fn weighed(&self, value: &Linear, place: &Place, moment: f32) -> Linear {
         let mut out = *value;
         let scale = place.radius * moment;

@@ -253,8 +253,8 @@ impl Radiosity {
         }
     }
 
-    /// Light made or lost, over what is emitted, by rows that are `looked_at`; with the paper's oracle all or nothing, and all in what did
-    /// not settle.
+    /// Light made or lost over what is emitted, 1: by rows, 0 if none are `looked_at`. Infinite if the solve did not settle or, with the
+    /// paper's oracle, if rows make much.
     fn astray(
         &self,
         surfaces: &impl Surfaces,

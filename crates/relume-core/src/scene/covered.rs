@@ -23,6 +23,12 @@ const ABOVE: f64 = 4.0;
 /// Lamps further from the box of a body, in roundings, neither are in it nor touch it.
 const REACH: f64 = 16.0;
 
+/// Holes narrower than this, in roundings, let nothing through.
+const SLIT: f64 = 8.0;
+
+/// Patches further apart than this share of their sizes are in two planes, for visibility too (`rounding_m` of elements).
+const TOLD_APART: f64 = 2.4e-7;
+
 /// Parts of less than this share of a patch are rounding.
 const SLIVER: f64 = 1e-9;
 
@@ -251,11 +257,12 @@ impl<'a> Group<'a> {
             }
         }
         for hull in &self.hulls {
-            for k in self.boxes.meeting(&hull.bounds.grown(self.slack_m)) {
-                let patch = &self.placed[k];
-                if !hull.holds(k) {
-                    self.stand(scene, hull, patch, (&mut out[patch.id.0 as usize], left));
-                }
+            let mut near = self.boxes.meeting(&hull.bounds.grown(self.slack_m));
+            near.retain(|&k| !hull.holds(k));
+            let near: Vec<&Placed> = near.into_iter().map(|k| &self.placed[k]).collect();
+            let mut stands = Stands::new(scene, (&self.placed, hull), &near, self.slack_m);
+            for patch in &near {
+                stands.on((patch, self.is_own), &mut out[patch.id.0 as usize], left);
             }
         }
         self.narrow(scene, &order, out, left);
@@ -302,8 +309,13 @@ impl<'a> Group<'a> {
             Sheet { patch: p.id, twin: patch.twin, enclosure, area_m2: patch.area_m2() }
         };
         let opposed = p.normal.dot(q.normal) < 0.0;
+        let upper = if opposed { None } else { upper_of(p, q) };
         for (of, by) in [(p, q), (q, p)] {
-            let lies = sheet(by).lies_to(&sheet(of), opposed);
+            let lies = match upper {
+                Some(upper) if upper == of.id => InPlane::Apart,
+                Some(_) => InPlane::Covers,
+                None => sheet(by).lies_to(&sheet(of), opposed),
+            };
             if lies == InPlane::Apart {
                 continue;
             }
@@ -318,11 +330,23 @@ impl<'a> Group<'a> {
             }
         }
     }
+}
 
-    /// What a body covers of a patch that it stands on or sticks in.
-    fn stand(&self, scene: &Scene, hull: &Hull, patch: &Placed, out: (&mut Covered, &mut usize)) {
-        stand(scene, (&self.placed, hull), (patch, self.is_own), self.slack_m, out);
+/// Which of two patches that face the same way is before the other, by more than what rounding makes of their own sizes: light
+/// tells them apart.
+fn upper_of(p: &Placed, q: &Placed) -> Option<PatchId> {
+    let reach = |p: &Placed| {
+        let apart = |c: &DVec3| c.distance(p.origin);
+        p.corners.iter().map(apart).fold(0.0, f64::max)
+    };
+    let rounding_m = TOLD_APART * (reach(p) + reach(q));
+    let is_before = |one: &Placed, other: &Placed| {
+        one.corners.iter().all(|&c| (c - other.corners[0]).dot(other.normal) > rounding_m)
+    };
+    if is_before(p, q) {
+        return Some(p.id);
     }
+    is_before(q, p).then_some(q.id)
 }
 
 /// Patches by their lowest coordinates.
@@ -342,55 +366,131 @@ impl Order {
     }
 }
 
-/// What a body covers of a patch that it stands on or sticks in; its polygons, by number. `is_own` if the patch is of that body, which
-/// moves, and places are in its frame.
-pub(super) fn stand(
-    scene: &Scene,
-    (placed, hull): (&[Placed], &Hull),
-    (patch, is_own): (&Placed, bool),
+/// A body that stands on patches or sticks in them.
+pub(super) struct Stands<'a> {
+    scene: &'a Scene,
+    placed: &'a [Placed],
+    hull: &'a Hull,
+    /// What may close its border.
+    near: &'a [&'a Placed],
     slack_m: f64,
-    (covered, left): (&mut Covered, &mut usize),
-) {
-    let height = |c: DVec3| (c - patch.corners[0]).dot(patch.normal);
-    if hull.border.iter().any(|&c| height(c) > slack_m) {
-        return;
+    /// Whether patches close it, by the planes that were asked for.
+    closed: Vec<(Plane, bool)>,
+}
+
+/// Where a body crosses the plane of a patch: disjoint convex polygons in the patch's frame, counter-clockwise, metres.
+struct Footprint {
+    within: Vec<Vec<DVec2>>,
+    /// Whether the polygons of the body are wound inwards.
+    turned: bool,
+}
+
+impl<'a> Stands<'a> {
+    /// Of a body, with its polygons by number, and the patches around it.
+    pub(super) fn new(
+        scene: &'a Scene,
+        (placed, hull): (&'a [Placed], &'a Hull),
+        near: &'a [&'a Placed],
+        slack_m: f64,
+    ) -> Stands<'a> {
+        Stands { scene, placed, hull, near, slack_m, closed: Vec::new() }
     }
-    let mut outline: Vec<Segment> = Vec::new();
-    for polygon in hull.polygons.iter().map(|&k| &placed[k]) {
-        let above = |c: DVec3| height(c) - ABOVE * slack_m;
-        let n = polygon.corners.len();
-        let through = (0..n).filter_map(|k| {
-            let [p, q] = [polygon.corners[k], polygon.corners[(k + 1) % n]];
-            let (x, y) = (above(p), above(q));
-            ((x > 0.0) != (y > 0.0)).then(|| p + (q - p) * (x / (x - y)))
-        });
-        let ends: Vec<DVec3> = through.collect();
-        let [p, q] = ends[..] else { continue };
-        // The inside is on the left, seen from the front of the patch.
-        let along = patch.normal.cross(polygon.normal);
-        let [p, q] = if along.dot(q - p) < 0.0 { [q, p] } else { [p, q] };
-        outline.push([p, q].map(|c| patch.in_frame(c)));
+
+    /// What it covers of a patch. `is_own` if the patch is of that body, which moves, and places are in its frame. What is
+    /// two-sided and open to the patch's plane covers only what closes it there: through a hole in a ceiling light gets among walls.
+    pub(super) fn on(
+        &mut self,
+        (patch, is_own): (&Placed, bool),
+        covered: &mut Covered,
+        left: &mut usize,
+    ) {
+        let Some(Footprint { within, turned }) = self.footprint(patch) else { return };
+        let hull = self.hull;
+        *left = left.saturating_sub(hull.polygons.len());
+        if !(hull.border.is_empty() || hull.twins.is_empty())
+            && !self.is_closed_at(patch, &within, left)
+        {
+            return;
+        }
+        let inner = if turned { &hull.polygons } else { &hull.twins };
+        let whole = &self.scene.patches[patch.id.0 as usize].corners;
+        for outline in within.iter().map(|p| common(p, whole)).filter(|p| p.len() > 2) {
+            let (bounds, [u, v]) = (around(&outline), patch.axes);
+            let plane = [patch.origin, u, v];
+            covered.inside.push(Inside { of: hull.of, is_own, outline, bounds, plane });
+        }
+        if add(self.scene, patch.id, within, (&mut *covered, left)) {
+            covered.contacts.extend(inner.iter().map(|&k| self.placed[k].id));
+        }
     }
-    if outline.is_empty() || outline.len() > COVERED_PARTS_MAX {
-        return;
+
+    fn footprint(&self, patch: &Placed) -> Option<Footprint> {
+        let (hull, slack_m) = (self.hull, self.slack_m);
+        let height = |c: DVec3| (c - patch.corners[0]).dot(patch.normal);
+        if hull.border.iter().any(|&c| height(c) > slack_m) {
+            return None;
+        }
+        let mut outline: Vec<Segment> = Vec::new();
+        for polygon in hull.polygons.iter().map(|&k| &self.placed[k]) {
+            let above = |c: DVec3| height(c) - ABOVE * slack_m;
+            let n = polygon.corners.len();
+            let through = (0..n).filter_map(|k| {
+                let [p, q] = [polygon.corners[k], polygon.corners[(k + 1) % n]];
+                let (x, y) = (above(p), above(q));
+                ((x > 0.0) != (y > 0.0)).then(|| p + (q - p) * (x / (x - y)))
+            });
+            let ends: Vec<DVec3> = through.collect();
+            let [p, q] = ends[..] else { continue };
+            // The inside is on the left, seen from the front of the patch.
+            let along = patch.normal.cross(polygon.normal);
+            let [p, q] = if along.dot(q - p) < 0.0 { [q, p] } else { [p, q] };
+            outline.push([p, q].map(|c| patch.in_frame(c)));
+        }
+        if outline.is_empty() || outline.len() > COVERED_PARTS_MAX {
+            return None;
+        }
+        let turns: f64 = outline.iter().map(|[p, q]| p.perp_dot(*q)).sum();
+        // Two-sided polygons may all be wound either way.
+        let turned = turns < 0.0 && hull.twins.len() == hull.polygons.len();
+        if turned {
+            outline.iter_mut().for_each(|line| line.reverse());
+        }
+        Some(Footprint { within: within_outlines(&outline, slack_m), turned })
     }
-    *left = left.saturating_sub(outline.len());
-    let turns: f64 = outline.iter().map(|[p, q]| p.perp_dot(*q)).sum();
-    // Two-sided polygons may all be wound either way.
-    let turned = turns < 0.0 && hull.twins.len() == hull.polygons.len();
-    if turned {
-        outline.iter_mut().for_each(|line| line.reverse());
-    }
-    let inner = if turned { &hull.polygons } else { &hull.twins };
-    let within = within_outlines(&outline, slack_m);
-    let whole = &scene.patches[patch.id.0 as usize].corners;
-    for outline in within.iter().map(|p| common(p, whole)).filter(|p| p.len() > 2) {
-        let (bounds, [u, v]) = (around(&outline), patch.axes);
-        let plane = [patch.origin, u, v];
-        covered.inside.push(Inside { of: hull.of, is_own, outline, bounds, plane });
-    }
-    if add(scene, patch.id, within, (&mut *covered, left)) {
-        covered.contacts.extend(inner.iter().map(|&k| placed[k].id));
+
+    /// Whether patches in the plane of one fill what the body leaves open there.
+    fn is_closed_at(&mut self, patch: &Placed, within: &[Vec<DVec2>], left: &mut usize) -> bool {
+        let slack_m = self.slack_m;
+        let lies_in = |plane: &Plane, p: &Placed| {
+            p.corners.iter().all(|&c| plane.distance(c).abs() <= slack_m)
+        };
+        if let Some((_, closed)) = self.closed.iter().find(|(plane, _)| lies_in(plane, patch)) {
+            return *closed;
+        }
+        let plane = Plane::through(patch.corners[0], patch.normal);
+        let mut open = within.to_vec();
+        for lid in self.near.iter().filter(|other| lies_in(&plane, other)) {
+            let mut corners: Vec<DVec2> = lid.corners.iter().map(|&c| patch.in_frame(c)).collect();
+            if lid.normal.dot(patch.normal) < 0.0 {
+                corners.reverse();
+            }
+            let mut rest = Vec::with_capacity(open.len());
+            for piece in &open {
+                *left = left.saturating_sub(1);
+                difference(piece, &corners, &mut rest);
+            }
+            // Slits of roundings let nothing through.
+            rest.retain(|piece| {
+                let [low, high] = around(piece);
+                Moments::of(piece).area > SLIT * slack_m * (high - low).length()
+            });
+            open = rest;
+            if open.is_empty() || *left == 0 {
+                break;
+            }
+        }
+        self.closed.push((plane, open.is_empty()));
+        open.is_empty()
     }
 }
 
@@ -476,9 +576,27 @@ impl Hull {
         self.is_convex && self.polygons.iter().any(|&k| before(&placed[k]))
     }
 
-    /// Whether a lamp lies flush on one of its polygons and may shine through that to where they look away from: two-sided polygons
-    /// hide nothing of one that lies in their place. Of a body that is not convex it is not known which way that is.
+    /// Whether a lamp that touches two-sided polygons may shine among them. One that lies flush on one of them, to where they look away
+    /// from: they hide nothing of what lies in their place; of a body that is not convex it is not known which way that is. And one
+    /// that lies in the plane of the border and looks at them: it closes an open box, or a part of it.
     pub(super) fn is_lit_by(&self, placed: &[Placed], lamp: &Placed, slack_m: f64) -> bool {
+        !self.twins.is_empty()
+            && (self.is_lit_through(placed, lamp, slack_m)
+                || self.is_lit_from_border(placed, lamp, slack_m))
+    }
+
+    fn is_lit_from_border(&self, placed: &[Placed], lamp: &Placed, slack_m: f64) -> bool {
+        let height = |c: DVec3| (c - lamp.corners[0]).dot(lamp.normal);
+        !self.border.is_empty()
+            && self.bounds.grown(ABOVE * slack_m).meets(&lamp.bounds)
+            && self.border.iter().all(|&c| height(c).abs() <= ABOVE * slack_m)
+            && self
+                .polygons
+                .iter()
+                .any(|&k| placed[k].corners.iter().any(|&c| height(c) > ABOVE * slack_m))
+    }
+
+    fn is_lit_through(&self, placed: &[Placed], lamp: &Placed, slack_m: f64) -> bool {
         let is_flush = |wall: &Placed| {
             let height = |c: DVec3| (c - wall.corners[0]).dot(wall.normal);
             wall.bounds.grown(ABOVE * slack_m).meets(&lamp.bounds)
@@ -486,7 +604,7 @@ impl Hull {
         };
         let looks_out = |wall: &Placed| self.is_convex && wall.normal.dot(lamp.normal) > 0.0;
         let mut walls = self.polygons.iter().map(|&k| &placed[k]);
-        !self.twins.is_empty() && walls.any(|wall| is_flush(wall) && !looks_out(wall))
+        walls.any(|wall| is_flush(wall) && !looks_out(wall))
     }
 
     /// Whether a patch of the group is one of its own.

@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use super::covered::{Face, Hull, dark_in_gaps, hulls_of, reach_m, stand};
+use super::covered::{Face, Hull, Stands, dark_in_gaps, hulls_of, reach_m};
 use super::gap::{open_sides, widest_m};
 use super::placed::{IN_PLANE, Placed};
 use super::{BodyId, Covered, Patch, PatchId, Scene};
@@ -157,35 +157,34 @@ impl Covering {
             let bounds = moved(&hull.bounds, &one.pose);
             let slack_m = IN_PLANE * reach_m(&bounds);
             let near = boxes.meeting(&bounds.grown(slack_m));
-            if near.is_empty() || Covering::may_hold_light(pair, (hull, &bounds), present, slack_m)
-            {
+            if near.is_empty() {
                 continue;
             }
             let border = hull.border.iter().map(|&c| one.pose.point(c)).collect();
             let hull = Hull { border, bounds, ..hull.clone() };
-            for patch in near.into_iter().map(|k| &patches[k]) {
+            if Covering::may_hold_light(pair, &hull, present, slack_m) {
+                continue;
+            }
+            let near: Vec<&Placed> = near.into_iter().map(|k| &patches[k]).collect();
+            let mut stands = Stands::new(scene, (polygons, &hull), &near, slack_m);
+            for patch in &near {
                 let covered =
                     out.entry(patch.id).or_insert_with(|| rest[patch.id.0 as usize].clone());
-                stand(scene, (polygons, &hull), (patch, false), slack_m, (covered, left));
+                stands.on((patch, false), covered, left);
             }
         }
     }
 
-    /// Whether a lamp may be among the polygons of a hull.
-    fn may_hold_light(
-        pair: &Pair<'_>,
-        (hull, bounds): (&Hull, &Aabb),
-        present: &[Present],
-        slack_m: f64,
-    ) -> bool {
+    /// Whether a lamp may be among the polygons of a hull, whose border and box are those in the world.
+    fn may_hold_light(pair: &Pair<'_>, hull: &Hull, present: &[Present], slack_m: f64) -> bool {
         let Pair { scene, now, polygons, bodies: [one, _] } = *pair;
         let glows = |id: PatchId| now.glows[id.0 as usize];
         let is_two_sided = !hull.twins.is_empty();
         let within = |what: &Aabb, touching: bool| {
             let [by, before] = if touching { [4.0, 2.0] } else { [2.0, 4.0] };
             let what = what.grown(by * slack_m);
-            let inner = bounds.hi.min(what.hi) - 3.0 * slack_m;
-            bounds.lo.max(what.lo).cmplt(inner).all()
+            let inner = hull.bounds.hi.min(what.hi) - 3.0 * slack_m;
+            hull.bounds.lo.max(what.lo).cmplt(inner).all()
                 && !hull.is_before(polygons, &what, before * slack_m)
         };
         let shines_in =

@@ -40,8 +40,9 @@ pub struct Shaft<'a> {
     pub patches: (PatchId, PatchId),
 }
 
-/// Distance from an end's plane, in slacks, within which a polygon lies on it.
-const COVER: f64 = 0.5;
+/// Distance from an end's plane, in slacks, within which a polygon lies on it. No less than 1: what is closer than a slack blocks
+/// nothing by itself, so that the light between would count twice.
+const COVER: f64 = 1.0;
 
 /// How far a polygon that lies on an end is lifted off it, in slacks: more than anything that is
 /// disregarded because it is close to an end.

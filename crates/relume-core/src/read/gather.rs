@@ -288,8 +288,7 @@ impl<'a> Look<'a> {
         } else {
             // The part in view may be much brighter or darker than the rest.
             let (factor, moment) = self.factor_past(&seen, &in_the_way, SENSOR_SPLITS);
-            let at = moment / factor.max(f64::MIN_POSITIVE);
-            (factor, radiosity_at(self.solved, &e, id, at))
+            (factor, radiosity_at(self.solved, &e, id, middle_of((factor, moment), &seen)))
         };
         if factor <= 0.0 {
             return;
@@ -390,7 +389,8 @@ impl<'a> Look<'a> {
         }
         let (factor, moment) = self.factor_past(part, occluders, SENSOR_SPLITS);
         if factor > 0.0 {
-            out.push(Part { leaf, at: moment / factor, nearest_m, factor });
+            let at = middle_of((factor, moment), part);
+            out.push(Part { leaf, at, nearest_m, factor });
         }
     }
 
@@ -442,6 +442,13 @@ impl Part {
         let e = WorldElement::new(&solved.space.view, &solved.space.forest, self.leaf, false);
         radiosity_at(solved, &e, self.leaf, self.at).map(f64::from)
     }
+}
+
+/// The middle of what is seen of a polygon, from its form factor and that times the middle: of a sliver both are differences of
+/// rounded numbers, but it is on the polygon all the same.
+fn middle_of((factor, moment): (f64, DVec3), polygon: &[DVec3]) -> DVec3 {
+    let bounds = Aabb::of(polygon.iter().copied());
+    (moment / factor.max(f64::MIN_POSITIVE)).clamp(bounds.lo, bounds.hi)
 }
 
 /// Radiosity of an element at a point of it, from its line, never negative, W/m2.

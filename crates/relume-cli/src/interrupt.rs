@@ -4,7 +4,7 @@
 //! look; it is ended from here, once what it has finished is in its place.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError, mpsc};
 use std::time::Duration;
 
 use relume::export::settle_unfinished;
@@ -15,6 +15,13 @@ use crate::text;
 
 /// How long a run may take to notice by itself.
 const GRACE: Duration = Duration::from_millis(600);
+
+/// How long a file that is being written may take before the process ends without it: a pipe that nobody
+/// reads never takes what is written.
+const FILE_GRACE: Duration = Duration::from_secs(5);
+
+/// Time between two looks whether a file is written.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(10);
 
 /// Puts what a run has finished into its place.
 type Keep = Box<dyn Fn() -> Result<(), Failure> + Send>;
@@ -41,16 +48,29 @@ pub(crate) fn listen() -> Result<(), Failure> {
 /// Ends the process with a message, from any thread and in the middle of anything but a file, once
 /// what is finished is kept.
 pub(crate) fn end(why: &Failure) -> ! {
-    if let Some(keep) = &*locked(&KEEP)
-        && let Err(failure) = keep()
-    {
-        text::complain(&failure.to_string());
-    }
-    // Not in the middle of a file.
-    let _guard = writing();
+    keep_within(FILE_GRACE);
+    // Not in the middle of a file, if that gets done.
+    let _guard = try_locked_for(&WRITING, FILE_GRACE);
     settle_unfinished();
     text::complain(&format!("\n{why}"));
     std::process::exit(i32::from(why.exit_code()));
+}
+
+/// Puts what the run has finished into its place, if that takes no longer.
+fn keep_within(patience: Duration) {
+    let (kept, wait) = mpsc::channel();
+    // No work of the engine: its results do not depend on it.
+    #[allow(clippy::disallowed_methods)]
+    std::thread::spawn(move || {
+        let failure = locked(&KEEP).as_ref().and_then(|keep| keep().err());
+        // Nobody waits any more: as good.
+        let _ = kept.send(failure);
+    });
+    match wait.recv_timeout(patience) {
+        Ok(Some(failure)) => text::complain(&failure.to_string()),
+        Ok(None) => {}
+        Err(_) => text::complain("the report could not be written in time"),
+    }
 }
 
 /// Ends the process at once where memory ran out, so that the rows kept so far stay as they do when a run is
@@ -75,6 +95,22 @@ pub(crate) fn requested() -> bool {
 /// While this is held, the process is not ended.
 pub(crate) fn writing() -> MutexGuard<'static, ()> {
     locked(&WRITING)
+}
+
+/// What a lock guards, or `None` if it is not let go of in so long a time.
+fn try_locked_for<T>(mutex: &Mutex<T>, patience: Duration) -> Option<MutexGuard<'_, T>> {
+    let mut looks = patience.as_millis() / BETWEEN_LOOKS.as_millis();
+    loop {
+        match mutex.try_lock() {
+            Ok(guard) => return Some(guard),
+            Err(TryLockError::Poisoned(poisoned)) => return Some(poisoned.into_inner()),
+            Err(TryLockError::WouldBlock) if looks == 0 => return None,
+            Err(TryLockError::WouldBlock) => {
+                looks -= 1;
+                std::thread::sleep(BETWEEN_LOOKS);
+            }
+        }
+    }
 }
 
 /// What a lock guards, also after a panic elsewhere.

@@ -44,6 +44,7 @@ impl Lock {
             let written = file.set_len(0).and_then(|()| file.write_all(number.as_bytes()));
             written.map_err(|error| Failure::write(&path, &error))?;
             remove_remains(dir, &is_named_by_runs);
+            nothing_in_the_way(dir)?;
             return Ok(Lock { _file: file, path });
         }
     }
@@ -74,6 +75,21 @@ fn taken(dir: &Path, file: &mut File) -> Failure {
     )
 }
 
+/// An error where something other than a file has a name that a run gives its files: a pipe would take a picture only
+/// once somebody reads it.
+fn nothing_in_the_way(dir: &Path) -> Result<(), Failure> {
+    let Ok(entries) = fs::read_dir(dir) else { return Ok(()) };
+    let in_the_way = entries
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| is_of_a_run(path) && fs::metadata(path).is_ok_and(|known| !known.is_file()));
+    match in_the_way.min() {
+        None => Ok(()),
+        Some(path) => Err(Failure::new(format_args!("{} is not a file", path.display()))
+            .help("move it away, or name another directory with -o")),
+    }
+}
+
 /// Whether a path is that of a file that only runs write into their folder, which have its lock.
 pub(crate) fn is_of_a_run(path: &Path) -> bool {
     path.file_name().and_then(|name| name.to_str()).is_some_and(is_named_by_runs)
@@ -81,6 +97,7 @@ pub(crate) fn is_of_a_run(path: &Path) -> bool {
 
 fn is_named_by_runs(name: &str) -> bool {
     name == "report.json"
+        || name == "preview.png"
         || (name.starts_with("frame-") && (name.ends_with(".png") || name.ends_with(".exr")))
 }
 
@@ -118,6 +135,14 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         fs::write(dir.path().join(".relume.lock"), "12").unwrap();
         assert!(Lock::take(dir.path()).is_ok());
+    }
+
+    #[test]
+    fn what_is_no_file_is_not_written_to() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::create_dir(dir.path().join("frame-0003.png")).unwrap();
+        let message = Lock::take(dir.path()).err().unwrap().to_string();
+        assert!(message.contains("frame-0003.png is not a file"), "{message}");
     }
 
     #[test]

@@ -442,10 +442,10 @@ impl Job {
             (Some(dir), None) => line += &format!(", report in {}", dir.display()),
             (None, _) => {}
         }
-        if let Some(energy) = &run.energy {
+        if let Some((frame, energy)) = &run.energy {
             line += &match gets_no_light(run.session.scene(), energy) {
                 true => NO_LIGHT_GETS_IN.to_owned(),
-                false => balance(energy, &run.suspects),
+                false => balance(*frame, energy, &run.suspects),
             };
         }
         line += &run.estimates.line(run.session.options().tolerance);
@@ -496,12 +496,12 @@ fn named(surfaces: &[String]) -> String {
     names.join(" and ")
 }
 
-/// A line about the energy balance of the last frame.
-fn balance(energy: &Energy, suspects: &[String]) -> String {
+/// A line about the energy balance of a frame.
+fn balance(frame: u32, energy: &Energy, suspects: &[String]) -> String {
     let Energy { emitted_w, absorbed_w, escaped_w } = *energy;
     let share = 100.0 * energy.unbalanced();
     let mut line = format!(
-        "\nlast frame: {emitted_w:.4} W emitted, {absorbed_w:.4} W absorbed, {escaped_w:.4} W escaped, \
+        "\nframe {frame}: {emitted_w:.4} W emitted, {absorbed_w:.4} W absorbed, {escaped_w:.4} W escaped, \
          {share:.2} % unbalanced"
     );
     // What is more is said of all frames.
@@ -559,8 +559,8 @@ struct Run<'a> {
     progress: Progress,
     /// Links of the last frame.
     links: u64,
-    /// Energy balance of the last frame.
-    energy: Option<Energy>,
+    /// Number and energy balance of the frame that was solved last.
+    energy: Option<(u32, Energy)>,
     /// Surfaces that receive more than they can.
     suspects: Vec<String>,
     estimates: Estimates,
@@ -607,7 +607,7 @@ impl Run<'_> {
             .step(frame, frames::time_of(frame, self.job.solve.clip.time.fps))
             .map_err(|error| self.session_failure(error))?;
         self.links = entry.links;
-        self.energy = entry.energy;
+        self.energy = entry.energy.map(|energy| (frame, energy));
         self.suspects = entry.suspects.clone();
         entry.accuracy = self.estimates.of(clip::solved(&self.session), frame, None);
         let picture = match self.job.picture_path(frame) {

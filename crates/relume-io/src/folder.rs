@@ -73,6 +73,13 @@ impl Folder {
 
     /// An error if a file may not be opened.
     pub(super) fn check(&self, name: &str, owner: &str) -> Result<(), SceneError> {
+        if name.is_empty() {
+            return Err(SceneError::Format {
+                file: self.file.clone(),
+                what: format!("{owner} names no file: its URI is empty"),
+                remedy: "export it again, or name the file that holds it".into(),
+            });
+        }
         if leaves_folder(name) && !self.allow_outside {
             let what = format!("{owner} is outside the folder of the file ({name})");
             return Err(self.outside(what));

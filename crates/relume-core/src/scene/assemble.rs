@@ -219,6 +219,9 @@ impl Parts {
         if !is_speck.contains(&true) {
             return Ok(());
         }
+        if !is_speck.contains(&false) {
+            return Err(self.all_specks(extent, motion));
+        }
         let mut counts = vec![(0, 0); self.surfaces.len()];
         for (patch, &speck) in self.patches.iter().zip(&is_speck) {
             let count = &mut counts[patch.surface.0 as usize];
@@ -274,18 +277,48 @@ impl Parts {
 
     /// The scene's extent at the start, or what it would be if all were present.
     fn extent_m(&self, motion: &Motion) -> Option<f64> {
-        let mut bounds: Option<(DVec3, DVec3)> = None;
-        for body in &self.bodies {
-            let moves = motion.moves(body.node);
-            let pose = if moves { motion.pose(body.node, 0.0) } else { None };
-            let pose = pose.unwrap_or(Pose::IDENTITY);
-            let range = body.patches.start as usize..body.patches.end as usize;
-            for point in self.patches[range].iter().flat_map(Patch::corners_in_body) {
-                let p = pose.point(point);
-                bounds = Some(bounds.map_or((p, p), |(low, high)| (low.min(p), high.max(p))));
-            }
-        }
+        let points = self.bodies.iter().flat_map(|body| self.points_at_start(body, motion));
+        let bounds = points.fold(None, |bounds: Option<(DVec3, DVec3)>, p| {
+            Some(bounds.map_or((p, p), |(low, high)| (low.min(p), high.max(p))))
+        });
         bounds.map(|(low, high)| (high - low).length())
+    }
+
+    /// Corners of a body's patches in the world at time 0.
+    fn points_at_start<'a>(
+        &'a self,
+        body: &'a Body,
+        motion: &Motion,
+    ) -> impl Iterator<Item = DVec3> + 'a {
+        let moves = motion.moves(body.node);
+        let pose = if moves { motion.pose(body.node, 0.0) } else { None };
+        let pose = pose.unwrap_or(Pose::IDENTITY);
+        let range = body.patches.start as usize..body.patches.end as usize;
+        self.patches[range].iter().flat_map(Patch::corners_in_body).map(move |p| pose.point(p))
+    }
+
+    /// The error where nothing is as large as a millionth of the scene, since its bodies are so far apart.
+    fn all_specks(&self, extent_m: f64, motion: &Motion) -> SceneError {
+        let place = |body: &Body| self.points_at_start(body, motion).next().unwrap_or(DVec3::ZERO);
+        let first = place(&self.bodies[0]);
+        let distance_m = |body: &Body| place(body).distance(first);
+        let furthest = self.bodies.iter().max_by(|a, b| distance_m(a).total_cmp(&distance_m(b)));
+        let apart = match furthest {
+            Some(body) if distance_m(body) > 0.0 => format!(
+                ": `{}` and `{}` are {:.3e} m apart",
+                self.bodies[0].name,
+                body.name,
+                distance_m(body)
+            ),
+            _ => String::new(),
+        };
+        SceneError::Geometry {
+            subject: format!("surface `{}`", self.surfaces[0].name),
+            what: format!(
+                "it and all others are smaller or thinner than a millionth of the scene, which is {extent_m:.3e} m large{apart}"
+            ),
+            remedy: "move what stands far out near the rest, or leave it out".into(),
+        }
     }
 
     fn add_patch(

@@ -255,6 +255,22 @@ fn what_is_too_small_for_the_scene_is_left_out_by_name() {
 }
 
 #[test]
+fn bodies_too_far_apart_for_their_sizes_are_named() {
+    let mut g = Gltf::cube();
+    g.node(json!({"name": "far", "mesh": 0, "translation": [1e8, 0, 0]}));
+    let message = scene_of(&g).unwrap_err().to_string();
+    assert!(message.contains("`far` are 1.000e8 m apart"), "{message}");
+}
+
+#[test]
+fn a_uri_that_names_nothing_is_said() {
+    let mut g = Gltf::cube();
+    g.json["buffers"] = json!([{"byteLength": 4, "uri": ""}]);
+    let message = scene_of(&g).unwrap_err().to_string();
+    assert!(message.contains("buffer 0 names no file: its URI is empty"), "{message}");
+}
+
+#[test]
 fn counts_without_data_are_refused_before_memory_is_asked_for() {
     let many = |count: u64| {
         refusal(|j| {

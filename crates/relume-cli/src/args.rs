@@ -112,9 +112,9 @@ pub(crate) enum Command {
     /// LOG has a line of JSON for each step: `set_pose` (body, to: axes and translation), `set_presence`,
     /// `set_reflectance`, `set_exitance`, `set_intensity`, `set_time`, `insert`, `remove`, `undo`, `redo`, and `solve`, with
     /// the hash of the links if it is known. Bodies, materials and lights go by the names that `relume info` lists;
-    /// `to` may be null: then the file has its say again. `insert` holds a name and meshes (surface, index of the
+    /// `to` may be null: then the file has its say again. `insert` holds a name and meshes (surface, name of the
     /// material, positions, triangles). Programs that use relume as a library write such logs
-    /// (`relume::Log`). Exits with 1 at the first hash that differs.
+    /// (`relume::Log`). Exits with 1 if a hash differs.
     #[command(
         after_help = "Example:  relume replay moves.jsonl scene.glb --tolerance 0.1 -o with-hashes.jsonl"
     )]

@@ -63,7 +63,7 @@ impl Failure {
 
     /// A file that could not be read.
     pub(crate) fn read(path: &Path, error: &io::Error) -> Failure {
-        Failure::new(format_args!("cannot read {}: {}", path.display(), describe(error)))
+        Failure::new(format_args!("cannot read `{}`: {}", path.display(), describe(error)))
             .help("check the path and its permissions")
     }
 

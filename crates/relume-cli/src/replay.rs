@@ -22,6 +22,11 @@ pub(crate) fn replay(args: &ReplayArgs) -> Result<(), Failure> {
     if let Some(error) = told.failed {
         return Err(error);
     }
+    if let Some(path) = &args.output {
+        let mut sink = Sink::open(Some(path))?;
+        log.write(&mut sink).and_then(|()| sink.flush()).map_err(|error| sink.failure(&error))?;
+        sink.finish()?;
+    }
     if let Some(solve) = told.differs {
         return Err(Failure::new(format_args!(
             "solve {solve} does not have the hash that the log has for it"
@@ -29,11 +34,6 @@ pub(crate) fn replay(args: &ReplayArgs) -> Result<(), Failure> {
         .help(
             "the scene, the options or the version of relume differ from those that wrote the log",
         ));
-    }
-    if let Some(path) = &args.output {
-        let mut sink = Sink::open(Some(path))?;
-        log.write(&mut sink).and_then(|()| sink.flush()).map_err(|error| sink.failure(&error))?;
-        sink.finish()?;
     }
     if args.clip.quiet {
         return Ok(());
@@ -89,9 +89,13 @@ fn failure(args: &ReplayArgs, error: LogError) -> Failure {
         LogError::Unsolved { line, source } => {
             step_failure(source, &format!("at line {line} of {log}"))
         }
+        LogError::Unknown { line, what, name } => {
+            Failure::new(format_args!("{log}, line {line}: the scene has no {what} `{name}`"))
+                .help("`relume info` lists the bodies, materials and lights of the scene")
+        }
+        // It names the remedy.
         LogError::Refused { line, source } => {
             Failure::new(format_args!("{log}, line {line}: {source}"))
-                .help("`relume info` lists the bodies, materials and lights of the scene")
         }
         LogError::Line { line, what } => Failure::new(format_args!("{log}, line {line}: {what}"))
             .help("`relume help replay` lists the commands"),

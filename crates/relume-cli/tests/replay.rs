@@ -34,7 +34,9 @@ fn a_log_is_followed_and_its_hashes_compared() {
 
     let written = fs::read_to_string(&with_hashes).unwrap();
     fs::write(&with_hashes, written.replacen(hashes[1], hashes[0], 1)).unwrap();
-    run(&with_hashes, &[]).fails(1, &["solve 1 does not have the hash", "help:"]);
+    let found = dir.path().join("found.jsonl");
+    run(&with_hashes, &["-o", text(&found)]).fails(1, &["solve 1 does not have the hash", "help:"]);
+    assert_eq!(fs::read_to_string(&found).unwrap(), written);
 }
 
 #[test]
@@ -45,6 +47,11 @@ fn what_cannot_be_followed_is_explained() {
         ("{\"remove\":{\"body\":\"sofa\"}}", ["line 1: the scene has no body `sofa`", "help:"]),
         ("{\"jump\":{}}", ["line 1: unknown variant `jump`", "help:"]),
         ("{\"set_time\":{\"to\":1e999}}", ["line 1: ", "help:"]),
+        ("{\"set_pose\":{\"body\":\"lamp\"}}", ["line 1: missing field `to`", "help:"]),
+        (
+            "{\"insert\":{\"name\":\"card\",\"meshes\":[{\"surface\":\"card\",\"material\":\"gold\",\"positions\":[[0,1,0],[1,1,0],[0,1,1]],\"triangles\":[[0,1,2]]}]}}",
+            ["line 1: the scene has no material `gold`", "`relume info` lists"],
+        ),
     ] {
         fs::write(&log, line).unwrap();
         relume(&[&["replay", text(&log), text(&scene)], &COARSE[..]].concat()).fails(1, &texts);

@@ -238,7 +238,7 @@ fn follow(scene: &Scene, seeds: std::ops::Range<u64>, steps: usize, insert: f64)
                 };
                 match session.apply(command) {
                     Ok(inverse) => inverses.push(inverse),
-                    Err(CommandError::Unknown { .. }) => {}
+                    Err(CommandError::Unknown { .. } | CommandError::Removed { .. }) => {}
                     Err(error) => panic!("{seed}: {error}"),
                 }
             }
@@ -391,6 +391,7 @@ fn what_makes_no_sense_is_refused_and_changes_nothing() {
         (Command::SetTime(f64::INFINITY), "the time"),
         (Command::Insert(flat), "no triangle with an area"),
         (Command::Insert(other), "material 9 does not exist"),
+        (Command::Insert(NewBody::new("bare")), "body `bare`: it has no mesh"),
     ] {
         let refused = session.apply(command).unwrap_err().to_string();
         assert!(refused.contains(says), "{refused}");
@@ -400,9 +401,35 @@ fn what_makes_no_sense_is_refused_and_changes_nothing() {
     let new = |name| NewBody::new(name).with_mesh(name, MaterialId(0), &corners, &triangles);
     session.apply(Command::Insert(new("x"))).unwrap();
     let back = session.apply(Command::Remove(BodyId(4))).unwrap();
+    let refused = session.apply(Command::Remove(BodyId(4))).unwrap_err().to_string();
+    assert!(refused.contains("there is no body 4"), "{refused}");
+    let lamp = session.apply(Command::Remove(BodyId(1))).unwrap();
+    let refused = session.apply(Command::hide(BodyId(1))).unwrap_err().to_string();
+    assert!(refused.contains("body `lamp` was removed; put it back"), "{refused}");
+    session.apply(lamp).unwrap();
     session.apply(Command::Insert(new("y"))).unwrap();
     let refused = session.apply(back).unwrap_err().to_string();
     assert!(refused.contains("reverse order"), "{refused}");
+}
+
+#[test]
+fn times_that_are_no_numbers_are_refused_and_normals_need_not_be_unit() {
+    let mut session = Session::new(room(), at_tolerance(0.4)).unwrap();
+    for time_s in [f64::NAN, f64::INFINITY] {
+        let refused = session.solve_at(time_s).err().unwrap().to_string();
+        assert!(refused.contains("a number of seconds"), "{refused}");
+    }
+    let frame = session.solve().unwrap();
+    let at = [0.5, 1.0, 0.2];
+    let long = frame.irradiance_at(at, [0.0, 3.0, 4.0]);
+    let unit = frame.irradiance_at(at, [0.0, 0.6, 0.8]);
+    assert!(
+        unit[0] > 0.0 && (0..3).all(|c| (long[c] / unit[c] - 1.0).abs() < 1e-9),
+        "{long:?}, {unit:?}"
+    );
+    for (at, normal) in [([f64::NAN, 1.0, 0.2], [0.0, 1.0, 0.0]), (at, [0.0; 3])] {
+        assert!(frame.irradiance_at(at, normal).iter().all(|e| e.is_nan()));
+    }
 }
 
 #[test]

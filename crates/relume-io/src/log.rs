@@ -6,10 +6,10 @@
 use std::io::{BufRead, Write};
 
 use glam::{DMat3, DVec3};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use relume_core::geometry::Pose;
-use relume_core::scene::{BodyId, LightId, MaterialId, NewBody, Scene};
+use relume_core::scene::{BodyId, LightId, MaterialId, NewBody, NewMesh, Scene};
 use relume_core::session::{Command, CommandError, Frame, Session, SessionError};
 
 /// Record of a session: one entry for each command, undo, redo and solve.
@@ -26,17 +26,62 @@ pub struct Log {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 enum Entry {
-    SetTime { to: f64 },
-    SetPose { body: String, to: Option<Placed> },
-    SetPresence { body: String, to: Option<bool> },
-    SetReflectance { material: String, to: Option<[f64; 3]> },
-    SetExitance { material: String, to: Option<[f64; 3]> },
-    SetIntensity { light: String, to: Option<[f64; 3]> },
-    Insert(NewBody),
-    Remove { body: String },
+    SetTime {
+        to: f64,
+    },
+    SetPose {
+        body: String,
+        #[serde(deserialize_with = "said")]
+        to: Option<Placed>,
+    },
+    SetPresence {
+        body: String,
+        #[serde(deserialize_with = "said")]
+        to: Option<bool>,
+    },
+    SetReflectance {
+        material: String,
+        #[serde(deserialize_with = "said")]
+        to: Option<[f64; 3]>,
+    },
+    SetExitance {
+        material: String,
+        #[serde(deserialize_with = "said")]
+        to: Option<[f64; 3]>,
+    },
+    SetIntensity {
+        light: String,
+        #[serde(deserialize_with = "said")]
+        to: Option<[f64; 3]>,
+    },
+    Insert {
+        name: String,
+        meshes: Vec<Drawn>,
+    },
+    Remove {
+        body: String,
+    },
     Undo {},
     Redo {},
-    Solve { hash: Option<String> },
+    Solve {
+        hash: Option<String>,
+    },
+}
+
+/// A value that may be null, but must be there.
+fn said<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<Option<T>, D::Error> {
+    Option::deserialize(from)
+}
+
+/// A mesh in a log.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Drawn {
+    surface: String,
+    material: String,
+    /// Metres.
+    positions: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
 }
 
 /// A pose in a log.
@@ -64,6 +109,16 @@ pub enum LogError {
         /// What is wrong with it.
         what: String,
     },
+    /// An entry names what the scene does not have.
+    #[error("line {line}: the scene has no {what} `{name}`")]
+    Unknown {
+        /// From 1.
+        line: usize,
+        /// Body, material or light.
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
     /// A command was refused.
     #[error("line {line}: {source}")]
     Refused {
@@ -88,11 +143,15 @@ impl Log {
         Log::default()
     }
 
-    /// Applies a command to a session; commands undone before can no longer be redone.
+    /// Applies a command to a session, and returns the inverse; commands undone before can no longer be redone.
     ///
     /// # Errors
     /// As [`Session::apply`]; a command that was refused is not logged.
-    pub fn apply(&mut self, session: &mut Session, command: Command) -> Result<(), CommandError> {
+    pub fn apply(
+        &mut self,
+        session: &mut Session,
+        command: Command,
+    ) -> Result<Command, CommandError> {
         let Some(entry) = Entry::of(session.scene(), &command) else {
             return Err(CommandError::Value {
                 subject: "a log".into(),
@@ -100,10 +159,11 @@ impl Log {
                 remedy: "use `Log::undo`".into(),
             });
         };
-        self.done.push(session.apply(command)?);
+        let inverse = session.apply(command)?;
+        self.done.push(inverse.clone());
         self.undone.clear();
         self.entries.push(entry);
-        Ok(())
+        Ok(inverse)
     }
 
     /// Undoes the last command that is in force; returns false if there is none.
@@ -182,7 +242,8 @@ impl Log {
                     each(frame, hash.as_deref());
                 }
                 other => {
-                    let command = other.command(session.scene()).map_err(fail)?;
+                    let unknown = |(what, name)| LogError::Unknown { line, what, name };
+                    let command = other.command(session.scene()).map_err(unknown)?;
                     log.apply(session, command).map_err(refused)?;
                 }
             }
@@ -209,6 +270,19 @@ fn moved(scene: &Scene, body: BodyId, pose: &Pose, by: DVec3) -> Pose {
     let moves = scene.bodies.get(body.0 as usize).is_some_and(|_| scene.moves(body));
     let own = if moves { DVec3::ZERO } else { pose.rotation * by };
     Pose { rotation: pose.rotation, translation: pose.translation + by - own }
+}
+
+impl Drawn {
+    fn of(mesh: &NewMesh, name_of: &dyn Fn(&MaterialId) -> Option<String>) -> Drawn {
+        let NewMesh { surface, material, positions, triangles } = mesh.clone();
+        Drawn {
+            surface,
+            // What does not exist is refused when the command is applied.
+            material: name_of(&material).unwrap_or_default(),
+            positions,
+            triangles,
+        }
+    }
 }
 
 impl Entry {
@@ -240,27 +314,30 @@ impl Entry {
             Command::SetIntensity(id, to) => {
                 Entry::SetIntensity { light: light(id).unwrap_or_default(), to: *to }
             }
-            Command::Insert(new) => Entry::Insert(new.clone()),
+            Command::Insert(new) => Entry::Insert {
+                name: new.name().to_owned(),
+                meshes: new.meshes().iter().map(|mesh| Drawn::of(mesh, &material)).collect(),
+            },
             Command::Remove(id) => Entry::Remove { body: body(id).unwrap_or_default() },
             Command::PutBack(_) => return None,
-            // None: a test of the face holds that every command stands above.
+            // None: the test `a_log_knows_every_command` holds that every command stands above.
             _ => return None,
         })
     }
 
     /// The command that an entry says; it is one.
-    fn command(&self, scene: &Scene) -> Result<Command, String> {
-        let body = |name: &String| {
-            scene.body_named(name).ok_or_else(|| format!("the scene has no body `{name}`"))
-        };
+    ///
+    /// # Errors
+    /// What is named and is not in the scene.
+    fn command(&self, scene: &Scene) -> Result<Command, (&'static str, String)> {
+        let body = |name: &String| scene.body_named(name).ok_or_else(|| ("body", name.to_owned()));
         let material = |name: &String| {
             let at = scene.materials.iter().position(|m| m.name == *name);
-            let id = at.map(|k| MaterialId(k as u32));
-            id.ok_or_else(|| format!("the scene has no material `{name}`"))
+            at.map(|k| MaterialId(k as u32)).ok_or_else(|| ("material", name.to_owned()))
         };
         let light = |name: &String| {
             let at = scene.lights.iter().position(|l| l.name == *name);
-            at.map(|k| LightId(k as u32)).ok_or_else(|| format!("the scene has no light `{name}`"))
+            at.map(|k| LightId(k as u32)).ok_or_else(|| ("light", name.to_owned()))
         };
         Ok(match self {
             Entry::SetTime { to } => Command::SetTime(*to),
@@ -279,10 +356,16 @@ impl Entry {
             }
             Entry::SetExitance { material: name, to } => Command::SetExitance(material(name)?, *to),
             Entry::SetIntensity { light: name, to } => Command::SetIntensity(light(name)?, *to),
-            Entry::Insert(new) => Command::Insert(new.clone()),
+            Entry::Insert { name, meshes } => {
+                let mut new = NewBody::new(name);
+                for Drawn { surface, material: of, positions, triangles } in meshes {
+                    new = new.with_mesh(surface, material(of)?, positions, triangles);
+                }
+                Command::Insert(new)
+            }
             Entry::Remove { body: name } => Command::Remove(body(name)?),
             Entry::Undo {} | Entry::Redo {} | Entry::Solve { .. } => {
-                return Err("it is no command".into());
+                unreachable!("the caller carries these out")
             }
         })
     }

@@ -28,11 +28,12 @@
 //! ```
 //! use relume::{Command, Options, Pose, SceneBuilder, Session};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let corner = |k: u32| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { 1.0 } else { -1.0 });
-//! # let sides = [[2, 6, 4, 0], [5, 7, 3, 1], [4, 5, 1, 0], [3, 7, 6, 2], [1, 3, 2, 0], [6, 7, 5, 4]];
-//! # let room_corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
-//! # let room_triangles: Vec<[u32; 3]> = sides.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-//! // An octahedron: corners in metres, and triangles, counter-clockwise seen from outside.
+//! // A cube of side 2 about the origin: corners in metres, and triangles, counter-clockwise seen from inside.
+//! let corner = |k: u32| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { 1.0 } else { -1.0 });
+//! let sides = [[2, 6, 4, 0], [5, 7, 3, 1], [4, 5, 1, 0], [3, 7, 6, 2], [1, 3, 2, 0], [6, 7, 5, 4]];
+//! let room_corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
+//! let room_triangles: Vec<[u32; 3]> = sides.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+//! // An octahedron, seen from outside.
 //! let r = 0.1;
 //! let lamp_corners = [[r, 0.0, 0.0], [-r, 0.0, 0.0], [0.0, r, 0.0], [0.0, -r, 0.0], [0.0, 0.0, r], [0.0, 0.0, -r]];
 //! let lamp_triangles = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
@@ -42,7 +43,7 @@
 //! let glow = b.material("glow", [0.0; 3], [1.0; 3]);
 //! let room = b.body("room");
 //! let ball = b.body("ball");
-//! b.mesh(room, "walls", grey, &room_corners, &room_triangles); // a cube of side 2 about the origin, seen from inside
+//! b.mesh(room, "walls", grey, &room_corners, &room_triangles);
 //! b.mesh(ball, "lamp", glow, &lamp_corners, &lamp_triangles);
 //! let mut session = Session::new(b.build()?, Options { tolerance: 0.1, ..Options::default() })?;
 //! let first = session.solve()?.hash(); // of all links

@@ -67,9 +67,9 @@ impl<'a> Frame<'a> {
         Hash(self.solved.hash.bits())
     }
 
-    /// Irradiance at a point with a unit normal, W/m2, linear RGB: gathered from all elements and punctual lights, each
-    /// with visibility of its own from this point. What an emitter emits is exact; what an element sends errs by its
-    /// radiosity's variation within it.
+    /// Irradiance at a point with a normal of any length but 0, W/m2, linear RGB: gathered from all elements and punctual lights,
+    /// each with visibility of its own from this point. What an emitter emits is exact; what an element sends errs by its
+    /// radiosity's variation within it. NaN where the point or the direction of the normal is no number.
     pub fn irradiance_at(&self, point: impl Into<DVec3>, normal: impl Into<DVec3>) -> [f64; 3] {
         self.irradiances_at(&[Sensor { at: point.into(), normal: normal.into() }])[0]
     }
@@ -77,7 +77,10 @@ impl<'a> Frame<'a> {
     /// Irradiances at many sensors in parallel, W/m2, linear RGB, in their order. Cost: some 0.1 us for each element
     /// that is neither far from a sensor nor hidden, more where something is partly in the way.
     pub fn irradiances_at(&self, sensors: &[Sensor]) -> Vec<[f64; 3]> {
-        sensors::irradiances_at(self.solved, sensors)
+        let unit =
+            |sensor: &Sensor| Sensor { normal: sensor.normal.normalize_or(DVec3::NAN), ..*sensor };
+        let sensors: Vec<Sensor> = sensors.iter().map(unit).collect();
+        sensors::irradiances_at(self.solved, &sensors)
     }
 
     /// Errors of the mesh's irradiance, estimated at `points` points by walks along rays. Cost: some 2,000 rays a point.

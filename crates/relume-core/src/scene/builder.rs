@@ -329,7 +329,7 @@ fn no_material(material: MaterialId, subject: &str) -> SceneError {
     SceneError::Geometry {
         subject: subject.to_owned(),
         what: format!("material {} does not exist", material.0),
-        remedy: "use a material of the same builder".into(),
+        remedy: "use a material of the same builder; for a body to be inserted, one of the session's scene".into(),
     }
 }
 

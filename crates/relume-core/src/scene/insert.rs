@@ -3,8 +3,6 @@
 //! Ids of other bodies, surfaces and materials stay; patches are numbered anew. What was taken out can be put back,
 //! and the scene is then as before. Must not know who changes a scene, or what is solved on it.
 
-use serde::{Deserialize, Serialize};
-
 use super::builder::SceneBuilder;
 use super::{
     Body, BodyId, Frame, Material, MaterialId, Node, NodeId, Patch, PatchId, Scene, SceneError,
@@ -12,22 +10,23 @@ use super::{
 };
 
 /// A body to be inserted into a scene: meshes with materials of that scene.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct NewBody {
     name: String,
     meshes: Vec<NewMesh>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct NewMesh {
-    surface: String,
-    /// Index of a material of the scene.
-    #[serde(with = "by_index")]
-    material: MaterialId,
-    positions: Vec<[f64; 3]>,
-    triangles: Vec<[u32; 3]>,
+/// Mesh of a [`NewBody`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct NewMesh {
+    /// Name of the surface.
+    pub surface: String,
+    /// A material of the scene.
+    pub material: MaterialId,
+    /// Corners in the body's frame, metres.
+    pub positions: Vec<[f64; 3]>,
+    /// Three indices into the positions each.
+    pub triangles: Vec<[u32; 3]>,
 }
 
 /// A body that was taken out of a scene, to be put back.
@@ -59,20 +58,6 @@ struct Ends {
     node: Option<Node>,
 }
 
-mod by_index {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    use super::MaterialId;
-
-    pub(super) fn serialize<S: Serializer>(id: &MaterialId, to: S) -> Result<S::Ok, S::Error> {
-        id.0.serialize(to)
-    }
-
-    pub(super) fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<MaterialId, D::Error> {
-        Ok(MaterialId(u32::deserialize(from)?))
-    }
-}
-
 impl NewBody {
     /// A body without polygons.
     pub fn new(name: &str) -> NewBody {
@@ -82,6 +67,11 @@ impl NewBody {
     /// Its name; in a scene in which the name is taken, a number is added.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Its meshes.
+    pub fn meshes(&self) -> &[NewMesh] {
+        &self.meshes
     }
 
     /// Adds a mesh: positions in the body's frame, metres, triangles counter-clockwise seen from the front, a material of the
@@ -115,6 +105,13 @@ impl Scene {
     /// # Errors
     /// What [`SceneBuilder::build`] would say of the body.
     pub(crate) fn with_body(&self, new: &NewBody) -> Result<(Scene, BodyId), SceneError> {
+        if new.meshes.is_empty() {
+            return Err(SceneError::Geometry {
+                subject: format!("body `{}`", new.name),
+                what: "it has no mesh".into(),
+                remedy: "give it one by `NewBody::with_mesh`".into(),
+            });
+        }
         let mut alone = SceneBuilder::new(&self.name);
         for Material { name, reflectance, exitance, double_sided, .. } in &self.materials {
             if *double_sided {

@@ -63,7 +63,7 @@ pub(crate) use edited::FIRST_NAME;
 pub use error::SceneError;
 pub use glow::Glow;
 pub use in_plane::{InPlane, Sheet};
-pub use insert::{NewBody, TakenBody};
+pub use insert::{NewBody, NewMesh, TakenBody};
 pub use join::{Joined, Part};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
 pub use print::{Print, Printed};

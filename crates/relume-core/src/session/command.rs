@@ -30,7 +30,7 @@ pub enum Command {
     SetExitance(MaterialId, Option<[f64; 3]>),
     /// Changes the intensity of a punctual light, W/sr (directional: W/m2).
     SetIntensity(LightId, Option<[f64; 3]>),
-    /// Inserts a body at the origin of the world, under the next free id.
+    /// Inserts a body at the origin of the world. The inverse, [`Command::Remove`], has its id.
     Insert(NewBody),
     /// Takes a body out.
     Remove(BodyId),
@@ -85,7 +85,7 @@ impl Command {
 #[non_exhaustive]
 pub enum CommandError {
     /// The scene has no such body, material or light.
-    #[error("there is no {what} {index}: the scene has {count}")]
+    #[error("there is no {what} {index}: the scene has {count}, numbered from 0")]
     Unknown {
         /// Body, material or light.
         what: &'static str,
@@ -93,6 +93,14 @@ pub enum CommandError {
         index: u32,
         /// Number of such things in the scene.
         count: usize,
+    },
+    /// The body was removed.
+    #[error(
+        "body `{name}` was removed; put it back first, by the command that removing it returned"
+    )]
+    Removed {
+        /// Its name.
+        name: String,
     },
     /// A value is outside of what can be computed with.
     #[error("{subject}: {what}; {remedy}")]
@@ -189,11 +197,7 @@ fn check(scene: &Scene, command: &Command) -> Result<(), CommandError> {
         Command::SetPose(body, pose) => {
             let name = name_of(scene, *body)?;
             match pose.as_ref().and_then(flaw_of) {
-                Some(flaw) => refuse(
-                    format!("the pose of body `{name}`"),
-                    flaw,
-                    "give a rotation without scale, and a translation in metres",
-                ),
+                Some((flaw, remedy)) => refuse(format!("the pose of body `{name}`"), flaw, remedy),
                 None => Ok(()),
             }
         }
@@ -237,11 +241,7 @@ fn name_of(scene: &Scene, body: BodyId) -> Result<&str, CommandError> {
     let found = found("body", &scene.bodies, body.0)?;
     match scene.has_body(body) {
         true => Ok(&found.name),
-        false => Err(CommandError::Unknown {
-            what: "body",
-            index: body.0,
-            count: (0..scene.bodies.len() as u32).filter(|&k| scene.has_body(BodyId(k))).count(),
-        }),
+        false => Err(CommandError::Removed { name: found.name.clone() }),
     }
 }
 
@@ -257,14 +257,16 @@ fn check_emission(subject: String, to: &Option<[f64; 3]>) -> Result<(), CommandE
     }
 }
 
-/// Flaw of a pose, if it has one.
-fn flaw_of(pose: &Pose) -> Option<String> {
+/// Flaw of a pose and the remedy, if it has one.
+fn flaw_of(pose: &Pose) -> Option<(String, &'static str)> {
     if !is_place(&pose.translation.to_array()) {
         let at = pose.translation;
-        return Some(format!("its translation is {at}, not within {COORDINATE_MAX_M:e} m"));
+        let flaw = format!("its translation is {at}, not within {COORDINATE_MAX_M:e} m");
+        return Some((flaw, "give a translation in metres"));
     }
     let axes = pose.rotation;
     let off = axes.transpose() * axes - glam::DMat3::IDENTITY;
     let is_rigid = off.to_cols_array().iter().all(|x| x.abs() <= ORTHONORMAL);
-    (!is_rigid || axes.determinant() <= 0.0).then(|| "its axes are not a rotation's".into())
+    let flaw = || ("its axes are not a rotation's".into(), "give a rotation without scale");
+    (!is_rigid || axes.determinant() <= 0.0).then(flaw)
 }

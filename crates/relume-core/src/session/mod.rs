@@ -82,6 +82,12 @@ pub enum SessionError {
         /// Names of the surfaces whose rows exceed 1 by most.
         surfaces: Vec<String>,
     },
+    /// A time that is no number of seconds.
+    #[error("there is nothing at the time {time_s} of a clip: give a number of seconds")]
+    Time {
+        /// The time asked for.
+        time_s: f64,
+    },
     /// An option is out of its range.
     #[error("{0}")]
     Option(String),
@@ -182,6 +188,9 @@ impl Session {
     /// As [`Session::solve`].
     #[doc(hidden)]
     pub fn step(&mut self, frame: u32, time_s: f64) -> Result<FrameReport, SessionError> {
+        if !time_s.is_finite() {
+            return Err(SessionError::Time { time_s });
+        }
         self.time_s = time_s;
         self.frames += 1;
         let back = self.solved.as_ref().map(|solved| self.way_back(solved));

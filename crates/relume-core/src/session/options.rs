@@ -74,7 +74,7 @@ impl Options {
             && !(epsilon > 0.0 && epsilon < 1.0 && min_area_m2 >= 0.0)
         {
             return fail(format!(
-                "form-factor={epsilon},{min_area_m2}: the form factor must lie between 0 and 1 and the area must not be negative"
+                "form-factor oracle: the form factor {epsilon} must lie between 0 and 1, and the area {min_area_m2} m2 must not be negative"
             ));
         }
         Ok(())

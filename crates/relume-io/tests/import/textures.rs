@@ -494,5 +494,8 @@ fn vertex_colours_that_are_mostly_unset_are_a_mask() {
         assert!(colours(&scene).iter().all(|c| c[1] == 0.0), "{painted:?}");
         assert!(with_code(&scene.notes, "vertex-colours").is_empty());
     }
-    assert!(scene([unset; 4], "MASK").is_err(), "nothing is left of it");
+    // Nothing would be left of it.
+    let whole = scene([unset; 4], "MASK").unwrap();
+    assert_eq!(with_code(&whole.notes, "transparency").len(), 1);
+    assert_eq!(colours(&whole), [[0.5; 3]]);
 }

@@ -227,6 +227,14 @@ pub(super) const BEHIND: f64 = 0.05;
 /// - Smaller: rooms and yards are cut off
 pub(super) const DWARFED: f64 = 8.0;
 
+/// Thickness of a body up to which it may be such a ground, over the diagonal of the scene.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: buildings count as ground for what lies in them
+/// - Smaller: what stands on thick floors is a speck
+pub(super) const SLAB: f64 = 0.02;
+
 /// Share of what emits that is seen from outside, from which on a scene glows outwards: what is within is no room.
 ///
 /// - Unit: 1

@@ -5,7 +5,7 @@
 use glam::DVec3;
 use relume_core::scene::{BodyId, Patch, Scene};
 
-use super::super::tuning::DWARFED;
+use super::super::tuning::{DWARFED, SLAB};
 
 /// Width : height that candidates are framed for.
 pub(super) const ASPECT: f64 = 4.0 / 3.0;
@@ -15,9 +15,6 @@ const SWEEP_STEPS: u32 = 64;
 
 /// Distance from a plane below which something is in it, over the diagonal of the scene.
 const IN_PLANE: f64 = 1e-6;
-
-/// The same for a body that is a slab.
-const SLAB: f64 = 0.02;
 
 /// An axis-aligned box, metres.
 #[derive(Clone, Copy, Debug)]

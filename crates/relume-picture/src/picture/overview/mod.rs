@@ -65,7 +65,7 @@ impl Overview {
         let stages: Vec<Stage> =
             (0..instants).map(|k| Stage::new((scene, outside), time_s(k), &bounds)).collect();
         let mut views = bounds.outside();
-        let glows_outwards = stages[0].lamps_seen(&views) > GLOW;
+        let glows_outwards = stages[0].lamps_seen(views.iter().map(|of| &of.view)) > GLOW;
         views.extend(bounds.inside(&stages[0]));
         let scores = |views: &[Candidate], size| scores(&stages, views, size, glows_outwards);
         let rough = scores(&views, Size::ROUGH);

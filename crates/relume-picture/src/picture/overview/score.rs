@@ -16,7 +16,6 @@ use relume_core::scene::{BodyId, PatchId, Projection, Scene};
 use super::super::camera::View;
 use super::super::tuning::{BLACK, CLOSE, LIT, PIXELS, SURFACES};
 use super::bounds::{ASPECT, Bounds};
-use super::candidates::Candidate;
 use super::caster::{Caster, Hit};
 use super::preview::Preview;
 
@@ -113,16 +112,16 @@ impl<'a> Stage<'a> {
     }
 
     /// Share of what emits, lights aside, that is seen from some of these views.
-    pub(super) fn lamps_seen(&self, views: &[Candidate]) -> f64 {
+    pub(super) fn lamps_seen<'v>(&self, views: impl Iterator<Item = &'v View>) -> f64 {
         let lamps: Vec<usize> =
             (0..self.preview.len()).filter(|&p| self.preview.emits(p)).collect();
         if lamps.is_empty() {
             return 0.0;
         }
         let mut seen_m2 = vec![0.0_f64; self.preview.len()];
-        for of in views {
+        for view in views {
             let mut now_m2 = vec![0.0; self.preview.len()];
-            self.look(&of.view, Size::FINE, |pixel| {
+            self.look(view, Size::FINE, |pixel| {
                 if let Pixel::Front { point, area_m2, .. } = pixel {
                     now_m2[point] += area_m2;
                 }

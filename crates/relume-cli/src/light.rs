@@ -8,7 +8,7 @@ use crate::clip::Clip;
 use crate::failure::Failure;
 use crate::output;
 use crate::outside::{self, Unlit};
-use crate::tuning::LIT_MIN;
+use crate::tuning::{LIT_MIN, SHOWN_MIN};
 use crate::viewing::{ViewFlags, Viewing};
 
 /// Most materials that are named.
@@ -27,8 +27,12 @@ pub(crate) fn for_pictures(
     clip: Clip,
     flags: &ViewFlags,
 ) -> Result<(Clip, Option<Viewing>), Failure> {
+    let seen_whole = instead_of_a_speck(&clip, flags)?;
+    let flags = seen_whole.as_ref().unwrap_or(flags);
     if clip.light_is_chosen() {
-        return required(&clip.scene).map(|()| (clip, None));
+        required(&clip.scene)?;
+        let views = seen_whole.map(|flags| Viewing::new(&clip.scene, &flags)).transpose()?;
+        return Ok((clip, views));
     }
     let why = if clip.scene.emits() {
         let views = Viewing::new(&clip.scene, flags)?;
@@ -52,6 +56,28 @@ pub(crate) fn for_pictures(
     let azimuth = view.map_or(0.0, |view| azimuth_beside(&view));
     clip.say(&outside::said_of_default(&clip.scene.name, azimuth, &why));
     Ok((clip.under_sky(Some(azimuth))?, Some(views)))
+}
+
+/// An overview where nothing was said of the view and the file's camera shows next to nothing of the scene, or looks past it.
+fn instead_of_a_speck(clip: &Clip, flags: &ViewFlags) -> Result<Option<ViewFlags>, Failure> {
+    let is_chosen = flags.camera.is_some() || flags.eye.is_some() || flags.overview;
+    let Some(camera) = clip.scene.cameras.first().filter(|_| !is_chosen) else { return Ok(None) };
+    let views = Viewing::new(&clip.scene, flags)?;
+    let mut most: Option<f64> = None;
+    for frame in instants(&clip.frames) {
+        // Where a camera is absent its frames fail by themselves, after those before them.
+        let Ok(view) = views.at(&clip.scene, frame, clip.fps()) else { continue };
+        let shown = Sketch::shown(&clip.scene, clip.time_of(frame), &view);
+        most = Some(most.map_or(shown, |most| most.max(shown)));
+    }
+    let Some(shown) = most.filter(|&shown| shown < SHOWN_MIN) else { return Ok(None) };
+    clip.say(&format!(
+        "note: the file's camera {} shows the scene on {:.1} % of the picture: an overview is shown instead; --camera {} keeps it",
+        output::name(&camera.name),
+        100.0 * shown,
+        output::name(&camera.name)
+    ));
+    Ok(Some(ViewFlags { overview: true, ..flags.clone() }))
 }
 
 /// A clip with a lamp where its view is from; if that is outside of what is closed, in the middle, with views chosen anew.

@@ -51,7 +51,10 @@ impl Meanwhile {
             if over.recv_timeout(patience) != Err(RecvTimeoutError::Timeout) {
                 return;
             }
-            let image = Sketch::new(&scene, time_s).draw(&view, &settings);
+            // On a thread of its own: those of the engine are busy as long as the frame takes, and that is when it is wanted.
+            let own = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+            let Ok(own) = own else { return };
+            let image = own.install(|| Sketch::new(&scene, time_s).draw(&view, &settings));
             let Ok(bytes) = image.to_png() else { return };
             let mut state = interrupt::locked(&shared);
             let _guard = interrupt::writing();
@@ -130,9 +133,17 @@ mod tests {
     use crate::args::DemoScene;
     use crate::demo;
 
-    fn start(path: &Path, patience: Duration) -> (Meanwhile, mpsc::Receiver<String>) {
+    fn room() -> (Arc<Scene>, View) {
         let scene = Arc::new((demo::demo(DemoScene::Room).build)().unwrap());
         let view = View::automatic(&scene);
+        (scene, view)
+    }
+
+    fn start(
+        (scene, view): (Arc<Scene>, View),
+        path: &Path,
+        patience: Duration,
+    ) -> (Meanwhile, mpsc::Receiver<String>) {
         let settings = Settings { width: 32, height: 24, ..Settings::default() };
         let (tell, told) = mpsc::channel();
         let say = move |line: &str| tell.send(line.to_owned()).unwrap();
@@ -143,7 +154,7 @@ mod tests {
     fn a_rough_picture_is_there_until_there_is_a_better_one() {
         let dir = tempfile::tempdir().unwrap();
         let path = path(dir.path());
-        let (mut meanwhile, told) = start(&path, Duration::ZERO);
+        let (mut meanwhile, told) = start(room(), &path, Duration::ZERO);
         assert!(told.recv().unwrap().contains("preview.png"));
         let bytes = fs::read(&path).unwrap();
         assert!(is_whole_png(&bytes));
@@ -151,11 +162,31 @@ mod tests {
         assert!(!path.exists());
     }
 
+    /// While every thread of the engine works, as it does for as long as a first frame takes.
+    #[test]
+    fn a_rough_picture_waits_for_no_thread_of_the_engine() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = path(dir.path());
+        let (release, held) = mpsc::channel::<()>();
+        let (room, held) = (room(), Mutex::new(held));
+        rayon::scope(|scope| {
+            for _ in 0..rayon::current_num_threads() {
+                // Until the sender is gone.
+                scope.spawn(|_| assert!(interrupt::locked(&held).recv().is_err()));
+            }
+            let (mut meanwhile, told) = start(room, &path, Duration::ZERO);
+            let said = told.recv_timeout(Duration::from_secs(60));
+            meanwhile.end(&path);
+            drop(release);
+            assert!(said.unwrap().contains("preview.png"));
+        });
+    }
+
     #[test]
     fn what_is_soon_finished_needs_none() {
         let dir = tempfile::tempdir().unwrap();
         let path = path(dir.path());
-        let (mut meanwhile, told) = start(&path, Duration::from_secs(3600));
+        let (mut meanwhile, told) = start(room(), &path, Duration::from_secs(3600));
         meanwhile.end(&path);
         assert!(told.recv().is_err());
         assert!(!path.exists());

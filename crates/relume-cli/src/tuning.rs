@@ -35,6 +35,14 @@ pub(crate) const MIN_AREA_SHARE: f64 = 1.0 / 5_000.0;
 /// - Smaller: pictures are dark
 pub(crate) const LIT_MIN: f64 = 0.5;
 
+/// Share of the picture on which a file's own camera has to show surfaces at some time, so that it is what pictures are taken from.
+///
+/// - Unit: 1
+/// - Tried: 0.002 is what one of a games' asset showed of a loudspeaker
+/// - Larger: cameras that look at something far away are not used
+/// - Smaller: pictures of specks
+pub(crate) const SHOWN_MIN: f64 = 0.01;
+
 /// Share of what is emitted that may be unaccounted for in a result of the plane.
 ///
 /// - Unit: 1

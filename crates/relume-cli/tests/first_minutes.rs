@@ -236,3 +236,49 @@ fn a_view_into_the_dark_is_said_once() {
     let ran = relume(&render).succeeds();
     assert!(!ran.err.contains("almost no light"), "{}", ran.err);
 }
+
+/// The statue with the file's camera so far away that nothing of it is made out, in a file.
+fn far_off(dir: &Path, distance_m: f64) -> PathBuf {
+    let path = statue(dir);
+    let bytes = std::fs::read(&path).unwrap();
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    let json_bytes = word(12);
+    let mut json: serde_json::Value =
+        serde_json::from_slice(&bytes[20..20 + json_bytes]).expect("its JSON");
+    json["cameras"] =
+        serde_json::json!([{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}]);
+    let nodes = json["nodes"].as_array_mut().unwrap();
+    nodes.push(
+        serde_json::json!({"name": "lookout", "camera": 0, "translation": [0.5, 1, distance_m]}),
+    );
+    let camera = nodes.len() - 1;
+    json["scenes"][0]["nodes"].as_array_mut().unwrap().push(camera.into());
+    let mut text = json.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let rest = &bytes[20 + json_bytes..];
+    let length = (20 + text.len() + rest.len()) as u32;
+    let head = [&bytes[..8], &length.to_le_bytes(), &(text.len() as u32).to_le_bytes(), b"JSON"];
+    std::fs::write(&path, [&head.concat()[..], &text, rest].concat()).unwrap();
+    path
+}
+
+#[test]
+fn a_camera_that_shows_a_speck_gives_way_to_an_overview() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    let said = |distance_m: f64, more: &[&str]| {
+        let scene = far_off(dir.path(), distance_m);
+        let always = ["render", text(&scene), "-o", text(&out), "--sky", "uniform=1"];
+        relume(&[&always[..], &SMALL[..], more].concat()).succeeds().err
+    };
+    let whole = "an overview is shown instead";
+    let speck = said(200.0, &[]);
+    assert!(
+        speck.contains("camera lookout shows the scene on 0.0 %") && speck.contains(whole),
+        "{speck}"
+    );
+    for (distance_m, more) in [(6.0, vec![]), (200.0, vec!["--camera", "lookout"])] {
+        let kept = said(distance_m, &more);
+        assert!(!kept.contains(whole), "{kept}");
+    }
+}

@@ -202,3 +202,68 @@ fn still_bodies_are_where_their_patches_are() {
     let eye = View::automatic(&scene).world_from_camera.translation;
     assert!(eye.cmpgt(DVec3::ZERO).all() && eye.cmplt(v(4.0, 3.0, 5.0)).all(), "{eye}");
 }
+
+/// A figure: a slab of two colours whose back is somewhat larger than its front.
+#[test]
+fn a_figure_is_seen_from_the_front() {
+    let mut scene = empty();
+    let [red, grey] = [[0.6, 0.1, 0.1], [0.6; 3]].map(|r| material(&mut scene, r, 0.0));
+    solid(&mut scene, v(-0.99, 0.0, 0.0), v(0.99, 1.98, 0.1), red);
+    solid(&mut scene, v(-1.0, 0.0, -0.1), v(1.0, 2.0, 0.0), grey);
+    let eye = View::automatic(&scene).world_from_camera.translation;
+    assert!(eye.z > 0.5, "{eye}");
+    // As much of it from the other side, where the front is empty.
+    let mut scene = empty();
+    let grey = material(&mut scene, [0.6; 3], 0.0);
+    body(&mut scene, &[(side(v(-1.0, 0.0, 0.0), v(1.0, 2.0, 0.0), Side::Back), grey)]);
+    let eye = View::automatic(&scene).world_from_camera.translation;
+    assert!(eye.z < -0.5, "{eye}");
+}
+
+/// Two boxes on grounds of a hundred metres: a polygon among those of the boxes, one of its own body, and a slab.
+#[test]
+fn what_stands_on_a_large_ground_is_no_speck() {
+    for ground in 0..3 {
+        let mut scene = empty();
+        let grey = material(&mut scene, [0.5; 3], 0.0);
+        let plane = side(v(-50.0, -1.0, -50.0), v(50.0, 0.0, 50.0), Side::Ceiling);
+        let mut polygons: Vec<_> =
+            SIDES.map(|s| (side(v(-0.5, 0.0, -0.5), v(0.5, 1.0, 0.5), s), grey)).to_vec();
+        match ground {
+            0 => polygons.push((plane, grey)),
+            1 => drop(body(&mut scene, &[(plane, grey)])),
+            _ => drop(solid(&mut scene, v(-50.0, -1.0, -50.0), v(50.0, 0.0, 50.0), grey)),
+        }
+        body(&mut scene, &polygons);
+        solid(&mut scene, v(1.0, 0.0, 0.0), v(1.5, 0.5, 0.5), grey);
+        let eye = View::automatic(&scene).world_from_camera.translation;
+        assert!(eye.length() < 8.0 && eye.y > 0.0, "{ground}: {eye}");
+    }
+}
+
+/// A closed body of two sides, of which a part of the skin glows to both: not a room with a lamp.
+#[test]
+fn a_figure_whose_eyes_glow_is_seen_from_outside() {
+    let mut scene = empty();
+    let grey = material(&mut scene, [0.5; 3], 0.0);
+    let glow = material(&mut scene, [0.5; 3], 4.0);
+    let (low, high) = (v(-1.0, 0.0, -0.6), v(1.0, 2.0, 0.6));
+    let mut skin: Vec<_> =
+        SIDES.iter().filter(|&&s| s != Side::Front).map(|&s| (side(low, high, s), grey)).collect();
+    let front = |a: (f64, f64), b: (f64, f64), m| {
+        (side(v(a.0, a.1, -0.6), v(b.0, b.1, 0.6), Side::Front), m)
+    };
+    skin.extend([
+        front((-1.0, 0.0), (1.0, 1.4), grey),
+        front((-1.0, 1.4), (-0.6, 1.6), grey),
+        front((-0.6, 1.4), (-0.4, 1.6), glow),
+        front((-0.4, 1.4), (0.4, 1.6), grey),
+        front((0.4, 1.4), (0.6, 1.6), glow),
+        front((0.6, 1.4), (1.0, 1.6), grey),
+        front((-1.0, 1.6), (1.0, 2.0), grey),
+    ]);
+    body(&mut scene, &skin);
+    let scene = double_sided(&scene);
+    let eye = View::automatic(&scene).world_from_camera.translation;
+    assert!(eye.cmplt(low).any() || eye.cmpgt(high).any(), "{eye}");
+}

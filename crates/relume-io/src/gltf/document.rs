@@ -14,7 +14,24 @@ use crate::regular::unless_fits;
 use relume_core::scene::SceneError;
 
 /// Extensions that may be required: handled, or without effect on diffuse light.
-const KNOWN: [&str; 27] = [
+const KNOWN: [&str; 44] = [
+    "CESIUM_RTC",
+    "CESIUM_primitive_outline",
+    "EXT_feature_metadata",
+    "EXT_instance_features",
+    "EXT_mesh_features",
+    "EXT_structural_metadata",
+    "FB_ngon_encoding",
+    "GODOT_single_root",
+    "KHR_audio_emitter",
+    "KHR_implicit_shapes",
+    "KHR_interactivity",
+    "KHR_materials_volume_scatter",
+    "KHR_node_hoverability",
+    "KHR_node_selectability",
+    "KHR_physics_rigid_bodies",
+    "MSFT_lod",
+    "VRM",
     "EXT_lights_image_based",
     "EXT_meshopt_compression",
     "KHR_draco_mesh_compression",

@@ -39,10 +39,18 @@ pub(super) struct Asset {
 #[derive(Deserialize, Default)]
 #[serde(default)]
 pub(super) struct RootExtensions {
+    #[serde(rename = "CESIUM_RTC")]
+    pub(super) relative_to: Option<Centre>,
     #[serde(rename = "KHR_lights_punctual")]
     pub(super) lights: Option<LightList>,
     #[serde(rename = "EXT_lights_image_based")]
     pub(super) environments: Option<serde_json::Value>,
+}
+
+/// Where the origin of a file is (`CESIUM_RTC`), metres.
+#[derive(Deserialize)]
+pub(super) struct Centre {
+    pub(super) center: [f64; 3],
 }
 
 #[derive(Deserialize, Default)]

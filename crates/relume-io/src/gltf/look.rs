@@ -43,6 +43,14 @@ pub(super) struct Triangles<'a> {
 /// Bytes of images that pictures show at most: primitives that come after show their means.
 const SHOWN_MAX: usize = 512 << 20;
 
+/// What becomes of surfaces that let all light pass.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Clear {
+    LeftOut,
+    /// They block light, as all others do.
+    Opaque,
+}
+
 /// How all surfaces of a file look.
 pub(super) struct Looks<'a> {
     document: &'a Document,
@@ -57,6 +65,7 @@ pub(super) struct Looks<'a> {
     /// Materials with textures or vertex colours.
     varied: BTreeSet<usize>,
     see_through: SeenThrough,
+    clear: Clear,
     /// Images kept for pictures, and their bytes.
     shown: (BTreeSet<Key>, usize),
     /// What was said of a texture already: material and which one.
@@ -72,8 +81,17 @@ struct SeenThrough {
 }
 
 impl<'a> Looks<'a> {
-    pub(super) fn new(document: &'a Document, paints: Vec<Paint>, pictures: bool) -> Looks<'a> {
+    pub(super) fn new(
+        document: &'a Document,
+        mut paints: Vec<Paint>,
+        pictures: bool,
+        clear: Clear,
+    ) -> Looks<'a> {
+        if clear == Clear::Opaque {
+            paints.iter_mut().for_each(|paint| paint.see_through = None);
+        }
         Looks {
+            clear,
             document,
             pictures,
             paints,
@@ -85,6 +103,11 @@ impl<'a> Looks<'a> {
             shown: Default::default(),
             said: BTreeSet::new(),
         }
+    }
+
+    /// Whether polygons that let all light pass were left out so far.
+    pub(super) fn leaves_out(&self) -> bool {
+        self.see_through.left_out > 0
     }
 
     /// The polygons of a primitive, merged where neighbours look alike; divided where its emission, or what it covers,
@@ -349,6 +372,12 @@ impl<'a> Looks<'a> {
                 names(&self.varied)
             ),
         );
+        if self.clear == Clear::Opaque {
+            let all = (0..self.paints.len() - 1).collect();
+            let message = "all surfaces let light pass (alphaMode, KHR_materials_transmission), so that nothing would be left: they \
+                           block it here, in their base colour";
+            say(Severity::Warning, "transparency", &all, message.to_owned());
+        }
         let SeenThrough { materials, opaque, left_out } = &self.see_through;
         say(
             Severity::Info,

@@ -7,7 +7,7 @@ use glam::{DMat3, DQuat, DVec3};
 use super::animation::{GlowKeys, Moves, played};
 use super::counts::{self, Uses};
 use super::document::Document;
-use super::look::Looks;
+use super::look::{Clear, Looks};
 use super::mesh::{Polygons, polygons};
 use super::skinned::Skinned;
 use super::{environment, json, light, material, node_name, note};
@@ -20,8 +20,22 @@ use relume_core::scene::{Camera, MaterialId, NodeId, Note, SceneError, Severity,
 /// Relative difference of scale components that counts as none (32-bit exporters).
 const SAME_SCALE: f64 = 1e-6;
 
-/// Everything of the file's active scene.
+/// Everything of the file's active scene. What lets all light pass is left out, but where there is nothing else: a glass alone is
+/// to be seen.
 pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draft, SceneError> {
+    let read = tree(document, options, Clear::LeftOut)?;
+    let read = match read.polygons == 0 && read.looks.leaves_out() {
+        true => tree(document, options, Clear::Opaque)?,
+        false => read,
+    };
+    Ok(read.finish())
+}
+
+fn tree<'a>(
+    document: &'a Document,
+    options: &ImportOptions,
+    clear: Clear,
+) -> Result<Tree<'a>, SceneError> {
     let mut notes = Vec::new();
     let roots = roots(document, &mut notes)?;
     let uses = counts::check(document, &roots)?;
@@ -33,7 +47,7 @@ pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draf
         document,
         moves: played.moves,
         lights: played.lights,
-        looks: Looks::new(document, paints, options.pictures),
+        looks: Looks::new(document, paints, options.pictures, clear),
         meshes: BTreeMap::new(),
         places: document.root.nodes.iter().map(|_| None).collect(),
         spans: options.rebuild.as_ref().map_or(Vec::new(), |rebuild| rebuild.spans(played.end_s)),
@@ -53,9 +67,13 @@ pub(super) fn draft(document: &Document, options: &ImportOptions) -> Result<Draf
         },
     };
     tree.draft.notes = notes;
-    tree.walk(&roots)?;
+    let base = document.root.extensions.relative_to.as_ref().map(|centre| {
+        let node = json::Node { translation: Some(centre.center), ..json::Node::default() };
+        tree.below(None, placed(&node, "CESIUM_RTC", None))
+    });
+    tree.walk(&roots, base)?;
     tree.skins()?;
-    Ok(tree.finish())
+    Ok(tree)
 }
 
 /// The root nodes of the active scene: the file's default, or its first; without any scene all
@@ -126,11 +144,11 @@ pub(super) struct Tree<'a> {
 const POLYGONS_MAX: usize = 1 << 22;
 
 impl Tree<'_> {
-    /// Adds the nodes below `roots`, parents first, in file order.
-    fn walk(&mut self, roots: &[usize]) -> Result<(), SceneError> {
+    /// Adds the nodes below `roots`, parents first, in file order, on a node of the draft.
+    fn walk(&mut self, roots: &[usize], base: Option<usize>) -> Result<(), SceneError> {
         let mut seen = vec![false; self.document.root.nodes.len()];
         let mut waiting: Vec<(usize, Option<usize>)> =
-            roots.iter().rev().map(|&r| (r, None)).collect();
+            roots.iter().rev().map(|&r| (r, base)).collect();
         while let Some((index, parent)) = waiting.pop() {
             let node = self
                 .document

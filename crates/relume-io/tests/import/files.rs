@@ -144,3 +144,14 @@ fn nodes_of_other_scenes_and_invisible_ones_are_left_out() {
     g.json.as_object_mut().unwrap().remove("scenes");
     assert_eq!(scene_of(&g).unwrap().bodies.len(), 2);
 }
+
+/// Extensions of other trades that change nothing of what is seen, and an origin that is elsewhere.
+#[test]
+fn what_is_required_and_changes_no_surface_is_read() {
+    let mut g = Gltf::cube();
+    g.json["extensionsRequired"] = json!(["EXT_structural_metadata", "MSFT_lod", "CESIUM_RTC"]);
+    g.json["extensions"] = json!({"CESIUM_RTC": {"center": [100.0, -20.0, 3.0]}});
+    let scene = scene_of(&g).unwrap();
+    let bounds = scene.bounds(0.0).unwrap();
+    assert_eq!(bounds.centre() + scene.origin, glam::DVec3::new(100.5, -19.5, 3.5));
+}

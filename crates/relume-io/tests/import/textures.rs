@@ -366,6 +366,23 @@ fn panes_of_glass_let_light_pass() {
     assert_eq!(area(glass), 1.0);
 }
 
+/// A glass by itself is to be seen; with anything beside it it lets light pass.
+#[test]
+fn where_everything_lets_light_pass_it_blocks_it() {
+    let mut g = Gltf::cube();
+    g.json["materials"][0]["extensions"] =
+        json!({"KHR_materials_transmission": {"transmissionFactor": 1.0}});
+    let scene = scene_of(&g).unwrap();
+    assert_eq!(scene.patches.len(), 6);
+    let notes = with_code(&scene.notes, "transparency");
+    assert!(notes.len() == 1 && notes[0].message.contains("nothing would be left"), "{notes:?}");
+    let mesh = g.cube_mesh();
+    let stone = g.push("materials", json!({"name": "stone"}));
+    g.json["meshes"][mesh]["primitives"][0]["material"] = json!(stone);
+    g.node(json!({"name": "stone", "mesh": mesh, "translation": [3.0, 0.0, 0.0]}));
+    assert_eq!(scene_of(&g).unwrap().patches.len(), 6);
+}
+
 #[test]
 fn high_reflectances_are_one_line_for_all_materials() {
     let mut g = Gltf::cube();
@@ -477,5 +494,8 @@ fn vertex_colours_that_are_mostly_unset_are_a_mask() {
         assert!(colours(&scene).iter().all(|c| c[1] == 0.0), "{painted:?}");
         assert!(with_code(&scene.notes, "vertex-colours").is_empty());
     }
-    assert!(scene([unset; 4], "MASK").is_err(), "nothing is left of it");
+    // Nothing would be left of it.
+    let whole = scene([unset; 4], "MASK").unwrap();
+    assert_eq!(with_code(&whole.notes, "transparency").len(), 1);
+    assert_eq!(colours(&whole), [[0.5; 3]]);
 }

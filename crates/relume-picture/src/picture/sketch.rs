@@ -77,6 +77,25 @@ impl Sketch {
         Sketch { scene, outside, poses, time_s, traced }
     }
 
+    /// Share of the picture that shows surfaces of a scene at `time_s` seconds, whether there is light or not. Cost: a hierarchy of
+    /// boxes over all patches and some thousand rays.
+    pub fn shown(scene: &Scene, time_s: f64, view: &View) -> f64 {
+        let near = scene.outside.as_ref().map(|_| scene.without_outside());
+        let scene = near.as_ref().unwrap_or(scene);
+        let Some(bounds) = Bounds::swept(scene) else { return 0.0 };
+        let bodies = (0..scene.bodies.len() as u32).map(BodyId);
+        let poses: Vec<Option<Pose>> = bodies.map(|body| scene.pose(body, time_s)).collect();
+        let caster = Caster::new(scene, &poses, bounds.unit());
+        let projector = Projector::new(view, METERED.0, METERED.1);
+        let sees = |pixel: &DVec2| {
+            let at = *pixel + 0.5;
+            let from = caster.place(projector.origin(at));
+            caster.first_front(scene, from, projector.direction(at).as_vec3()).is_some()
+        };
+        let seen = pixels(METERED).filter(sees).count();
+        seen as f64 / pixels(METERED).count() as f64
+    }
+
     /// Share of what a view sees of surfaces on which light is to be expected, lamps included: what is within six stops of
     /// the typical. `None` where it sees no surface.
     pub fn lit(&self, view: &View) -> Option<f64> {

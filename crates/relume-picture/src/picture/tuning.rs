@@ -211,6 +211,46 @@ pub(super) const INSIDE: f64 = 0.2;
 /// - Smaller: cups are shown from inside
 pub(super) const OPEN: f64 = 1.5;
 
+/// What a view from behind (-Z) is worth less than one from the front of a file (+Z), from the sides half as much.
+///
+/// - Unit: 1
+/// - Tried: 0.05 (of six figures and panels that were seen from behind all are seen from the front)
+/// - Larger: things that face elsewhere are shown from their dark or empty side
+/// - Smaller: figures are shown from behind
+pub(super) const BEHIND: f64 = 0.05;
+
+/// How many times larger than all else a plane is that views leave out.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: what stands on large grounds is a speck
+/// - Smaller: rooms and yards are cut off
+pub(super) const DWARFED: f64 = 8.0;
+
+/// Thickness of a body up to which it may be such a ground, over the diagonal of the scene.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: buildings count as ground for what lies in them
+/// - Smaller: what stands on thick floors is a speck
+pub(super) const SLAB: f64 = 0.02;
+
+/// Share of what emits that is seen from outside, from which on a scene glows outwards: what is within is no room.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: figures whose eyes glow are seen from within
+/// - Smaller: rooms with glowing outsides are shown from outside
+pub(super) const GLOW: f64 = 0.1;
+
+/// What a view from inside is worth less there, for each picture full of reverse sides.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: nothing, beyond 2
+/// - Smaller: figures whose eyes glow are seen from within
+pub(super) const SKIN: f64 = 2.0;
+
 /// Instants of an animation at which views are judged.
 ///
 /// - Unit: instants

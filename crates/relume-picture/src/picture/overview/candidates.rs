@@ -5,7 +5,7 @@
 use glam::{DVec2, DVec3};
 
 use super::super::camera::View;
-use super::super::tuning::{INSIDE, OPEN, ROOM, SPAN, YFOV_INSIDE, YFOV_OUTSIDE};
+use super::super::tuning::{BEHIND, INSIDE, OPEN, ROOM, SPAN, YFOV_INSIDE, YFOV_OUTSIDE};
 use super::bounds::{ASPECT, Bounds};
 use super::score::Stage;
 
@@ -20,15 +20,19 @@ pub(super) struct Candidate {
     pub(super) view: View,
     /// How much its score is less than what it shows: by how odd it is.
     pub(super) oddness: f64,
+    /// Whether it is from within the bounds.
+    pub(super) within: bool,
 }
 
 impl Bounds {
-    /// Views from outside that just hold the bounds, all around at several heights.
+    /// Views from outside that just hold the bounds, all around at several heights. The front of a file is +Z (glTF 2.0, section
+    /// 3.4): what shows as much from there is better.
     pub(super) fn outside(&self) -> Vec<Candidate> {
         let around = |(slope, oddness)| {
             azimuths().map(move |azimuth| {
                 let view = self.framing(DVec3::new(azimuth.x, slope, azimuth.y));
-                Candidate { view, oddness }
+                let oddness = oddness + BEHIND * 0.5 * (1.0 - azimuth.y);
+                Candidate { view, oddness, within: false }
             })
         };
         SLOPES.into_iter().flat_map(around).collect()
@@ -59,7 +63,7 @@ impl Bounds {
             if enclosure > ROOM && span > SPAN {
                 let views_from = targets.iter().map(|&at| View::look_at(eye, at, YFOV_INSIDE));
                 let oddness = INSIDE + OPEN * (1.0 - enclosure);
-                views.extend(views_from.map(|view| Candidate { view, oddness }));
+                views.extend(views_from.map(|view| Candidate { view, oddness, within: true }));
             }
         }
         views

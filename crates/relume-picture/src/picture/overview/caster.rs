@@ -85,6 +85,11 @@ impl Caster {
         ((world - self.middle) / self.unit_m).as_vec3()
     }
 
+    /// A point in units of the scene in the world, metres.
+    pub(in super::super) fn world(&self, at: Vec3) -> DVec3 {
+        at.as_dvec3() * self.unit_m + self.middle
+    }
+
     /// Metres in a unit of the scene.
     pub(in super::super) fn unit_m(&self) -> f64 {
         self.unit_m

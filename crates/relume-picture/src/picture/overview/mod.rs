@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use relume_core::scene::Scene;
 
 use super::camera::View;
-use super::tuning::{FINALISTS, INSTANTS};
+use super::tuning::{FINALISTS, GLOW, INSTANTS, SKIN};
 use bounds::Bounds;
 use candidates::Candidate;
 use score::{Size, Stage};
@@ -50,11 +50,12 @@ impl Overview {
     /// are taken from points with much in sight all around. Of all of them the one is taken that shows
     /// most of the lit surface and fewest black pixels and backs of faces, judged by a rough solution at
     /// up to three instants. Light from outside counts, what stands for it does not. Where nothing emits every surface counts the same.
+    /// Of a large plane with small things on it the things are shown, and what glows on its outside is no room.
     pub fn of(scene: &Scene) -> Overview {
         let outside = scene.outside.as_deref();
         let near = outside.map(|_| scene.without_outside());
         let scene = near.as_ref().unwrap_or(scene);
-        let Some(bounds) = Bounds::swept(scene) else {
+        let Some(bounds) = Bounds::swept(scene).map(|whole| whole.focused(scene)) else {
             let view = View::look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 0.7);
             return Overview { view, lit: None };
         };
@@ -64,22 +65,30 @@ impl Overview {
         let stages: Vec<Stage> =
             (0..instants).map(|k| Stage::new((scene, outside), time_s(k), &bounds)).collect();
         let mut views = bounds.outside();
+        let glows_outwards = stages[0].lamps_seen(views.iter().map(|of| &of.view)) > GLOW;
         views.extend(bounds.inside(&stages[0]));
-        let rough = scores(&stages, &views, Size::ROUGH);
+        let scores = |views: &[Candidate], size| scores(&stages, views, size, glows_outwards);
+        let rough = scores(&views, Size::ROUGH);
         let mut order: Vec<usize> = (0..views.len()).collect();
         // Stable: of equals the first.
         order.sort_by(|&a, &b| rough[b].total_cmp(&rough[a]));
         order.truncate(FINALISTS);
         order.sort_unstable();
         let finalists: Vec<Candidate> = order.iter().map(|&k| views[k]).collect();
-        let view = finalists[first_best(&scores(&stages, &finalists, Size::FINE))].view;
+        let view = finalists[first_best(&scores(&finalists, Size::FINE))].view;
         Overview { view, lit: stages[0].lit_share(&view) }
     }
 }
 
-/// The score of each view, over all instants.
-fn scores(stages: &[Stage<'_>], views: &[Candidate], size: Size) -> Vec<f64> {
-    let score = |of: &Candidate, stage: &Stage<'_>| stage.score(&of.view, size) - of.oddness;
+/// The score of each view, over all instants; of what glows outwards the inner side is nothing to show.
+fn scores(stages: &[Stage<'_>], views: &[Candidate], size: Size, glows_outwards: bool) -> Vec<f64> {
+    let score = |of: &Candidate, stage: &Stage<'_>| {
+        let score = stage.score(&of.view, size) - of.oddness;
+        match of.within && glows_outwards {
+            true => score - SKIN * stage.reverse_share(&of.view),
+            false => score,
+        }
+    };
     let sum = |of: &Candidate| stages.iter().map(|stage| score(of, stage)).sum();
     views.par_iter().map(sum).collect()
 }

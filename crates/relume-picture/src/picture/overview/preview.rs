@@ -93,6 +93,11 @@ impl Preview {
         self.points[point].area_m2
     }
 
+    /// Where a point is, in units of the scene.
+    pub(super) fn at(&self, point: usize) -> Vec3 {
+        self.points[point].at
+    }
+
     /// Points in all.
     pub(super) fn len(&self) -> usize {
         self.points.len()

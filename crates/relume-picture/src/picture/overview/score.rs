@@ -11,7 +11,7 @@
 use glam::{DVec3, Vec3};
 use relume_core::geometry::Pose;
 use relume_core::scene::outside::Outside;
-use relume_core::scene::{BodyId, Projection, Scene};
+use relume_core::scene::{BodyId, PatchId, Projection, Scene};
 
 use super::super::camera::View;
 use super::super::tuning::{BLACK, CLOSE, LIT, PIXELS, SURFACES};
@@ -33,6 +33,8 @@ pub(super) struct Stage<'a> {
     scene: &'a Scene,
     caster: Caster,
     preview: Preview,
+    /// Whether each point is where the view is to be.
+    is_near: Vec<bool>,
     /// Sums over all points: of area weighed by light, and of area that emits, m2.
     whole_m2: [f64; 2],
 }
@@ -61,7 +63,9 @@ impl<'a> Stage<'a> {
         let caster = Caster::new(scene, &poses, bounds.unit());
         let sky = outside.and_then(|outside| outside.at(time_s).ok());
         let preview = Preview::new((scene, sky.as_ref()), time_s, &poses, &caster);
-        let mut stage = Stage { scene, caster, preview, whole_m2: [0.0; 2] };
+        let is_near =
+            (0..preview.len()).map(|k| bounds.is_near(caster.world(preview.at(k)))).collect();
+        let mut stage = Stage { scene, caster, preview, is_near, whole_m2: [0.0; 2] };
         stage.whole_m2 = stage.sums(|point| stage.preview.area_m2(point));
         stage
     }
@@ -69,7 +73,7 @@ impl<'a> Stage<'a> {
     /// Areas of points weighed by light, and of those that emit.
     fn sums(&self, area_m2: impl Fn(usize) -> f64) -> [f64; 2] {
         let mut sums = [0.0; 2];
-        for point in 0..self.preview.len() {
+        for point in (0..self.preview.len()).filter(|&point| self.is_near[point]) {
             let area = area_m2(point);
             sums[0] += area * (self.preview.brightness[point] + BLACK);
             sums[1] += if self.preview.emits(point) { area } else { 0.0 };
@@ -105,6 +109,43 @@ impl<'a> Stage<'a> {
         let surfaces = pixels_of.iter().filter(|&&n| n >= PIXELS).count().min(SURFACES);
         let variety = surfaces as f64 / self.scene.surfaces.len().clamp(1, SURFACES) as f64;
         share(0) + 0.3 * sum / count + 0.2 * variety + 0.1 * share(1) - close / count
+    }
+
+    /// Share of what emits, lights aside, that is seen from some of these views.
+    pub(super) fn lamps_seen<'v>(&self, views: impl Iterator<Item = &'v View>) -> f64 {
+        let lamps: Vec<usize> =
+            (0..self.preview.len()).filter(|&p| self.preview.emits(p)).collect();
+        if lamps.is_empty() {
+            return 0.0;
+        }
+        let mut seen_m2 = vec![0.0_f64; self.preview.len()];
+        for view in views {
+            let mut now_m2 = vec![0.0; self.preview.len()];
+            self.look(view, Size::FINE, |pixel| {
+                if let Pixel::Front { point, area_m2, .. } = pixel {
+                    now_m2[point] += area_m2;
+                }
+            });
+            lamps.iter().for_each(|&p| seen_m2[p] = seen_m2[p].max(now_m2[p]));
+        }
+        let part_m2 = self.sums(|point| seen_m2[point].min(self.preview.area_m2(point)))[1];
+        if self.whole_m2[1] > 0.0 { part_m2 / self.whole_m2[1] } else { 0.0 }
+    }
+
+    /// Share of the picture that shows the reverse of what is double-sided.
+    pub(super) fn reverse_share(&self, view: &View) -> f64 {
+        let (mut reverse, mut count) = (0.0, 0.0);
+        // Of two sides the first is the front.
+        let is_reverse = |patch: PatchId| {
+            self.scene.patches[patch.0 as usize].twin.is_some_and(|twin| twin < patch)
+        };
+        self.look(view, Size::ROUGH, |pixel| {
+            count += 1.0;
+            if let Pixel::Front { hit, .. } = pixel {
+                reverse += if hit.front.is_some_and(is_reverse) { 1.0 } else { 0.0 };
+            }
+        });
+        reverse / count
     }
 
     /// Share of the picture that shows something lit; `None` where nothing is.

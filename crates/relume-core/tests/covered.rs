@@ -255,3 +255,117 @@ fn light_gets_no_deeper_under_a_crate_than_some_widths_of_the_gap() {
         }
     }
 }
+
+/// Sides of a box about `middle`, seen from inside, but for those that `skip` names (low x, high x, low y, high y, low z, high z).
+fn open_box(middle: DVec3, half: DVec3, skip: &[usize]) -> Vec<[DVec3; 4]> {
+    let p = |x: f64, y: f64, z: f64| middle + half * v(x, y, z);
+    let sides = [
+        [p(-1., -1., -1.), p(-1., 1., -1.), p(-1., 1., 1.), p(-1., -1., 1.)],
+        [p(1., -1., -1.), p(1., -1., 1.), p(1., 1., 1.), p(1., 1., -1.)],
+        [p(-1., -1., -1.), p(-1., -1., 1.), p(1., -1., 1.), p(1., -1., -1.)],
+        [p(-1., 1., -1.), p(1., 1., -1.), p(1., 1., 1.), p(-1., 1., 1.)],
+        [p(-1., -1., -1.), p(1., -1., -1.), p(1., 1., -1.), p(-1., 1., -1.)],
+        [p(-1., -1., 1.), p(-1., 1., 1.), p(1., 1., 1.), p(1., -1., 1.)],
+    ];
+    let kept = sides.into_iter().enumerate().filter(|(k, _)| !skip.contains(k));
+    kept.map(|(_, side)| side).collect()
+}
+
+/// Energies of a scene at a time: emitted, absorbed and escaped, W.
+fn energies(scene: Scene, times_s: &[f64]) -> Vec<[f64; 3]> {
+    let mut session = Session::new(scene, at_tolerance(0.1)).unwrap();
+    let mut out = Vec::new();
+    for &time_s in times_s {
+        let energy = session.solve_at(time_s).unwrap().report().energy.unwrap();
+        out.push([energy.emitted_w, energy.absorbed_w, energy.escaped_w]);
+    }
+    out
+}
+
+/// A lamp that looks down into an open box of double-sided sides, in the plane of its rim, and rising through it.
+#[test]
+fn a_lamp_in_the_rim_of_an_open_box_shines_into_it() {
+    let of = |rises: bool| {
+        let mut b = SceneBuilder::new("open box");
+        let thin = b.double_sided_material("thin", [0.7; 3], [0.0; 3]);
+        let glow = b.material("glow", [0.5; 3], [100.0; 3]);
+        let node = b.node("box", None, DVec3::ZERO, DQuat::IDENTITY);
+        for side in open_box(DVec3::ZERO, v(2.0, 1.5, 1.25), &[5]) {
+            b.polygon(node, "box", thin, &side);
+        }
+        let lamp = b.node("lamp", None, v(0.0, 0.0, 1.25), DQuat::IDENTITY);
+        let corners = flipped(facing_up([-0.2, 0.2], [-0.3, 0.1], 0.0));
+        b.polygon(lamp, "lamp", glow, &corners);
+        if rises {
+            let values = vec![v(0.0, 0.0, 1.0), v(0.0, 0.0, 1.25), v(0.0, 0.0, 1.5)];
+            let (times_s, interpolation) = (vec![0.0, 1.0, 2.0], Interpolation::Linear);
+            b.animate_translation(lamp, Track { times_s, values, interpolation });
+        }
+        b.build().unwrap()
+    };
+    let emitted_w = 3.0 * 100.0 * 0.16;
+    for [emitted, absorbed, escaped] in
+        [energies(of(false), &[0.0]), energies(of(true), &[0.0, 1.0, 2.0])].concat()
+    {
+        assert!((emitted / emitted_w - 1.0).abs() < 1e-6, "{emitted} W of {emitted_w} emitted");
+        assert!((absorbed + escaped) / emitted > 0.995, "{absorbed} W + {escaped} W");
+    }
+}
+
+/// A room of double-sided walls, the ceiling an object of its own with a hole; above that a recess that a lamp closes.
+#[test]
+fn through_a_hole_in_a_ceiling_light_gets_among_walls() {
+    let mut b = SceneBuilder::new("recess");
+    let thin = b.double_sided_material("thin", [0.8; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.8; 3], [100.0; 3]);
+    let object = |b: &mut SceneBuilder, name: &str, polygons: &[[DVec3; 4]]| {
+        let node = b.node(name, None, DVec3::ZERO, DQuat::IDENTITY);
+        polygons.iter().for_each(|polygon| b.polygon(node, name, thin, polygon));
+    };
+    object(&mut b, "walls", &open_box(v(0.0, 0.0, 1.0), v(1.5, 1.2, 1.0), &[5]));
+    let [low, high] = [[-0.6, -0.4], [0.1, 0.3]];
+    let ceiling = [
+        facing_up([-1.5, low[0]], [-1.2, 1.2], 2.0),
+        facing_up([high[0], 1.5], [-1.2, 1.2], 2.0),
+        facing_up([low[0], high[0]], [-1.2, low[1]], 2.0),
+        facing_up([low[0], high[0]], [high[1], 1.2], 2.0),
+    ];
+    object(&mut b, "ceiling", &ceiling);
+    let (middle, half) = (v(-0.25, -0.05, 2.1), v(0.35, 0.35, 0.1));
+    object(&mut b, "recess", &open_box(middle, half, &[4, 5]));
+    let lamp = b.node("lamp", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.polygon(lamp, "lamp", glow, &flipped(facing_up([low[0], high[0]], [low[1], high[1]], 2.2)));
+    let [emitted, absorbed, escaped] = energies(b.build().unwrap(), &[0.0])[0];
+    assert!(escaped.abs() < 0.02 * emitted, "{escaped} W of {emitted} W escape");
+    assert!((absorbed / emitted - 1.0).abs() < 0.02, "{absorbed} W of {emitted} W are absorbed");
+}
+
+/// A panel some micrometres before a wall of a room: a smaller one, and one as large as the wall, from one side or both.
+#[test]
+fn panels_close_before_walls_lose_no_light() {
+    for (gap_m, share) in
+        [(2e-6, 0.7), (3e-6, 0.7), (4e-6, 0.7), (3e-6, 1.0), (4e-6, 1.0), (6e-6, 1.0)]
+    {
+        for two_sided in [false, true] {
+            let mut b = SceneBuilder::new("panel");
+            let thin = b.double_sided_material("thin", [0.7; 3], [0.0; 3]);
+            let grey = b.material("grey", [0.7; 3], [0.0; 3]);
+            let glow = b.material("glow", [0.5; 3], [100.0; 3]);
+            let (wall, panel) = if two_sided { (thin, thin) } else { (grey, grey) };
+            let size = v(10.0, 8.0, 4.0);
+            for (k, side) in open_box(DVec3::ZERO, size / 2.0, &[]).iter().enumerate() {
+                let node = b.node(&format!("wall {k}"), None, DVec3::ZERO, DQuat::IDENTITY);
+                b.polygon(node, "wall", wall, side);
+            }
+            let [x, y] =
+                [size.x, size.y].map(|length| [-0.5 * share * length, 0.5 * share * length]);
+            let node = b.node("panel", None, v(0.0, 0.0, gap_m - 2.0), DQuat::IDENTITY);
+            b.polygon(node, "panel", panel, &facing_up(x, y, 0.0));
+            let lamp = b.node("lamp", None, DVec3::ZERO, DQuat::IDENTITY);
+            b.polygon(lamp, "lamp", glow, &flipped(facing_up([-1.0, 1.0], [-0.5, 0.5], 1.9)));
+            let [emitted, absorbed, escaped] = energies(b.build().unwrap(), &[0.0])[0];
+            let lost = (emitted - absorbed - escaped) / emitted;
+            assert!(lost.abs() < 0.005, "{gap_m} m, {share}, {two_sided}: {lost} are lost");
+        }
+    }
+}

@@ -8,9 +8,6 @@ use super::split::{Shape, bilinear};
 use crate::geometry::{Aabb, Interval, Plane, Pose};
 use crate::scene::{BodyId, Frame, Light, LightId, LightKind, PatchId, Scene, World};
 
-/// Relative rounding of what files hold: coordinates in single precision.
-const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
-
 /// A patch's plane, in its body's frame and in the world.
 #[derive(Clone, Copy, Debug)]
 pub struct WorldPatch {
@@ -258,8 +255,8 @@ fn hidden_twins(scene: &Scene) -> Vec<bool> {
     scene.patches.iter().enumerate().map(twin_is_first).collect()
 }
 
-/// Relative rounding of what is made here in double precision.
-const FINE_ROUNDING: f64 = 1.0 / (1_u64 << 46) as f64;
+/// Rounding of what is made here in double precision, as a share of that of files.
+const FINER: f64 = 1.0 / (1 << 24) as f64;
 
 fn world_patch(
     patch: &crate::scene::Patch,
@@ -268,7 +265,6 @@ fn world_patch(
 ) -> WorldPatch {
     let pose = poses[patch.body.0 as usize].unwrap_or(Pose::IDENTITY);
     let f = patch.frame;
-    let reach = patch.corners.iter().fold(0.0_f64, |m, c| m.max(c.x.abs()).max(c.y.abs()));
     WorldPatch {
         local: f,
         world: Frame {
@@ -279,7 +275,7 @@ fn world_patch(
         },
         body: patch.body,
         twin: patch.twin,
-        rounding_m: reach * if is_distant { FINE_ROUNDING } else { ROUNDING },
+        rounding_m: patch.rounding_m() * if is_distant { FINER } else { 1.0 },
     }
 }
 

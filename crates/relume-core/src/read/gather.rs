@@ -241,8 +241,8 @@ impl<'a> Look<'a> {
                 continue;
             }
             let polygon = view.occluder(patch);
-            let on_target = lies_in(&polygon, &plane, rounding_m).is_some_and(|opposed| {
-                in_plane(self.forest, view, patch, target, opposed) != InPlane::Apart
+            let on_target = lies_in(&polygon, &plane, rounding_m).is_some_and(|lying| {
+                in_plane(self.forest, view, patch, target, lying) != InPlane::Apart
             });
             let lift = if on_target { plane.normal * (LIFT * rounding_m) } else { DVec3::ZERO };
             let mut corners: Vec<DVec3> = polygon.corners.iter().map(|&c| c + lift).collect();

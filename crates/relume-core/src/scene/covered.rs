@@ -9,7 +9,7 @@ use super::gap::{Gap, between, gap_reach, open_sides};
 use super::placed::{IN_PLANE, Placed};
 use super::topology::{Polygon, components, matched, sides_of};
 use super::weld::Weld;
-use super::{BodyId, InPlane, PatchId, Scene, Sheet, Solids};
+use super::{BodyId, InPlane, Lying, PatchId, Scene, Sheet, Solids};
 use crate::geometry::{
     Aabb, BoxTree, Moments, Plane, Pose, Segment, common, difference, within_outlines,
 };
@@ -25,9 +25,6 @@ const REACH: f64 = 16.0;
 
 /// Holes narrower than this, in roundings, let nothing through.
 const SLIT: f64 = 8.0;
-
-/// Patches further apart than this share of their sizes are in two planes, for visibility too (`rounding_m` of elements).
-const TOLD_APART: f64 = 2.4e-7;
 
 /// Parts of less than this share of a patch are rounding.
 const SLIVER: f64 = 1e-9;
@@ -306,16 +303,13 @@ impl<'a> Group<'a> {
         let sheet = |p: &Placed| {
             let patch = &scene.patches[p.id.0 as usize];
             let enclosure = solids.enclosures[p.id.0 as usize];
-            Sheet { patch: p.id, twin: patch.twin, enclosure, area_m2: patch.area_m2() }
+            let (area_m2, rounding_m) = (patch.area_m2(), patch.rounding_m());
+            Sheet { patch: p.id, twin: patch.twin, enclosure, area_m2, rounding_m }
         };
         let opposed = p.normal.dot(q.normal) < 0.0;
-        let upper = if opposed { None } else { upper_of(p, q) };
         for (of, by) in [(p, q), (q, p)] {
-            let lies = match upper {
-                Some(upper) if upper == of.id => InPlane::Apart,
-                Some(_) => InPlane::Covers,
-                None => sheet(by).lies_to(&sheet(of), opposed),
-            };
+            let lying = Lying { opposed, height_m: height_m(by, of) };
+            let lies = sheet(by).lies_at(&sheet(of), lying);
             if lies == InPlane::Apart {
                 continue;
             }
@@ -332,21 +326,10 @@ impl<'a> Group<'a> {
     }
 }
 
-/// Which of two patches that face the same way is before the other, by more than what rounding makes of their own sizes: light
-/// tells them apart.
-fn upper_of(p: &Placed, q: &Placed) -> Option<PatchId> {
-    let reach = |p: &Placed| {
-        let apart = |c: &DVec3| c.distance(p.origin);
-        p.corners.iter().map(apart).fold(0.0, f64::max)
-    };
-    let rounding_m = TOLD_APART * (reach(p) + reach(q));
-    let is_before = |one: &Placed, other: &Placed| {
-        one.corners.iter().all(|&c| (c - other.corners[0]).dot(other.normal) > rounding_m)
-    };
-    if is_before(p, q) {
-        return Some(p.id);
-    }
-    is_before(q, p).then_some(q.id)
+/// Lowest and highest corner of a patch before the plane of another, metres.
+fn height_m(patch: &Placed, other: &Placed) -> [f64; 2] {
+    let heights = patch.corners.iter().map(|&c| (c - other.corners[0]).dot(other.normal));
+    heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], h| [low.min(h), high.max(h)])
 }
 
 /// Patches by their lowest coordinates.

@@ -25,6 +25,17 @@ pub struct Sheet {
     pub enclosure: Enclosure,
     /// Its area, m2.
     pub area_m2: f64,
+    /// Rounding of its corners ([`Patch::rounding_m`](super::Patch::rounding_m)), metres.
+    pub rounding_m: f64,
+}
+
+/// How a polygon lies to the plane of an end that it is close to.
+#[derive(Clone, Copy, Debug)]
+pub struct Lying {
+    /// Whether it faces the other way.
+    pub opposed: bool,
+    /// Lowest and highest of its corners before that plane, metres.
+    pub height_m: [f64; 2],
 }
 
 impl Sheet {
@@ -58,6 +69,19 @@ impl Sheet {
             [false, true] if opposed => InPlane::Apart,
             [true, false] if end.enclosure == Enclosure::Body => InPlane::Touches,
             _ => shows(),
+        }
+    }
+
+    /// The same for patches that may be a little apart: by more than the rounding of both, the one before shows and hides the other
+    /// that faces the same way. So do light and what is covered tell them apart alike.
+    pub fn lies_at(&self, end: &Sheet, Lying { opposed, height_m }: Lying) -> InPlane {
+        let told_apart_m = self.rounding_m.min(end.rounding_m);
+        let [low, high] = height_m;
+        match self.lies_to(end, opposed) {
+            _ if !opposed && low > told_apart_m => InPlane::Covers,
+            _ if !opposed && high < -told_apart_m => InPlane::Apart,
+            InPlane::Covers if high < -told_apart_m => InPlane::Apart,
+            lies => lies,
         }
     }
 

@@ -62,7 +62,7 @@ pub use edited::Edited;
 pub(crate) use edited::FIRST_NAME;
 pub use error::SceneError;
 pub use glow::Glow;
-pub use in_plane::{InPlane, Sheet};
+pub use in_plane::{InPlane, Lying, Sheet};
 pub use insert::{NewBody, NewMesh, TakenBody};
 pub use join::{Joined, Part};
 pub use motion::{Interpolation, Motion, Node, NodeId, RotationTrack, Track};
@@ -137,6 +137,9 @@ pub struct Scene {
 }
 
 /// Everything that moves rigidly together: an animated node with what hangs rigidly below it,
+/// Relative rounding of coordinates in single precision.
+const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
+
 /// or one object that never moves.
 #[derive(Clone, Debug)]
 pub struct Body {
@@ -427,6 +430,11 @@ impl Patch {
     pub(crate) fn most_factor(&self, centre: DVec3) -> f64 {
         let far = (self.frame.origin - centre).dot(self.frame.normal);
         (self.area_m2() / (std::f64::consts::PI * far * far)).min(1.0)
+    }
+
+    /// Rounding of its corners in its own frame, metres: what files hold, coordinates in single precision.
+    pub(crate) fn rounding_m(&self) -> f64 {
+        ROUNDING * self.corners.iter().fold(0.0_f64, |m, c| m.max(c.x.abs()).max(c.y.abs()))
     }
 
     /// Corners in the body's frame, counter-clockwise seen from the front.

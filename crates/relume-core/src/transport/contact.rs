@@ -3,31 +3,37 @@
 
 use crate::element::{Forest, OccluderPolygon, WorldElement, WorldView};
 use crate::geometry::{ConvexPolygon, Plane};
-use crate::scene::{InPlane, PatchId, Sheet};
+use crate::scene::{InPlane, Lying, PatchId, Sheet};
 
-/// Relation of a patch in the plane of an end of patch `end` to that end; `opposed` if it faces the other way.
+/// Relation of a patch in the plane of an end of patch `end` to that end.
 pub fn in_plane(
     forest: &Forest,
     view: &WorldView,
     patch: PatchId,
     end: PatchId,
-    opposed: bool,
+    lying: Lying,
 ) -> InPlane {
     let sheet = |patch: PatchId| Sheet {
         patch,
         twin: view.patch(patch).twin,
         enclosure: forest.enclosure(patch),
         area_m2: forest.area_m2(forest.patch_root(patch)),
+        rounding_m: view.patch(patch).rounding_m,
     };
-    sheet(patch).lies_to(&sheet(end), opposed)
+    sheet(patch).lies_at(&sheet(end), lying)
 }
 
-/// Whether a polygon lies in an end's plane, up to `within_m`, and if so whether it faces the other way.
-pub fn lies_in(polygon: &OccluderPolygon<'_>, plane: &Plane, within_m: f64) -> Option<bool> {
+/// How a polygon lies in an end's plane, if it does up to `within_m`.
+pub fn lies_in(polygon: &OccluderPolygon<'_>, plane: &Plane, within_m: f64) -> Option<Lying> {
     let cosine = polygon.plane.normal.dot(plane.normal);
-    let is_near =
-        cosine.abs() > 0.5 && polygon.corners.iter().all(|&c| plane.distance(c).abs() <= within_m);
-    is_near.then_some(cosine < 0.0)
+    if cosine.abs() <= 0.5 {
+        return None;
+    }
+    let heights = polygon.corners.iter().map(|&c| plane.distance(c));
+    let [low, high] = heights
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], h| [low.min(h), high.max(h)]);
+    let is_near = low >= -within_m && high <= within_m;
+    is_near.then_some(Lying { opposed: cosine < 0.0, height_m: [low, high] })
 }
 
 /// Area that two elements in one plane have in common, without what `covers` takes away, m2.

@@ -5,7 +5,7 @@ use crate::element::{ElementId, Forest, Kind, OccluderPolygon, WorldElement, Wor
 use crate::geometry::{
     Aabb, Interval, Plane, Pose, ShaftOfBoxes, is_outside_hull, shaft_meets_box,
 };
-use crate::scene::{BodyId, InPlane, PatchId};
+use crate::scene::{BodyId, InPlane, Lying, PatchId};
 
 use super::clip::keep_in_front;
 use super::contact::{in_plane, lies_in, overlap_m2};
@@ -153,6 +153,11 @@ impl<'a> Lifted<'a> {
 #[inline]
 fn span(polygon: &OccluderPolygon<'_>, plane: &Plane) -> Interval {
     Interval::of(polygon.corners.iter().map(|&c| plane.distance(c)))
+}
+
+/// Of polygons that are known to lie in one plane.
+fn in_contact(opposed: bool) -> Lying {
+    Lying { opposed, height_m: [0.0; 2] }
 }
 
 /// The larger of two numbers, by end.
@@ -329,7 +334,7 @@ impl<'a> Shaft<'a> {
         let (a, b) = self.own.map_or((self.a, self.b), |(_, a, b)| (a, b));
         let (of_a, of_b) = self.patches;
         meeting(a, b) == Meeting::Coplanar
-            && in_plane(self.forest, self.view, of_a, of_b, true) == InPlane::Touches
+            && in_plane(self.forest, self.view, of_a, of_b, in_contact(true)) == InPlane::Touches
     }
 
     /// Area in contact, without what other surfaces in the same plane show in place of the ends', m2.
@@ -343,7 +348,8 @@ impl<'a> Shaft<'a> {
         let shows = |patch: &PatchId| {
             let of = |end| {
                 let opposed = polygon(*patch).plane.normal.dot(self.view.normal(end, own)) < 0.0;
-                in_plane(self.forest, self.view, *patch, end, opposed) == InPlane::Covers
+                in_plane(self.forest, self.view, *patch, end, in_contact(opposed))
+                    == InPlane::Covers
             };
             rides(*patch) && (of(self.patches.0) || of(self.patches.1))
         };
@@ -359,8 +365,8 @@ impl<'a> Shaft<'a> {
         within_m: f64,
     ) -> [bool; 2] {
         let on = |e: &WorldElement, of| {
-            lies_in(polygon, &e.plane, within_m).is_some_and(|opposed| {
-                in_plane(self.forest, self.view, patch, of, opposed) != InPlane::Apart
+            lies_in(polygon, &e.plane, within_m).is_some_and(|lying| {
+                in_plane(self.forest, self.view, patch, of, lying) != InPlane::Apart
             })
         };
         [on(a, self.patches.0), on(b, self.patches.1)]

@@ -275,6 +275,19 @@ fn a_lumpy_body_receives_what_it_does_over_links_of_its_patches() {
     assert!(2 * grouped.pairs.active < plain.pairs.active);
 }
 
+/// Two triangles of a quad are a group of a smaller radius than either triangle.
+#[test]
+fn triangles_beside_each_other_are_not_divided_for_being_near() {
+    let scene = Arc::new(quarry(24, 0));
+    let body = scene.body_named("torus").unwrap();
+    let (session, report) = built(&scene, &at_tolerance(0.1), 0.0);
+    let solution = session.frame().unwrap().solution();
+    let patches = || (0..).zip(&scene.patches).filter(|(_, p)| p.body == body);
+    let leaves: usize = patches().map(|(k, _)| solution.leaves_of(PatchId(k)).len()).sum();
+    println!("{leaves} leaves on {} triangles, {} links", patches().count(), report.links);
+    assert!(10 * leaves < 15 * patches().count(), "{leaves}");
+}
+
 /// A black ball; so fine that all of its patches are small where there are 96 around.
 fn ball(around: u32) -> Scene {
     let mut b = SceneBuilder::new("ball");

@@ -11,7 +11,7 @@ use super::judge::{SpaceJudge, Stage, culled, passing};
 use super::margin::{Margin, SideMargin};
 use super::oracle::Oracle;
 use super::tree::{Carried, CullReason, Gradients, in_steps};
-use super::tuning::{APART, MISSED, PLACE, SHARED, SHARED_BY_FACETS, TURNED};
+use super::tuning::{APART, FACET_RADIUS, MISSED, PLACE, SHARED, SHARED_BY_FACETS, TURNED};
 use super::verdict::{Judgement, Verdict};
 use crate::transport::Side;
 
@@ -201,7 +201,13 @@ impl SpaceJudge<'_> {
         (a, end_a): (ElementId, &Spread<'_>),
         (b, end_b): (ElementId, &Spread<'_>),
     ) -> Option<Side> {
-        let order = match no_smaller(end_a.radius, end_b.radius) {
+        // Two triangles of a quad are a group of a smaller radius than either: by radius alone, triangles that are near would be
+        // divided before anything asks what whole ones exchange.
+        let counts = |id, end: &Spread<'_>| {
+            let is_facet = !self.is_group(id) && self.forest.is_in_group(self.forest.fixed(id));
+            if is_facet { FACET_RADIUS * end.radius } else { end.radius }
+        };
+        let order = match no_smaller(counts(a, end_a), counts(b, end_b)) {
             true => [Side::A, Side::B],
             false => [Side::B, Side::A],
         };

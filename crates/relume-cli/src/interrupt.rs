@@ -18,7 +18,7 @@ const GRACE: Duration = Duration::from_millis(600);
 
 /// How long a file that is being written may take before the process ends without it: a pipe that nobody
 /// reads never takes what is written.
-const FILE_GRACE: Duration = Duration::from_secs(5);
+const FILE_GRACE: Duration = Duration::from_secs(2);
 
 /// Time between two looks whether a file is written.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(10);
@@ -48,16 +48,16 @@ pub(crate) fn listen() -> Result<(), Failure> {
 /// Ends the process with a message, from any thread and in the middle of anything but a file, once
 /// what is finished is kept.
 pub(crate) fn end(why: &Failure) -> ! {
-    keep_within(FILE_GRACE);
     // Not in the middle of a file, if that gets done.
-    let _guard = try_locked_for(&WRITING, FILE_GRACE);
+    let is_kept = keep_within(FILE_GRACE);
+    let _guard = is_kept.then(|| try_locked_for(&WRITING, FILE_GRACE));
     settle_unfinished();
     text::complain(&format!("\n{why}"));
     std::process::exit(i32::from(why.exit_code()));
 }
 
-/// Puts what the run has finished into its place, if that takes no longer.
-fn keep_within(patience: Duration) {
+/// Puts what the run has finished into its place, if that takes no longer; whether it is done.
+fn keep_within(patience: Duration) -> bool {
     let (kept, wait) = mpsc::channel();
     // No work of the engine: its results do not depend on it.
     #[allow(clippy::disallowed_methods)]
@@ -67,9 +67,14 @@ fn keep_within(patience: Duration) {
         let _ = kept.send(failure);
     });
     match wait.recv_timeout(patience) {
-        Ok(Some(failure)) => text::complain(&failure.to_string()),
-        Ok(None) => {}
-        Err(_) => text::complain("the report could not be written in time"),
+        Ok(failure) => {
+            failure.into_iter().for_each(|failure| text::complain(&failure.to_string()));
+            true
+        }
+        Err(_) => {
+            text::complain("the report could not be written in time");
+            false
+        }
     }
 }
 

@@ -87,7 +87,45 @@ fn what_is_no_regular_file_is_refused_by_name_wherever_a_file_is_named() {
     pipe(&out.join("frame-0000.png"));
     fs::remove_file(out.join("report.json")).unwrap();
     pipe(&out.join("report.json"));
-    soon(&[&render[..], &["--resume"]].concat()).fails(1, &["report.json", "a pipe"]);
+    soon(&[&render[..], &["--resume"]].concat()).fails(1, &["frame-0000.png is not a file"]);
+    fs::remove_file(out.join("frame-0000.png")).unwrap();
+    soon(&[&render[..], &["--resume"]].concat()).fails(1, &["report.json is not a file"]);
+}
+
+/// What goes into a pipe that nobody reads.
+#[cfg(unix)]
+#[test]
+fn a_run_that_a_pipe_holds_up_can_be_stopped() {
+    let (dir, scene) = room();
+    let path = dir.path().join("pipe");
+    pipe(&path);
+    let mut child = Command::new(env!("CARGO_BIN_EXE_relume"))
+        .args([
+            "solve",
+            text(&scene),
+            "--tolerance",
+            "0.5",
+            "--frames",
+            "0",
+            "--report",
+            text(&path),
+        ])
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_secs(3));
+    let number = child.id().to_string();
+    assert!(Command::new("kill").arg(number).status().unwrap().success());
+    let begun = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if begun.elapsed() > Duration::from_secs(20) {
+            child.kill().unwrap();
+            panic!("it does not end");
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
 }
 
 /// A glTF file with a triangle, changed.

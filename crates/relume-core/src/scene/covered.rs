@@ -61,7 +61,7 @@ impl Scene {
     /// What of each patch is covered by what rests on it; empty where nothing is. That is where it touches another patch or
     /// another shows in its place ([`Sheet::lies_to`]), and where a body of polygons that look outwards, or are two-sided, stands on
     /// it or sticks in it: one that is closed but for a border in the patch's plane or behind it, so that boxes without a bottom
-    /// count, all wound alike, and without lamps in it; and what lies in narrow gaps (`scene/gap.rs`). Bodies that never move cover each other, a body that moves only itself.
+    /// count (where they are two-sided, if patches fill that border), all wound alike, and without lamps in it or in its border; and what lies in narrow gaps (`scene/gap.rs`). Bodies that never move cover each other, a body that moves only itself.
     /// Exact to a millionth of the largest coordinate. Of patches that are covered by more than 0.999 by one thing only that is said.
     /// Those that `is_displaced` names are not where the file has them: they cover themselves alone, as if they moved.
     pub(crate) fn covered(

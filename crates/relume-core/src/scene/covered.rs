@@ -390,9 +390,8 @@ impl<'a> Stands<'a> {
         let Some(Footprint { within, turned }) = self.footprint(patch) else { return };
         let hull = self.hull;
         *left = left.saturating_sub(hull.polygons.len());
-        if !(hull.border.is_empty() || hull.twins.is_empty())
-            && !self.is_closed_at(patch, &within, left)
-        {
+        let lets_light_in = !(hull.border.is_empty() || hull.twins.is_empty());
+        if lets_light_in && !self.is_closed_at(patch, &within, left) {
             return;
         }
         let inner = if turned { &hull.polygons } else { &hull.twins };

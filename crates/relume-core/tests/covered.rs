@@ -340,6 +340,29 @@ fn through_a_hole_in_a_ceiling_light_gets_among_walls() {
     assert!((absorbed / emitted - 1.0).abs() < 0.02, "{absorbed} W of {emitted} W are absorbed");
 }
 
+/// A double-sided lamp in a ceiling but for a rounding, half in a box that sticks in the ceiling: light leaves it to both sides or to one.
+#[test]
+fn a_lamp_in_a_ceiling_but_for_a_rounding_loses_no_light() {
+    for off_m in [-2.4e-7, -2e-8, 0.0, 2e-8, 2.4e-7] {
+        let mut b = SceneBuilder::new("flush lamp");
+        let thin = b.double_sided_material("thin", [0.6; 3], [0.0; 3]);
+        let glow = b.double_sided_material("glow", [0.7; 3], [10.0; 3]);
+        for (k, side) in open_box(DVec3::ZERO, v(1.2, 0.7, 0.4), &[]).iter().enumerate() {
+            let node = b.node(&format!("wall {k}"), None, DVec3::ZERO, DQuat::IDENTITY);
+            b.polygon(node, "wall", thin, side);
+        }
+        let node = b.node("hollow", None, DVec3::ZERO, DQuat::IDENTITY);
+        for side in open_box(v(-0.3, -0.3, 0.2), v(0.4, 0.35, 0.45), &[5]) {
+            b.polygon(node, "hollow", thin, &side);
+        }
+        let lamp = b.node("lamp", None, v(0.0, 0.0, 0.4 - off_m), DQuat::IDENTITY);
+        b.polygon(lamp, "lamp", glow, &flipped(facing_up([-0.34, 0.34], [-0.09, 0.09], 0.0)));
+        let [emitted, absorbed, escaped] = energies(b.build().unwrap(), &[0.0])[0];
+        let lost = (emitted - absorbed - escaped) / emitted;
+        assert!(lost.abs() < 0.01, "{off_m} m: {lost} of {emitted} W are lost");
+    }
+}
+
 /// A panel some micrometres before a wall of a room: a smaller one, and one as large as the wall, from one side or both.
 #[test]
 fn panels_close_before_walls_lose_no_light() {

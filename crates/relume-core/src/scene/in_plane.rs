@@ -73,12 +73,14 @@ impl Sheet {
     }
 
     /// The same for patches that may be a little apart: by more than the rounding of both, the one before shows and hides the other
-    /// that faces the same way. So do light and what is covered tell them apart alike.
+    /// that faces the same way, as one side of a two-sided one does. So do light and what is covered tell them apart alike.
     pub fn lies_at(&self, end: &Sheet, Lying { opposed, height_m }: Lying) -> InPlane {
         let told_apart_m = self.rounding_m.min(end.rounding_m);
         let [low, high] = height_m;
-        match self.lies_to(end, opposed) {
-            _ if !opposed && low > told_apart_m => InPlane::Covers,
+        let lies = self.lies_to(end, opposed);
+        let may_show = !opposed || (self.twin.is_some() && lies != InPlane::Touches);
+        match lies {
+            _ if may_show && low > told_apart_m => InPlane::Covers,
             _ if !opposed && high < -told_apart_m => InPlane::Apart,
             InPlane::Covers if high < -told_apart_m => InPlane::Apart,
             lies => lies,

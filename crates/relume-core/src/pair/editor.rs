@@ -126,17 +126,17 @@ impl<J: Judge> Editor<'_, J> {
             },
         };
         let before = self.tree.history(pair);
-        let history = match same {
-            _ if !(dynamic && goes_on) => History::default(),
-            // It came to rest.
-            true if stale == Stale::Due && before.is_straight_through(&sample) => {
-                match self.judge.stale(a, b, false) {
-                    Stale::Moved | Stale::Occlusion => before.evaluated(sample, ahead),
-                    _ => History::default(),
-                }
-            }
-            true => before.evaluated(sample, ahead),
-            false => History::begun(sample, ahead),
+        let came_to_rest = stale == Stale::Due && before.is_straight_through(&sample);
+        let history = if !(dynamic && goes_on) {
+            History::default()
+        } else if !same {
+            History::begun(sample, ahead)
+        } else if came_to_rest
+            && !matches!(self.judge.stale(a, b, false), Stale::Moved | Stale::Occlusion)
+        {
+            History::default()
+        } else {
+            before.evaluated(sample, ahead)
         };
         self.tree.set_history(pair, history);
     }
@@ -172,14 +172,11 @@ impl<J: Judge> Editor<'_, J> {
             Verdict::RefineSelf => State::RefinedSelf,
             Verdict::Cull(reason) => State::Culled(reason),
         };
-        let moved = match stale {
-            Stale::New => wanted == State::Active && self.judge.stale(a, b, false) == Stale::Moved,
-            stale => {
-                wanted == State::Active && {
-                    matches!(stale, Stale::Moved | Stale::Followed | Stale::Due)
-                }
-            }
+        let has_moved = || match stale {
+            Stale::New => self.judge.stale(a, b, false) == Stale::Moved,
+            stale => matches!(stale, Stale::Moved | Stale::Followed | Stale::Due),
         };
+        let moved = wanted == State::Active && has_moved();
         let work = &mut self.changes.work;
         work.dynamic_links += u64::from(moved);
         if before != wanted {
@@ -211,7 +208,7 @@ impl<J: Judge> Editor<'_, J> {
             self.changes.work.occlusion_changed +=
                 u64::from(before.visibility != carried.visibility);
             self.tree.set_carried(pair, carried);
-            self.record(Edit::Set(pair));
+            self.keep_edit(Edit::Set(pair));
             let kind = match before.visibility.cmp(&carried.visibility) {
                 Ordering::Equal => return,
                 Ordering::Greater => EventKind::Occluded,
@@ -284,7 +281,7 @@ impl<J: Judge> Editor<'_, J> {
                 self.tree.set_state(pair, wanted);
                 self.tree.set_carried(pair, &found.carried);
                 self.hash.add(self.key(pair), &found.carried);
-                self.record(Edit::Set(pair));
+                self.keep_edit(Edit::Set(pair));
                 0..0
             }
             State::Culled(_) | State::New | State::Vacant => {
@@ -298,7 +295,7 @@ impl<J: Judge> Editor<'_, J> {
     fn unlink(&mut self, pair: PairId) {
         let link = self.tree.link(pair).expect("a link");
         self.hash.remove(self.key(pair), &link.carried);
-        self.record(Edit::Removed(link.a, link.b));
+        self.keep_edit(Edit::Removed(link.a, link.b));
     }
 
     /// Removes everything below a refined pair, from the leaves up.
@@ -327,7 +324,7 @@ impl<J: Judge> Editor<'_, J> {
         pair_key(self.judge.key(a), self.judge.key(b))
     }
 
-    fn record(&mut self, edit: Edit) {
+    fn keep_edit(&mut self, edit: Edit) {
         if self.record.edits {
             self.changes.edits.push(edit);
         }

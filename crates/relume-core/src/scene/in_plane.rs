@@ -25,7 +25,7 @@ pub struct Sheet {
     pub enclosure: Enclosure,
     /// Its area, m2.
     pub area_m2: f64,
-    /// Rounding of its corners ([`Patch::rounding_m`](super::Patch::rounding_m)), metres.
+    /// Rounding of its corners in single precision, metres.
     pub rounding_m: f64,
 }
 

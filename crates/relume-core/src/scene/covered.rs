@@ -379,8 +379,8 @@ impl<'a> Stands<'a> {
         Stands { scene, placed, hull, near, slack_m, closed: Vec::new() }
     }
 
-    /// What it covers of a patch. `is_own` if the patch is of that body, which moves, and places are in its frame. What is
-    /// two-sided and open to the patch's plane covers only what closes it there: through a hole in a ceiling light gets among walls.
+    /// Adds what it covers of a patch. `is_own` if the patch is of that body, which moves, and places are in its frame. A two-sided body
+    /// with a border covers nothing in a plane whose patches leave a part of its opening free: light gets in there.
     pub(super) fn on(
         &mut self,
         (patch, is_own): (&Placed, bool),
@@ -558,9 +558,9 @@ impl Hull {
         self.is_convex && self.polygons.iter().any(|&k| before(&placed[k]))
     }
 
-    /// Whether a lamp that touches two-sided polygons may shine among them. One that lies flush on one of them, to where they look away
-    /// from: they hide nothing of what lies in their place; of a body that is not convex it is not known which way that is. And one
-    /// that lies in the plane of the border and looks at them: it closes an open box, or a part of it.
+    /// Whether a lamp that touches two-sided polygons may shine among them: if it lies flush on one of them and looks inwards (they
+    /// hide nothing of what lies in their place; inwards is known of convex bodies only, so any way counts for others), or if it
+    /// lies in the plane of the border and looks at them, as a lamp in the rim of an open box does.
     pub(super) fn is_lit_by(&self, placed: &[Placed], lamp: &Placed, slack_m: f64) -> bool {
         !self.twins.is_empty()
             && (self.is_lit_through(placed, lamp, slack_m)

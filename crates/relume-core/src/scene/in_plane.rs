@@ -72,8 +72,9 @@ impl Sheet {
         }
     }
 
-    /// The same for patches that may be a little apart: by more than the rounding of both, the one before shows and hides the other
-    /// that faces the same way, as one side of a two-sided one does. So do light and what is covered tell them apart alike.
+    /// How this patch lies to another one that is in its plane, or nearly. Where they are further apart than the smaller of their
+    /// roundings, the one in front shows and hides the other if that faces the same way (of a two-sided one the side that does), whatever
+    /// their sizes; otherwise as [`Sheet::lies_to`]. Visibility and coverage both ask this, so that they agree.
     pub fn lies_at(&self, end: &Sheet, Lying { opposed, height_m }: Lying) -> InPlane {
         let told_apart_m = self.rounding_m.min(end.rounding_m);
         let [low, high] = height_m;

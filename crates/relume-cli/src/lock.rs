@@ -44,8 +44,8 @@ impl Lock {
             let written = file.set_len(0).and_then(|()| file.write_all(number.as_bytes()));
             written.map_err(|error| Failure::write(&path, &error))?;
             remove_remains(dir, &is_named_by_runs);
-            nothing_in_the_way(dir)?;
-            return Ok(Lock { _file: file, path });
+            let lock = Lock { _file: file, path };
+            return nothing_in_the_way(dir).map(|()| lock);
         }
     }
 }
@@ -143,6 +143,7 @@ mod tests {
         fs::create_dir(dir.path().join("frame-0003.png")).unwrap();
         let message = Lock::take(dir.path()).err().unwrap().to_string();
         assert!(message.contains("frame-0003.png is not a file"), "{message}");
+        assert!(!dir.path().join(".relume.lock").exists());
     }
 
     #[test]

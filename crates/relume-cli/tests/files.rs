@@ -3,7 +3,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
@@ -12,13 +12,24 @@ use crate::common::{self, Ran, relume, room, text};
 
 /// Runs the command, which has to end by itself soon.
 fn soon(arguments: &[&str]) -> Ran {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_relume"))
+    let mut child = start(arguments);
+    wait(&mut child, arguments);
+    let output = child.wait_with_output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    Ran { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+}
+
+fn start(arguments: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_relume"))
         .args(arguments)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .unwrap();
+        .unwrap()
+}
+
+fn wait(child: &mut Child, arguments: &[&str]) {
     let begun = Instant::now();
     while child.try_wait().unwrap().is_none() {
         if begun.elapsed() > Duration::from_secs(30) {
@@ -27,9 +38,6 @@ fn soon(arguments: &[&str]) -> Ran {
         }
         std::thread::sleep(Duration::from_millis(5));
     }
-    let output = child.wait_with_output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    Ran { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
 }
 
 fn pipe(path: &Path) {
@@ -93,39 +101,19 @@ fn what_is_no_regular_file_is_refused_by_name_wherever_a_file_is_named() {
 }
 
 /// What goes into a pipe that nobody reads.
-#[cfg(unix)]
 #[test]
 fn a_run_that_a_pipe_holds_up_can_be_stopped() {
     let (dir, scene) = room();
     let path = dir.path().join("pipe");
     pipe(&path);
-    let mut child = Command::new(env!("CARGO_BIN_EXE_relume"))
-        .args([
-            "solve",
-            text(&scene),
-            "--tolerance",
-            "0.5",
-            "--frames",
-            "0",
-            "--report",
-            text(&path),
-        ])
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let scene = text(&scene);
+    let arguments =
+        ["solve", scene, "--tolerance", "0.5", "--frames", "0", "--report", text(&path)];
+    let mut child = start(&arguments);
     std::thread::sleep(Duration::from_secs(3));
     let number = child.id().to_string();
     assert!(Command::new("kill").arg(number).status().unwrap().success());
-    let begun = Instant::now();
-    while child.try_wait().unwrap().is_none() {
-        if begun.elapsed() > Duration::from_secs(20) {
-            child.kill().unwrap();
-            panic!("it does not end");
-        }
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    wait(&mut child, &arguments);
 }
 
 /// A glTF file with a triangle, changed.

@@ -22,7 +22,7 @@ use super::{
     Body, BodyId, Frame, Glow, Interpolation, Material, MaterialId, Motion, NodeId, Note, Patch,
     PatchId, Print, Scene, SceneError, Severity, Surface, SurfaceId, TintId,
 };
-use crate::geometry::Pose;
+use crate::geometry::{Aabb, Pose};
 
 impl Scene {
     /// The scene of a draft: objects grouped into bodies, scales baked into corners, names made unique, everything checked.
@@ -278,10 +278,8 @@ impl Parts {
     /// The scene's extent at the start, or what it would be if all were present.
     fn extent_m(&self, motion: &Motion) -> Option<f64> {
         let points = self.bodies.iter().flat_map(|body| self.points_at_start(body, motion));
-        let bounds = points.fold(None, |bounds: Option<(DVec3, DVec3)>, p| {
-            Some(bounds.map_or((p, p), |(low, high)| (low.min(p), high.max(p))))
-        });
-        bounds.map(|(low, high)| (high - low).length())
+        let bounds = Aabb::of(points);
+        (!bounds.is_empty()).then(|| bounds.diagonal())
     }
 
     /// Corners of a body's patches in the world at time 0.

@@ -11,7 +11,7 @@ use super::topology::{Polygon, components, matched, sides_of};
 use super::weld::Weld;
 use super::{BodyId, InPlane, Lying, PatchId, Scene, Sheet, Solids};
 use crate::geometry::{
-    Aabb, BoxTree, Moments, Plane, Pose, Segment, common, difference, within_outlines,
+    Aabb, BoxTree, Interval, Moments, Plane, Pose, Segment, common, difference, within_outlines,
 };
 use crate::scene::tuning::{
     COVERED_CUTS_MAX, COVERED_PARTS_MAX, COVERED_WHOLLY, COVERING_POLYGONS_MAX,
@@ -308,7 +308,8 @@ impl<'a> Group<'a> {
         };
         let opposed = p.normal.dot(q.normal) < 0.0;
         for (of, by) in [(p, q), (q, p)] {
-            let lying = Lying { opposed, height_m: height_m(by, of) };
+            let height = |&c: &DVec3| (c - of.corners[0]).dot(of.normal);
+            let lying = Lying { opposed, height_m: Interval::of(by.corners.iter().map(height)) };
             let lies = sheet(by).lies_at(&sheet(of), lying);
             if lies == InPlane::Apart {
                 continue;
@@ -324,12 +325,6 @@ impl<'a> Group<'a> {
             }
         }
     }
-}
-
-/// Lowest and highest corner of a patch before the plane of another, metres.
-fn height_m(patch: &Placed, other: &Placed) -> [f64; 2] {
-    let heights = patch.corners.iter().map(|&c| (c - other.corners[0]).dot(other.normal));
-    heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], h| [low.min(h), high.max(h)])
 }
 
 /// Patches by their lowest coordinates.

@@ -1,7 +1,7 @@
 //! Which of two surfaces that lie in one plane hides the other. Pure bookkeeping; must not know elements.
 
 use super::{Enclosure, PatchId};
-use crate::geometry::no_smaller;
+use crate::geometry::{Interval, no_smaller};
 
 /// How a polygon in the plane of an end lies to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,8 +34,8 @@ pub struct Sheet {
 pub struct Lying {
     /// Whether it faces the other way.
     pub opposed: bool,
-    /// Lowest and highest of its corners before that plane, metres.
-    pub height_m: [f64; 2],
+    /// How far its corners are before that plane, metres.
+    pub height_m: Interval,
 }
 
 impl Sheet {
@@ -77,13 +77,12 @@ impl Sheet {
     /// their sizes; otherwise as [`Sheet::lies_to`]. Visibility and coverage both ask this, so that they agree.
     pub fn lies_at(&self, end: &Sheet, Lying { opposed, height_m }: Lying) -> InPlane {
         let told_apart_m = self.rounding_m.min(end.rounding_m);
-        let [low, high] = height_m;
         let lies = self.lies_to(end, opposed);
         let may_show = !opposed || (self.twin.is_some() && lies != InPlane::Touches);
         match lies {
-            _ if may_show && low > told_apart_m => InPlane::Covers,
-            _ if !opposed && high < -told_apart_m => InPlane::Apart,
-            InPlane::Covers if high < -told_apart_m => InPlane::Apart,
+            _ if may_show && height_m.lo > told_apart_m => InPlane::Covers,
+            _ if !opposed && height_m.hi < -told_apart_m => InPlane::Apart,
+            InPlane::Covers if height_m.hi < -told_apart_m => InPlane::Apart,
             lies => lies,
         }
     }

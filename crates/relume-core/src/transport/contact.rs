@@ -2,7 +2,7 @@
 //! surfaces in contact, which is everything that leaves their overlap.
 
 use crate::element::{Forest, OccluderPolygon, WorldElement, WorldView};
-use crate::geometry::{ConvexPolygon, Plane};
+use crate::geometry::{ConvexPolygon, Interval, Plane};
 use crate::scene::{InPlane, Lying, PatchId, Sheet};
 
 /// Relation of a patch in the plane of an end of patch `end` to that end.
@@ -29,11 +29,9 @@ pub fn lies_in(polygon: &OccluderPolygon<'_>, plane: &Plane, within_m: f64) -> O
     if cosine.abs() <= 0.5 {
         return None;
     }
-    let heights = polygon.corners.iter().map(|&c| plane.distance(c));
-    let [low, high] = heights
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], h| [low.min(h), high.max(h)]);
-    let is_near = low >= -within_m && high <= within_m;
-    is_near.then_some(Lying { opposed: cosine < 0.0, height_m: [low, high] })
+    let height_m = Interval::of(polygon.corners.iter().map(|&c| plane.distance(c)));
+    let is_near = height_m.lo >= -within_m && height_m.hi <= within_m;
+    is_near.then_some(Lying { opposed: cosine < 0.0, height_m })
 }
 
 /// Area that two elements in one plane have in common, without what `covers` takes away, m2.

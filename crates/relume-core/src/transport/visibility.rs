@@ -157,7 +157,7 @@ fn span(polygon: &OccluderPolygon<'_>, plane: &Plane) -> Interval {
 
 /// Of polygons that are known to lie in one plane.
 fn in_contact(opposed: bool) -> Lying {
-    Lying { opposed, height_m: [0.0; 2] }
+    Lying { opposed, height_m: Interval::ZERO }
 }
 
 /// The larger of two numbers, by end.

@@ -288,6 +288,34 @@ fn triangles_beside_each_other_are_not_divided_for_being_near() {
     assert!(10 * leaves < 15 * patches().count(), "{leaves}");
 }
 
+/// Neighbours on a smooth surface send each other next to nothing, however close they are.
+#[test]
+fn a_smooth_body_of_more_triangles_has_no_more_links() {
+    let solve = |around: u32| {
+        let scene = Arc::new(quarry(around, 0));
+        let (session, report) = built(&scene, &at_tolerance(0.1), 0.0);
+        let body = scene.body_named("torus").unwrap();
+        let of_patch = patch_means(&session.frame().unwrap().solution());
+        let mean_on = |on_body: bool| {
+            let patches = || {
+                let all = scene.patches.iter().zip(&of_patch);
+                all.filter(|(patch, _)| (patch.body == body) == on_body)
+            };
+            let arriving: f64 = patches().map(|(_, of)| of.0 * of.1).sum();
+            arriving / patches().map(|(_, of)| of.0).sum::<f64>()
+        };
+        let means = [mean_on(true), mean_on(false)];
+        println!("{} patches, {} links, {means:?} W/m2", scene.patches.len(), report.links);
+        (report.links, means)
+    };
+    let (links, means) = solve(36);
+    let (finer_links, finer_means) = solve(108);
+    assert!(2 * finer_links < 3 * links, "{links} {finer_links}");
+    for (mean, finer) in means.into_iter().zip(finer_means) {
+        assert!((finer / mean - 1.0).abs() < 0.01, "{mean} {finer}");
+    }
+}
+
 /// A black ball; so fine that all of its patches are small where there are 96 around.
 fn ball(around: u32) -> Scene {
     let mut b = SceneBuilder::new("ball");

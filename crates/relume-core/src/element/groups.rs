@@ -159,6 +159,43 @@ pub struct Group {
     pub is_convex: bool,
     /// The convex solid that all of its facets are of, if there is one.
     pub solid: Option<u32>,
+    /// Cone around the normals of its facets.
+    pub normals: NormalCone,
+}
+
+/// A cone of directions around an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NormalCone {
+    /// Unit axis; any where the angle is pi.
+    pub axis: DVec3,
+    /// Largest angle of a direction with the axis, radians.
+    pub angle: f64,
+}
+
+impl NormalCone {
+    /// The cone of one direction.
+    pub fn of_one(normal: DVec3) -> NormalCone {
+        NormalCone { axis: normal, angle: 0.0 }
+    }
+
+    /// A cone around weighted directions: its axis is their mean.
+    pub(super) fn of(normals: impl Iterator<Item = (DVec3, f64)> + Clone) -> NormalCone {
+        let mean: DVec3 = normals.clone().map(|(normal, weight)| normal * weight).sum();
+        let weight: f64 = normals.clone().map(|(_, weight)| weight).sum();
+        // Of directions that cancel out the mean is a rounding.
+        if mean.length() < 1e-3 * weight {
+            return NormalCone { axis: DVec3::Z, angle: std::f64::consts::PI };
+        }
+        let axis = mean.normalize();
+        let least = normals.map(|(normal, _)| axis.dot(normal)).fold(1.0, f64::min);
+        NormalCone { axis, angle: libm::acos(least.max(-1.0)) }
+    }
+
+    /// Half the angle of the smallest cone around this one and another, radians.
+    pub fn half_angle_with(&self, other: &NormalCone) -> f64 {
+        let between = libm::acos(self.axis.dot(other.axis).clamp(-1.0, 1.0));
+        self.angle.max(other.angle).max(0.5 * (self.angle + other.angle + between))
+    }
 }
 
 /// All groups of a forest.
@@ -234,5 +271,34 @@ impl Groups {
             + self.leaves.capacity() * size_of::<GroupLeaf>();
         let by_id = self.numbers.capacity() * 4 + self.spans.capacity() * 8;
         (lists + by_id + (self.ids.capacity() + self.roots.capacity()) * 4) as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cone(normals: &[DVec3]) -> NormalCone {
+        NormalCone::of(normals.iter().map(|&normal| (normal.normalize(), 1.0)))
+    }
+
+    #[test]
+    fn a_cone_holds_its_directions_and_a_cone_around_two_holds_both() {
+        let one = cone(&[DVec3::new(0.1, 0.0, 1.0), DVec3::new(-0.1, 0.0, 1.0)]);
+        assert!((one.axis - DVec3::Z).length() < 1e-12);
+        assert!((one.angle - libm::atan(0.1)).abs() < 1e-12);
+        // Side by side: from the far edge of one to the far edge of the other.
+        let aside = NormalCone { axis: DVec3::X, angle: 0.2 };
+        let around = 0.5 * (one.angle + 0.2 + std::f64::consts::FRAC_PI_2);
+        assert!((one.half_angle_with(&aside) - around).abs() < 1e-12);
+        // One within the other.
+        let inner = NormalCone::of_one(DVec3::new(0.01, 0.0, 1.0).normalize());
+        assert_eq!(one.half_angle_with(&inner), one.angle);
+    }
+
+    #[test]
+    fn directions_that_cancel_out_fill_the_sphere() {
+        let cone = cone(&[DVec3::Z, DVec3::NEG_Z]);
+        assert_eq!(cone.angle, std::f64::consts::PI);
     }
 }

@@ -13,7 +13,7 @@ mod tuning;
 mod world;
 
 pub use forest::{Counts, Forest, PartInside, Seeds, old_coarse_numbers};
-pub use groups::{Group, GroupLeaf, Groups, distant_parts, grouped_patches};
+pub use groups::{Group, GroupLeaf, Groups, NormalCone, distant_parts, grouped_patches};
 pub use ids::{ElementId, ElementKey, Kind, Renumbering};
 pub use split::{Extent, Shape, bilinear, bilinear_area};
 pub use world::{OccluderPolygon, WorldElement, WorldLight, WorldPatch, WorldView};

@@ -11,7 +11,9 @@ use super::judge::{SpaceJudge, Stage, culled, passing};
 use super::margin::{Margin, SideMargin};
 use super::oracle::Oracle;
 use super::tree::{Carried, CullReason, Gradients, in_steps};
-use super::tuning::{APART, FACET_RADIUS, MISSED, PLACE, SHARED, SHARED_BY_FACETS, TURNED};
+use super::tuning::{
+    APART, FACET_RADIUS, GRAZING, MISSED, NEAR_FLAT, PLACE, SHARED, SHARED_BY_FACETS, TURNED,
+};
 use super::verdict::{Judgement, Verdict};
 use crate::transport::Side;
 
@@ -68,6 +70,9 @@ impl SpaceJudge<'_> {
             return match (self.forest.group(a).is_some_and(|group| group.is_convex), self.stage) {
                 (true, _) => culled(CullReason::FacingAway),
                 (false, Stage::Coarse) => passing(Verdict::CoarseLink, 0),
+                (false, Stage::Fine(brightness)) if self.is_flat(a, brightness) => {
+                    culled(CullReason::Grazing)
+                }
                 (false, Stage::Fine(_)) => {
                     narrowed.extend_from_slice(candidates);
                     passing(Verdict::RefineSelf, 0)
@@ -125,7 +130,8 @@ impl SpaceJudge<'_> {
         let side = self.larger_radius((a, end_a), (b, end_b));
         let apart = end_a.centre.distance(end_b.centre);
         let near = apart < APART * (end_a.radius + end_b.radius);
-        if let Some(side) = side.filter(|_| near) {
+        let factor = near.then(|| grazing_factor(end_a, end_b)).flatten();
+        if let Some(side) = side.filter(|_| near && factor.is_none()) {
             return passing(Verdict::Refine(side), 0);
         }
         let x = exchange_of(end_a, end_b);
@@ -134,10 +140,16 @@ impl SpaceJudge<'_> {
             false => (1.0, 0),
         };
         let crossing = Crossing { apart_m: apart, x: &x, v };
-        let on = [
-            self.group_error(brightness, (a, end_a.area_m2), (b, x.shows_m2.1), &crossing),
-            self.group_error(brightness, (b, end_b.area_m2), (a, x.shows_m2.0), &crossing),
-        ];
+        let on = match factor {
+            Some(factor) => [
+                self.grazing_error(brightness, (a, end_a.area_m2), b, factor),
+                self.grazing_error(brightness, (b, end_b.area_m2), a, factor),
+            ],
+            None => [
+                self.group_error(brightness, (a, end_a.area_m2), (b, x.shows_m2.1), &crossing),
+                self.group_error(brightness, (b, end_b.area_m2), (a, x.shows_m2.0), &crossing),
+            ],
+        };
         let error = on[0].max(on[1]);
         if let Some(side) = side.filter(|_| error > threshold) {
             let larger = if on[1] > on[0] { Side::B } else { Side::A };
@@ -182,6 +194,31 @@ impl SpaceJudge<'_> {
         let shared = if self.is_group(receiver) { SHARED_BY_FACETS } else { SHARED };
         let hidden = if v < 1.0 { shared * shared * v * (1.0 - v) + MISSED / 16.0 } else { 0.0 };
         weight * arrives / light.irradiance * (place * place + hidden).sqrt()
+    }
+
+    /// The error on an end of a link with a near-flat neighbour, weighed as [`SpaceJudge::group_error`], where the form factor of no
+    /// facet may be off by more than `factor`.
+    fn grazing_error(
+        &self,
+        brightness: &CoarseBrightness,
+        (receiver, area_m2): (ElementId, f64),
+        source: ElementId,
+        factor: f64,
+    ) -> f64 {
+        let weight = (area_m2 / self.group_reference_m2(brightness, receiver)).sqrt();
+        let sent = brightness.of(self.forest, source).radiosity;
+        weight * sent * factor / brightness.of(self.forest, receiver).irradiance
+    }
+
+    /// Whether what the facets of a group exchange among themselves counts for nothing: that they reflect all that they receive is
+    /// the most that they can send.
+    fn is_flat(&self, id: ElementId, brightness: &CoarseBrightness) -> bool {
+        let Oracle::Error { threshold } = self.oracle else { return false };
+        let Some(group) = self.forest.group(id) else { return false };
+        let Some(factor) = grazing_factor_of(group.normals.angle) else { return false };
+        let area_m2 = self.forest.area_m2(id);
+        let weight = (area_m2 / self.group_reference_m2(brightness, id)).sqrt();
+        weight * factor <= threshold
     }
 
     /// Area at which an end weighs 1 in the error norm, m2.
@@ -247,6 +284,19 @@ impl SpaceJudge<'_> {
         // What is in the way is left out: weights need no shadows of lights.
         carrying(Verdict::CoarseLink, leaves.map(arrives).sum(), 1.0, Margin::Firm, 0)
     }
+}
+
+/// What the form factor of a facet of one end to the other may be off by, however close they are, where they are near-flat.
+///
+/// If all normals lie within t of an axis, two facets see each other only along directions within t of the plane across it, and the
+/// form factor of a facet to all of them is at most 1.5 t^2 (for small t), whatever lies there.
+fn grazing_factor(a: &Spread<'_>, b: &Spread<'_>) -> Option<f64> {
+    grazing_factor_of(a.normals.half_angle_with(&b.normals))
+}
+
+fn grazing_factor_of(half_angle: f64) -> Option<f64> {
+    let sine = libm::sin(half_angle.min(std::f64::consts::FRAC_PI_2));
+    (sine <= NEAR_FLAT).then_some(GRAZING * sine * sine)
 }
 
 /// Exchange of two ends without occlusion.

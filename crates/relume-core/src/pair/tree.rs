@@ -27,6 +27,8 @@ pub enum CullReason {
     NoReceiver,
     /// The ends touch, and other surfaces in their plane show in place of all that they have in common.
     Covered,
+    /// A group paired with itself that is near-flat: what its facets exchange is left out.
+    Grazing,
 }
 
 /// State of a pair at this instant.
@@ -53,7 +55,7 @@ impl State {
         matches!(self, State::Refined(_) | State::RefinedSelf)
     }
 
-    const ALL: [State; 10] = [
+    const ALL: [State; 11] = [
         State::New,
         State::Active,
         State::Refined(Side::A),
@@ -64,6 +66,7 @@ impl State {
         State::Culled(CullReason::NoReceiver),
         State::Vacant,
         State::Culled(CullReason::Covered),
+        State::Culled(CullReason::Grazing),
     ];
 
     fn code(self) -> u32 {
@@ -78,6 +81,7 @@ impl State {
             State::Culled(CullReason::NoReceiver) => 7,
             State::Vacant => 8,
             State::Culled(CullReason::Covered) => 9,
+            State::Culled(CullReason::Grazing) => 10,
         }
     }
 }

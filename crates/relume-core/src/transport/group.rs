@@ -14,7 +14,8 @@
 use glam::{DVec2, DVec3};
 
 use crate::element::{
-    ElementId, Forest, GroupLeaf, Kind, WorldElement, WorldView, bilinear, bilinear_area,
+    ElementId, Forest, GroupLeaf, Kind, NormalCone, WorldElement, WorldView, bilinear,
+    bilinear_area,
 };
 use crate::geometry::{Pose, part_in_front};
 use crate::scene::BodyId;
@@ -35,6 +36,8 @@ pub struct Spread<'a> {
     pub radius: f64,
     /// Area, m2.
     pub area_m2: f64,
+    /// Cone around its normals.
+    pub normals: NormalCone,
     /// Whether it stands for light from outside.
     is_distant: bool,
     points: Points<'a>,
@@ -96,6 +99,7 @@ impl<'a> Spread<'a> {
                 centre: pose.point(group.centre),
                 radius: group.radius,
                 area_m2: forest.area_m2(id),
+                normals: NormalCone { axis: pose.direction(group.normals.axis), ..group.normals },
                 is_distant: false,
                 points: Points::Group(forest.groups().leaves_of(group), pose),
             };
@@ -104,7 +108,8 @@ impl<'a> Spread<'a> {
         let e = WorldElement::new(view, forest, id, common.is_some());
         let (centre, radius, area_m2) = (e.centre, e.radius, e.area);
         let is_distant = forest.is_distant(id);
-        Spread { id, centre, radius, area_m2, is_distant, points: Points::Element(e) }
+        let normals = NormalCone::of_one(e.plane.normal);
+        Spread { id, centre, radius, area_m2, normals, is_distant, points: Points::Element(e) }
     }
 
     /// Projected area towards the middle of another end, each point at its own place: P, m2.

@@ -195,6 +195,14 @@ pub(super) const FACING: f64 = 0.7303;
 /// - Smaller: visibilities of facets are noise
 pub(super) const FACET_RAYS: usize = 4;
 
+/// Runs of neighbouring facets of an end that have a visibility of their own, at most.
+///
+/// - Unit: runs
+/// - Tried: 256
+/// - Larger: time on finely tessellated bodies
+/// - Smaller: shadows on them are coarse
+pub(super) const RUNS_MAX: usize = 256;
+
 /// Segments that a pair with a group is sampled by.
 ///
 /// - Unit: segments

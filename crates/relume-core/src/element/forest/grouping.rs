@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::Forest;
-use crate::element::groups::{Group, GroupLeaf, Groups, Layout, NONE, Sort};
+use crate::element::groups::{Group, GroupLeaf, Groups, Layout, NONE, NormalCone, Sort};
 use crate::element::ids::{ElementId, Kind};
 use crate::element::tuning::{ACROSS_SHARE, AREA_SHARE};
 use crate::scene::Scene;
@@ -77,7 +77,8 @@ fn add(groups: &mut Groups, scene: &Scene, forest: &Forest, id: ElementId) -> bo
     groups.numbers[id.0 as usize] = groups.list.len() as u32;
     groups.ids.push(id);
     let body = forest.cluster_body(id);
-    groups.list.push(Group { leaves, centre, radius, body, is_convex, solid });
+    let normals = NormalCone::of(own.iter().map(|leaf| (leaf.normal, leaf.area_m2)));
+    groups.list.push(Group { leaves, centre, radius, body, is_convex, solid, normals });
     is_convex
 }
 

@@ -6,8 +6,9 @@ use crate::scene::{BodyId, PatchId};
 use crate::transport::kernel::Simd;
 use crate::transport::segments::{EDGE_OVERLAP, SEGMENTS, SegmentBundle};
 use glam::DVec3;
+use std::ops::Range;
 
-use super::super::tuning::{FACET_RAYS, GROUP_SEGMENTS};
+use super::super::tuning::{FACET_RAYS, GROUP_SEGMENTS, RUNS_MAX};
 use super::{Placing, Points, Spread, Towards, factor, scrambled};
 
 /// Query for the occluders between two ends of which one is a group.
@@ -202,6 +203,27 @@ impl Aims {
     fn at(&self, share: f64) -> usize {
         self.sums.partition_point(|&sum| sum <= share).min(self.facets.len() - 1)
     }
+
+    /// How many runs the facets are seen in: of one facet each, or of neighbours where there are very many.
+    fn runs(&self) -> usize {
+        self.facets.len().min(RUNS_MAX)
+    }
+
+    /// Run that a facet is in.
+    fn run_of(&self, facet: usize) -> usize {
+        facet * self.runs() / self.facets.len()
+    }
+
+    /// The facets of a run.
+    fn run(&self, k: usize) -> Range<usize> {
+        let from = |k: usize| (k * self.facets.len()).div_ceil(self.runs());
+        from(k)..from(k + 1)
+    }
+
+    /// What a run weighs, relative to the mean facet.
+    fn run_weight(&self, k: usize) -> f64 {
+        self.weights[self.run(k)].iter().sum()
+    }
 }
 
 /// A point that a ray starts from or ends on.
@@ -228,11 +250,17 @@ impl Tally {
         self.clear[k] += if clear { weight } else { 0.0 };
     }
 
-    /// Visibility of each facet of an end: the mean where little is known of it.
-    fn by_facet(&self, (own, aims): (&Spread<'_>, &Aims), mean: f64, doubt: f64) -> Vec<f32> {
+    /// Visibility of each facet of an end, which is counted at the place that `place` says: the mean where little is known of it.
+    fn by_facet(
+        &self,
+        (own, aims): (&Spread<'_>, &Aims),
+        place: impl Fn(usize) -> usize,
+        (mean, doubt): (f64, f64),
+    ) -> Vec<f32> {
         let Points::Group(leaves, _) = &own.points else { return Vec::new() };
         let mut out = vec![mean as f32; leaves.len()];
-        for (k, &facet) in aims.facets.iter().enumerate() {
+        for (n, &facet) in aims.facets.iter().enumerate() {
+            let k = place(n);
             let (clear, all) = (self.clear[k] + doubt * mean, self.all[k] + doubt);
             out[facet as usize] = if all > 0.0 { (clear / all) as f32 } else { mean as f32 };
         }
@@ -242,7 +270,7 @@ impl Tally {
 
 /// A line of sight between facets of two ends.
 struct Ray {
-    /// Which facet of the end that has more of them, and which of the other, by their places among those that face.
+    /// Which run of facets of the end that has more of them, and which facet of the other, by its place among those that face.
     facets: (usize, usize),
     from: Aim,
     to: Aim,
@@ -277,7 +305,7 @@ impl<'a> Rays<'a> {
 
     /// All of them that leave and arrive on the sides that face.
     fn all<'s>(&'s self, sight: &'s GroupSight<'_>) -> impl Iterator<Item = Ray> + 's {
-        let count = self.aims.0.facets.len();
+        let count = self.aims.0.runs();
         let each = (RAYS.0.div_ceil(count)).max(FACET_RAYS).min((RAYS.1 / count).max(1));
         let (many, few) = self.ends;
         let ray = move |(round, k): (usize, usize)| {
@@ -285,7 +313,9 @@ impl<'a> Rays<'a> {
             let within = unit((k as u32).reverse_bits() ^ turn);
             let share = (((round + k) % each) as f64 + within) / each as f64;
             let key = self.key.wrapping_add((round * count + k) as u64);
-            let from = sight.aim((many, few), self.aims.0.facets[k], key);
+            let run = self.aims.0.run(k);
+            let facet = run.start + scrambled(key, 1) as usize % run.len();
+            let from = sight.aim((many, few), self.aims.0.facets[facet], key);
             let j = self.aims.1.at(share);
             let key = key.rotate_left(32) ^ self.key;
             let to = sight.aim((few, many), self.aims.1.facets[j], key);
@@ -305,7 +335,8 @@ impl GroupSight<'_> {
         let (many, few) = rays.ends;
         let (of_many, of_few) = (&rays.aims.0, &rays.aims.1);
         let (mut seen_many, mut seen_few) =
-            (Tally::new(of_many.facets.len()), Tally::new(of_few.facets.len()));
+            (Tally::new(of_many.runs()), Tally::new(of_few.facets.len()));
+        let weights: Vec<f64> = (0..of_many.runs()).map(|k| of_many.run_weight(k)).collect();
         let (mut stack, mut clear_sum, mut sum) = (Vec::with_capacity(64), 0.0, 0.0);
         let mut all = rays.all(self).peekable();
         while all.peek().is_some() {
@@ -315,7 +346,7 @@ impl GroupSight<'_> {
             for (n, Ray { facets: (k, j), from, to }) in bundle.into_iter().enumerate() {
                 let clear = blocked >> n & 1 == 0;
                 let weight = from.weight * to.weight;
-                let of_ray = weight * of_many.weights[k];
+                let of_ray = weight * weights[k];
                 seen_many.add(k, weight, clear);
                 seen_few.add(j, of_ray, clear);
                 sum += of_ray;
@@ -326,8 +357,9 @@ impl GroupSight<'_> {
             return FacetSight::default();
         }
         let mean = clear_sum / sum;
-        let of_many = seen_many.by_facet((many, of_many), mean, 0.0);
-        let of_few = seen_few.by_facet((few, of_few), mean, 1.0);
+        let run_of = |n| of_many.run_of(n);
+        let of_many = seen_many.by_facet((many, of_many), run_of, (mean, 0.0));
+        let of_few = seen_few.by_facet((few, of_few), |n| n, (mean, 1.0));
         let of_facets = if rays.swapped { [of_few, of_many] } else { [of_many, of_few] };
         FacetSight { mean, of_facets }
     }

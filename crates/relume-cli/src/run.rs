@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
-use relume::export::{probe, write_atomically, write_glb};
+use relume::export::{glb, probe, write_atomically};
 use relume::scene::{BodyId, Light, MaterialId, Scene};
 use relume::session::{Energy, Options, Session, SessionError, Snapshot};
 use relume_picture::picture::{self, Exposure};
@@ -48,12 +48,7 @@ pub(crate) fn demo(args: DemoArgs) -> Result<(), Failure> {
     let scene = (demo.build)().map_err(scene_file::failure)?;
     make_directory(&dir)?;
     let path = dir.join(format!("{}.glb", demo.name));
-    {
-        let _guard = interrupt::writing();
-        write_glb(&scene, &path).map_err(|error| {
-            Failure::new(error).help("choose another place with -o, or check its permissions")
-        })?;
-    }
+    write_demo(&scene, &dir, &path)?;
     let job = Job {
         scene: path,
         dir: Some(dir),
@@ -65,6 +60,18 @@ pub(crate) fn demo(args: DemoArgs) -> Result<(), Failure> {
         solve: args.solve,
     };
     job.run()
+}
+
+/// Writes the scene of a demonstration into a folder where no other run writes, unless another file has its name.
+fn write_demo(scene: &Scene, dir: &Path, path: &Path) -> Result<(), Failure> {
+    let _lock = Lock::take(dir)?;
+    let bytes = glb(scene).map_err(Failure::new)?;
+    if fs::read(path).is_ok_and(|there| there != bytes) {
+        return Err(Failure::new(format_args!("{} is another scene", path.display()))
+            .help("move it away, or name another directory with -o"));
+    }
+    let _guard = interrupt::writing();
+    write_atomically(path, &bytes).map_err(|error| Failure::write(path, &error))
 }
 
 /// `relume render`
@@ -796,7 +803,9 @@ fn make_directory(dir: &Path) -> Result<(), Failure> {
         return Err(Failure::new(format_args!("{} is a file, not a directory", dir.display()))
             .help("choose another directory with -o"));
     }
-    fs::create_dir_all(dir).map_err(|error| Failure::write(dir, &error))
+    // Without a dot at its end, which names nothing while the folder is not there.
+    let to_make: PathBuf = dir.components().collect();
+    fs::create_dir_all(to_make).map_err(|error| Failure::write(dir, &error))
 }
 
 #[cfg(test)]

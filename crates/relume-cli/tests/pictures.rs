@@ -63,6 +63,24 @@ fn a_demonstration_writes_scene_pictures_and_report() {
     assert_eq!(&png[16..24], [0, 0, 0, 64, 0, 0, 0, 48]);
 }
 
+/// Nor does a dot at the end of a folder that is not there yet stop it.
+#[test]
+fn a_demonstration_leaves_another_scene_of_its_name_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("new").join(".");
+    let out = out.to_str().unwrap();
+    let run = || relume(&["demo", "room", "-o", out, "--frames", "0"]);
+    succeeded(&run());
+    succeeded(&run());
+    let scene = dir.path().join("new").join("room.glb");
+    fs::write(&scene, "my own").unwrap();
+    let refused = run();
+    assert!(!refused.status.success());
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(said.contains("room.glb is another scene") && said.contains("-o"), "{said}");
+    assert_eq!(fs::read_to_string(&scene).unwrap(), "my own");
+}
+
 #[test]
 fn parts_of_a_clip_match_the_whole() {
     part_matches_whole(&[]);

@@ -363,6 +363,82 @@ fn a_lamp_in_a_ceiling_but_for_a_rounding_loses_no_light() {
     }
 }
 
+/// A lamp in the plane of a ceiling of tiles as large as it is, smaller or larger, before or after them in the file.
+#[test]
+fn a_lamp_in_the_plane_of_tiles_shows_before_them() {
+    let emitted = |tiles: u32, first: bool, two_sided: bool| {
+        let mut b = SceneBuilder::new("tiles");
+        let grey = b.material("grey", [0.6; 3], [0.0; 3]);
+        let tile = match two_sided {
+            true => b.double_sided_material("tile", [0.6; 3], [0.0; 3]),
+            false => grey,
+        };
+        let glow = b.material("glow", [0.5; 3], [10.0; 3]);
+        let add_lamp = |b: &mut SceneBuilder| {
+            let lamp = b.node("lamp", None, DVec3::ZERO, DQuat::IDENTITY);
+            b.polygon(lamp, "lamp", glow, &flipped(facing_up([-0.5, 0.5], [-0.5, 0.5], 1.0)));
+        };
+        if first {
+            add_lamp(&mut b);
+        }
+        for (k, side) in open_box(DVec3::ZERO, v(2.0, 2.0, 1.0), &[5]).iter().enumerate() {
+            let node = b.node(&format!("wall {k}"), None, DVec3::ZERO, DQuat::IDENTITY);
+            b.polygon(node, "wall", grey, side);
+        }
+        let node = b.node("ceiling", None, DVec3::ZERO, DQuat::IDENTITY);
+        let width = 4.0 / f64::from(tiles);
+        for (x, y) in (0..tiles).flat_map(|x| (0..tiles).map(move |y| (x, y))) {
+            let from = |k: u32| -2.0 + width * f64::from(k);
+            let tile_at = facing_up([from(x), from(x + 1)], [from(y), from(y + 1)], 1.0);
+            b.polygon(node, "ceiling", tile, &flipped(tile_at));
+        }
+        if !first {
+            add_lamp(&mut b);
+        }
+        let [emitted, absorbed, escaped] = energies(b.build().unwrap(), &[0.0])[0];
+        let lost = (emitted - absorbed - escaped) / emitted;
+        assert!(lost.abs() < 0.01, "{tiles} tiles: {lost} of {emitted} W are lost");
+        emitted
+    };
+    for (tiles, two_sided) in [1, 3, 4, 8].into_iter().flat_map(|n| [(n, false), (n, true)]) {
+        for first in [false, true] {
+            let power_w = emitted(tiles, first, two_sided);
+            assert!(
+                (power_w / 30.0 - 1.0).abs() < 1e-3,
+                "{tiles} {two_sided} {first}: {power_w} W"
+            );
+        }
+    }
+}
+
+/// A double-sided lamp from a tenth of a micrometre to ten before a tile of its size: none of the light of its back is lost, or made.
+#[test]
+fn a_lamp_close_before_a_tile_of_its_size_loses_no_light() {
+    for (gap_m, two_sided) in [1e-7, 2.4e-7, 5e-7, 1e-6, 2e-6, 4e-6, 1e-5]
+        .into_iter()
+        .flat_map(|gap_m| [(gap_m, false), (gap_m, true)])
+    {
+        let mut b = SceneBuilder::new("tile");
+        let grey = b.material("grey", [0.6; 3], [0.0; 3]);
+        let tile = b.double_sided_material("tile", [0.6; 3], [0.0; 3]);
+        let tile = if two_sided { tile } else { grey };
+        let glow = b.double_sided_material("glow", [0.5; 3], [10.0; 3]);
+        for (k, side) in open_box(DVec3::ZERO, v(2.0, 2.0, 1.0), &[]).iter().enumerate() {
+            let node = b.node(&format!("wall {k}"), None, DVec3::ZERO, DQuat::IDENTITY);
+            b.polygon(node, "wall", grey, side);
+        }
+        let square = flipped(facing_up([-0.5, 0.5], [-0.5, 0.5], 0.5));
+        for (name, material, z) in [("tile", tile, 0.0), ("lamp", glow, -gap_m)] {
+            let node = b.node(name, None, v(0.0, 0.0, z), DQuat::IDENTITY);
+            b.polygon(node, name, material, &square);
+        }
+        let [emitted, absorbed, escaped] = energies(b.build().unwrap(), &[0.0])[0];
+        let lost = (emitted - absorbed - escaped) / emitted;
+        assert!(lost.abs() < 0.01, "{gap_m} m, {two_sided}: {lost} of {emitted} W are lost");
+        assert!(absorbed > 29.0, "{gap_m} m, {two_sided}: {absorbed} W");
+    }
+}
+
 /// A panel some micrometres before a wall of a room: a smaller one, and one as large as the wall, from one side or both.
 #[test]
 fn panels_close_before_walls_lose_no_light() {

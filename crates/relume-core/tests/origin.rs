@@ -96,6 +96,13 @@ fn what_lies_near_the_origin_stays_and_what_stays_far_is_told() {
 }
 
 #[test]
+fn what_lies_further_out_than_any_scene_may_be_is_refused() {
+    let refused = Scene::from_draft(draft(v(1e39, 0.0, 0.0), true)).unwrap_err().to_string();
+    assert!(refused.contains("1e39") && refused.contains("more than 1e12"), "{refused}");
+    assert!(Scene::from_draft(draft(v(1e9, 0.0, 0.0), true)).is_ok());
+}
+
+#[test]
 fn corners_far_out_in_their_meshes_are_coarse() {
     let mut far = draft(DVec3::ZERO, true);
     for corner in far.nodes.iter_mut().flat_map(|n| &mut n.surfaces).flat_map(|s| &mut s.polygons) {

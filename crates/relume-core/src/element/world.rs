@@ -21,6 +21,8 @@ pub struct WorldPatch {
     pub twin: Option<PatchId>,
     /// How far a corner of this patch may be off its exact place, metres.
     pub rounding_m: f64,
+    /// Whether it emits at any time.
+    pub shines: bool,
 }
 
 /// A polygon that blocks light, with the planes that bound it.
@@ -129,8 +131,7 @@ impl WorldView {
     /// The scene as it is in a world. Cost: proportional to the patches.
     pub fn new(scene: &Scene, forest: &Forest, now: &World) -> WorldView {
         let poses = now.poses().to_vec();
-        let is_distant = |p: &crate::scene::Patch| scene.is_distant(p.body);
-        let patches = scene.patches.iter().map(|p| world_patch(p, &poses, is_distant(p))).collect();
+        let patches = scene.patches.iter().map(|p| world_patch(scene, p, &poses)).collect();
         let still = vec![Some(Pose::IDENTITY); poses.len()];
         let world = Occluders::of(scene, &poses);
         let local = Occluders::of(scene, &still);
@@ -258,11 +259,7 @@ fn hidden_twins(scene: &Scene) -> Vec<bool> {
 /// Rounding of what is made here in double precision, as a share of that of files.
 const FINER: f64 = 1.0 / (1 << 24) as f64;
 
-fn world_patch(
-    patch: &crate::scene::Patch,
-    poses: &[Option<Pose>],
-    is_distant: bool,
-) -> WorldPatch {
+fn world_patch(scene: &Scene, patch: &crate::scene::Patch, poses: &[Option<Pose>]) -> WorldPatch {
     let pose = poses[patch.body.0 as usize].unwrap_or(Pose::IDENTITY);
     let f = patch.frame;
     WorldPatch {
@@ -275,7 +272,8 @@ fn world_patch(
         },
         body: patch.body,
         twin: patch.twin,
-        rounding_m: patch.rounding_m() * if is_distant { FINER } else { 1.0 },
+        rounding_m: patch.rounding_m() * if scene.is_distant(patch.body) { FINER } else { 1.0 },
+        shines: scene.patch_emits(patch),
     }
 }
 

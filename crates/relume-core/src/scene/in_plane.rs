@@ -27,6 +27,8 @@ pub struct Sheet {
     pub area_m2: f64,
     /// Rounding of its corners in single precision, metres.
     pub rounding_m: f64,
+    /// Whether it emits at any time.
+    pub shines: bool,
 }
 
 /// How a polygon lies to the plane of an end that it is close to.
@@ -42,8 +44,9 @@ impl Sheet {
     /// How this patch lies to another one in its plane; `opposed` if it faces the other way.
     ///
     /// A closed body touches what it stands on: where its face lies in the plane of another surface and looks at it, each
-    /// hides the other from everything else. Of two surfaces in one plane that face the same way, the smaller shows and
-    /// hides the larger (a rug on a floor); of equal ones the first. Two rooms that share a wall's plane are back to back:
+    /// hides the other from everything else. Of two surfaces in one plane that face the same way, one that emits shows and
+    /// hides one that does not (a lamp in a ceiling of tiles); of others the smaller hides the larger (a rug on a floor), of equal ones the
+    /// first the second. Two rooms that share a wall's plane are back to back:
     /// neither wall hides the other.
     pub fn lies_to(&self, end: &Sheet, opposed: bool) -> InPlane {
         if self.twin == Some(end.patch) {
@@ -74,13 +77,15 @@ impl Sheet {
 
     /// How this patch lies to another one that is in its plane, or nearly. Where they are further apart than the smaller of their
     /// roundings, the one in front shows and hides the other if that faces the same way (of a two-sided one the side that does), whatever
-    /// their sizes; otherwise as [`Sheet::lies_to`]. Visibility and coverage both ask this, so that they agree.
+    /// their sizes, and touches it if they look at each other; otherwise as [`Sheet::lies_to`]. Visibility and coverage both ask this, so that they agree.
     pub fn lies_at(&self, end: &Sheet, Lying { opposed, height_m }: Lying) -> InPlane {
         let told_apart_m = self.rounding_m.min(end.rounding_m);
         let lies = self.lies_to(end, opposed);
         let may_show = !opposed || (self.twin.is_some() && lies != InPlane::Touches);
         match lies {
             _ if may_show && height_m.lo > told_apart_m => InPlane::Covers,
+            // They look at each other.
+            _ if height_m.lo > told_apart_m => InPlane::Touches,
             _ if !opposed && height_m.hi < -told_apart_m => InPlane::Apart,
             InPlane::Covers if height_m.hi < -told_apart_m => InPlane::Apart,
             lies => lies,
@@ -90,6 +95,9 @@ impl Sheet {
     /// Whether of two coincident patches that face the same way, or whose other sides do, this one shows.
     fn shows_before(&self, other: &Sheet) -> bool {
         let first = |s: &Sheet| s.twin.map_or(s.patch, |twin| twin.min(s.patch));
+        if self.shines != other.shines {
+            return self.shines;
+        }
         match (no_smaller(self.area_m2, other.area_m2), no_smaller(other.area_m2, self.area_m2)) {
             (true, true) => first(self) < first(other),
             (is_larger, _) => !is_larger,

@@ -4,6 +4,7 @@
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use super::draft::{Draft, DraftNode};
+use super::limits::COORDINATE_MAX_M;
 use super::tuning::{FAR, FAR_CORNERS};
 use super::{Interpolation, Note, Severity};
 
@@ -29,7 +30,8 @@ pub(super) fn bring_near(draft: &mut Draft, notes: &mut Vec<Note>) -> DVec3 {
     }
     let middle = low.midpoint(high);
     let far_m = middle.abs().max_element();
-    if far_m <= FAR * size_m {
+    // What is further out than any scene may be is refused for that, not moved.
+    if far_m <= FAR * size_m || far_m > COORDINATE_MAX_M {
         return DVec3::ZERO;
     }
     if !draft.near_origin {

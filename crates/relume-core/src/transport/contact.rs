@@ -19,6 +19,7 @@ pub fn in_plane(
         enclosure: forest.enclosure(patch),
         area_m2: forest.area_m2(forest.patch_root(patch)),
         rounding_m: view.patch(patch).rounding_m,
+        shines: view.patch(patch).shines,
     };
     sheet(patch).lies_at(&sheet(end), lying)
 }

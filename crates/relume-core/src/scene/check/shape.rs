@@ -336,9 +336,9 @@ fn overlaps(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
     }
     for (name, (count, with)) in found {
         let message = format!(
-            "{count} polygons overlap polygons of {} in one plane and face the same way (they are coplanar): the \
-             smaller is taken to lie on the larger, of equal ones the first; raise by a millimetre what is to be on \
-             top, or cut the other out beneath it",
+            "{count} polygons overlap polygons of {} in one plane and face the same way (they are coplanar): what \
+             emits is taken to lie on what does not, else the smaller on the larger, of equal ones the first; raise by a millimetre \
+             what is to be on top, or cut the other out beneath it",
             listed(&with)
         );
         notes.push(note(Severity::Warning, "overlap", name, count, message));
@@ -434,8 +434,8 @@ fn duplicates(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
     }
     for (object, (count, with)) in doubled {
         let message = format!(
-            "{count} polygons coincide with polygons of {} and face the same way: the first of each shows, the others count as \
-             covered, so that no light is exchanged twice; delete one of each",
+            "{count} polygons coincide with polygons of {} and face the same way: what emits shows, or else the first of each, and the \
+             others count as covered, so that no light is exchanged twice; delete one of each",
             listed(&with)
         );
         notes.push(note(Severity::Warning, "duplicate", object, count, message));

@@ -73,7 +73,8 @@ impl Direct {
             }
             let own = PatchId(k as u32);
             for corners in Blocker::parts(&corners(k, frame)) {
-                known.push(Known { patch: own, twin: patch.twin, area_m2: patch.area_m2() });
+                let (twin, area_m2) = (patch.twin, patch.area_m2());
+                known.push(Known { patch: own, twin, area_m2, shines: scene.patch_emits(patch) });
                 boxes.push(Aabb::of(corners.iter().copied()));
                 let plane = Plane::through(frame.origin, frame.normal);
                 blockers.push(Blocker { plane, corners });

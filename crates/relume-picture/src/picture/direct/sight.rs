@@ -48,6 +48,8 @@ pub(super) struct Known {
     pub(super) patch: PatchId,
     pub(super) twin: Option<PatchId>,
     pub(super) area_m2: f64,
+    /// Whether it emits at any time.
+    pub(super) shines: bool,
 }
 
 /// A flat piece of a surface.
@@ -238,7 +240,7 @@ impl Surroundings {
         }
     }
 
-    /// Whether a patch lies on a lamp, in its plane, and hides what it covers: of what faces the same way the smaller does, as in
+    /// Whether a patch lies on a lamp, in its plane, and hides what it covers: of what faces the same way the smaller lamp does, as in
     /// the solution, and what faces the lamp and has one side does.
     fn lies_on(&self, blocker: u32, lamp: &Lamp) -> bool {
         let (known, of) = (&self.known[blocker as usize], &self.blockers[blocker as usize]);
@@ -248,7 +250,8 @@ impl Surroundings {
             return false;
         }
         let is_smaller = known.area_m2 < lamp.area_m2 * (1.0 - 1e-6);
-        is_smaller || (known.twin.is_none() && of.plane.normal.dot(lamp.plane.normal) < 0.0)
+        (known.shines && is_smaller)
+            || (known.twin.is_none() && of.plane.normal.dot(lamp.plane.normal) < 0.0)
     }
 
     /// What of the patches found stands between a receiver and something convex: the parts before both planes.

@@ -26,6 +26,7 @@ mod memory;
 mod notes;
 mod output;
 mod outside;
+mod overwrite;
 mod paper;
 mod plan;
 mod preview;
@@ -68,6 +69,7 @@ fn main() -> ExitCode {
 }
 
 fn execute(command: Command) -> Result<(), Failure> {
+    overwrite::refuse(&command)?;
     match command {
         Command::Info(args) => info::info(&args),
         Command::Check(args) => check::check(&args),

@@ -247,6 +247,31 @@ fn a_coordinate_that_is_out_of_range_is_named_with_its_line() {
 }
 
 #[test]
+fn what_a_command_reads_it_does_not_write_over() {
+    let (dir, scene) = room();
+    let sensors = dir.path().join("sensors.txt");
+    fs::write(&sensors, "0 0.5 0 0 1 0\n").unwrap();
+    let before = (fs::read(&scene).unwrap(), fs::read(&sensors).unwrap());
+    // By another way to the same file.
+    let again = dir.path().join(".").join(scene.file_name().unwrap());
+    let (scene_at, again, sensors_at) = (text(&scene), text(&again), text(&sensors));
+    for arguments in [
+        &["export", scene_at, "-o", again][..],
+        &["solve", scene_at, "--report", again],
+        &["solve", scene_at, "--events", scene_at],
+        &["render", scene_at, "-o", text(&dir.path().join("out")), "--report", scene_at],
+        &["factors", scene_at, "-o", scene_at],
+        &["factors", scene_at, "--report", scene_at],
+        &["bench", scene_at, "--json", scene_at],
+        &["probe", scene_at, sensors_at, "-o", sensors_at],
+        &["probe", scene_at, sensors_at, "-o", again],
+    ] {
+        soon(arguments).fails(1, &["is read by this command", "name another file"]);
+    }
+    assert!((fs::read(&scene).unwrap(), fs::read(&sensors).unwrap()) == before);
+}
+
+#[test]
 fn files_by_absolute_address_are_told_from_the_network() {
     let dir = tempfile::tempdir().unwrap();
     let elsewhere = tempfile::tempdir().unwrap();

@@ -439,6 +439,51 @@ fn a_lamp_close_before_a_tile_of_its_size_loses_no_light() {
     }
 }
 
+/// A lamp in the plane of a ceiling that looks out of the room: nothing arrives, and no work is done for what is not there.
+#[test]
+fn a_lamp_that_faces_out_of_its_ceiling_emits_nothing() {
+    let mut b = SceneBuilder::new("uplight");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.0; 3], [10.0; 3]);
+    let node = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.cuboid_inward(node, "room", grey, DVec3::ZERO, v(4.0, 4.0, 3.0));
+    let lamp = b.node("lamp", None, v(2.0, 2.0, 3.0), DQuat::IDENTITY);
+    b.polygon(lamp, "lamp", glow, &facing_up([-0.5, 0.5], [-0.5, 0.5], 0.0));
+    let mut session = Session::new(b.build().unwrap(), at_tolerance(0.1)).unwrap();
+    let frame = session.solve_at(0.0).unwrap();
+    let energy = frame.report().energy.unwrap();
+    assert_eq!((energy.emitted_w, energy.absorbed_w), (0.0, 0.0));
+    assert!(frame.report().links < 20_000, "{}", frame.report().links);
+}
+
+/// A crate that slides over a lamp in the floor's plane and off it again.
+#[test]
+fn a_lamp_that_a_crate_slides_over_goes_out_and_on_again() {
+    let mut b = SceneBuilder::new("covered lamp");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.0; 3], [10.0; 3]);
+    let node = b.node("room", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.cuboid_inward(node, "room", grey, DVec3::ZERO, v(4.0, 4.0, 3.0));
+    let lamp = b.node("lamp", None, v(2.0, 2.0, 0.0), DQuat::IDENTITY);
+    b.polygon(lamp, "lamp", glow, &facing_up([-0.2, 0.2], [-0.2, 0.2], 0.0));
+    let over = b.node("crate", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.cuboid(over, "crate", grey, v(-0.5, 1.5, 0.0), v(0.5, 2.5, 0.8));
+    let values = [1.0, 2.0, 3.0].map(|x| v(x, 0.0, 0.0)).to_vec();
+    let interpolation = Interpolation::Linear;
+    b.animate_translation(over, Track { times_s: vec![0.0, 1.0, 2.0], values, interpolation });
+    let scene = b.build().unwrap();
+    let times_s = [0.0, 1.0, 2.0, 1.0];
+    let warm = energies(scene.clone(), &times_s);
+    for (&time_s, warm) in times_s.iter().zip(&warm) {
+        let cold = energies(scene.clone(), &[time_s])[0];
+        for k in 0..2 {
+            assert!((warm[k] - cold[k]).abs() <= 1e-3 * cold[k], "{time_s} s: {warm:?} {cold:?}");
+        }
+    }
+    assert_eq!(warm[1][..2], [0.0, 0.0]);
+    assert!(warm[0][0] > 1.0 && warm[2][0] > 1.0, "{warm:?}");
+}
+
 /// A panel some micrometres before a wall of a room: a smaller one, and one as large as the wall, from one side or both.
 #[test]
 fn panels_close_before_walls_lose_no_light() {

@@ -84,13 +84,13 @@ fn a_sheet_that_lies_on_a_lamp_hides_it() {
     let half = at_the_origin(|b| add(b, "sheet", std::slice::from_ref(&sheet)));
     let open = at_the_origin(|_| ());
     assert!((half - 0.5 * open).abs() < 1e-6, "{half} {open}");
-    // The other way round it faces as the lamp does: the smaller of two surfaces in one plane shows.
-    let along = at_the_origin(|b| {
-        let mut corners = sheet.clone();
-        corners.reverse();
-        add(b, "sheet", &[corners]);
-    });
-    assert!((along - 0.5 * open).abs() < 1e-6, "{along} {open}");
+    // The other way round it faces as the lamp does: the smaller of two surfaces in one plane shows, and the lamp counts as a fifth.
+    let along = |x: [f64; 2]| {
+        at_the_origin(|b| add(b, "sheet", &[flipped(facing_up(x, [-1.0, 1.0], 2.0)).to_vec()]))
+    };
+    assert!((along([-1.0, 0.0]) - open).abs() < 1e-6, "{} {open}", along([-1.0, 0.0]));
+    let hidden = [along([-1.0, -0.7]), along([0.7, 1.0])];
+    assert!(hidden[0] < 0.95 * open && (hidden[0] - hidden[1]).abs() < 1e-6, "{hidden:?} {open}");
 }
 
 /// The dark side of a door leaf with both sides, turned by 22 degrees, at a place of seven digits that lies 1e-7 m behind it: it

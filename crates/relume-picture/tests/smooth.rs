@@ -150,7 +150,7 @@ fn lamps_and_blockers_of_many_corners_are_found_exactly() {
     assert!(partly > 20 && clear > 20, "{partly} {clear}");
 }
 
-/// A plate lies on half of a lamp in the floor, in its plane, and a box stands on another part: what they cover does not shine. The floor
+/// Plates lie on half of a lamp in the floor, in its plane, and a box stands on another part: what they cover does not shine. The floor
 /// around the lamp, larger and in its plane, covers nothing.
 #[test]
 fn what_lies_on_a_lamp_hides_it() {
@@ -162,7 +162,11 @@ fn what_lies_on_a_lamp_hides_it() {
         let flat = |x: [f64; 2]| side(v(x[0], -1.0, 1.0), v(x[1], 0.0, 3.0), Side::Ceiling);
         body(&mut scene, &[(flat([1.0, 3.0]), glow)]);
         if on_it.contains(&"plate") {
-            body(&mut scene, &[(flat([1.0, 2.0]), grey)]);
+            // Smaller than a fifth of the lamp each.
+            for k in 0..4 {
+                let from = 1.0 + 0.25 * f64::from(k);
+                body(&mut scene, &[(flat([from, from + 0.25]), grey)]);
+            }
         }
         if on_it.contains(&"box") {
             solid(&mut scene, v(2.0, 0.0, 1.0), v(3.0, 1e-3, 3.0), grey);

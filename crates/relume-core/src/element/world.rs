@@ -21,8 +21,8 @@ pub struct WorldPatch {
     pub twin: Option<PatchId>,
     /// How far a corner of this patch may be off its exact place, metres.
     pub rounding_m: f64,
-    /// Whether it emits at any time.
-    pub shines: bool,
+    /// [`Scene::lying_m2`].
+    pub lying_m2: f64,
 }
 
 /// A polygon that blocks light, with the planes that bound it.
@@ -273,7 +273,7 @@ fn world_patch(scene: &Scene, patch: &crate::scene::Patch, poses: &[Option<Pose>
         body: patch.body,
         twin: patch.twin,
         rounding_m: patch.rounding_m() * if scene.is_distant(patch.body) { FINER } else { 1.0 },
-        shines: scene.patch_emits(patch),
+        lying_m2: scene.lying_m2(patch),
     }
 }
 

@@ -465,6 +465,7 @@ impl SpaceJudge<'_> {
                 }
                 false => self.forest.area_m2(self.forest.patch_root(self.patch_of(id))),
             },
+            alike_area: self.forest.alike_m2(self.patch_of(id)),
         };
         [end(pair.ids.0, place_a.area), end(pair.ids.1, place_b.area)]
     }
@@ -831,7 +832,14 @@ impl SpaceJudge<'_> {
             (Stage::Fine(brightness), Oracle::Error { threshold }) => {
                 let end = |id, area, reference_area| {
                     let light = brightness.of(self.forest, id);
-                    End { area, reference_area, light, own_area: 0.0, surface_area: 0.0 }
+                    End {
+                        area,
+                        reference_area,
+                        light,
+                        own_area: 0.0,
+                        surface_area: 0.0,
+                        alike_area: 0.0,
+                    }
                 };
                 let receiver = end(element, e.area, self.reference_area(brightness, element));
                 let source = end(light, 0.0, f64::INFINITY);

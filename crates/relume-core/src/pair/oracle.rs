@@ -39,6 +39,8 @@ pub(super) struct End {
     pub(super) own_area: f64,
     /// Area of the surface that it is a part of and that may send alike: of its patch, or of the sky; m2.
     pub(super) surface_area: f64,
+    /// Area of what it is connected with that emits as it does, or as it does not; m2.
+    pub(super) alike_area: f64,
 }
 
 /// Norm that errors are measured in.
@@ -226,8 +228,11 @@ fn one_way(
     let Brightness { radiosity, reflected, .. } = source.light;
     let varies = SOURCE_VARIATION * (source.area / link.reference_area).min(4.0);
     // What a small source does unevenly its neighbours do too, in the same sense: splitting the
-    // source does not mend it, so it counts as if the source were as large as the receiver.
-    let whole = |area: f64| if source.area > 0.0 { (area / source.area).max(1.0) } else { 1.0 };
+    // source does not mend it, so it counts as if the source were as large as the receiver, or as all that is like it.
+    let whole = |area: f64| match source.area > 0.0 {
+        true => (area.min(source.alike_area) / source.area).max(1.0),
+        false => 1.0,
+    };
     let (whole, in_shadow) = (whole(receiver.area), whole(receiver.area.min(link.shadow)));
     let alike = EDGE * link.alike(receiver, source).max(in_shadow);
     let edge = alike * (radiosity - reflected) + alike.max(EDGE_REFLECTED) * reflected;

@@ -303,9 +303,8 @@ impl<'a> Group<'a> {
         let sheet = |p: &Placed| {
             let patch = &scene.patches[p.id.0 as usize];
             let enclosure = solids.enclosures[p.id.0 as usize];
-            let (area_m2, rounding_m) = (patch.area_m2(), patch.rounding_m());
-            let shines = scene.patch_emits(patch);
-            Sheet { patch: p.id, twin: patch.twin, enclosure, area_m2, rounding_m, shines }
+            let (lying_m2, rounding_m) = (scene.lying_m2(patch), patch.rounding_m());
+            Sheet { patch: p.id, twin: patch.twin, enclosure, lying_m2, rounding_m }
         };
         let opposed = p.normal.dot(q.normal) < 0.0;
         for (of, by) in [(p, q), (q, p)] {

@@ -1,6 +1,7 @@
 //! Which of two surfaces that lie in one plane hides the other. Pure bookkeeping; must not know elements.
 
-use super::{Enclosure, PatchId};
+use super::tuning::LAMP_AREA;
+use super::{Enclosure, Patch, PatchId, Scene};
 use crate::geometry::{Interval, no_smaller};
 
 /// How a polygon in the plane of an end lies to it.
@@ -23,12 +24,10 @@ pub struct Sheet {
     pub twin: Option<PatchId>,
     /// What its surface encloses.
     pub enclosure: Enclosure,
-    /// Its area, m2.
-    pub area_m2: f64,
+    /// [`Scene::lying_m2`].
+    pub lying_m2: f64,
     /// Rounding of its corners in single precision, metres.
     pub rounding_m: f64,
-    /// Whether it emits at any time.
-    pub shines: bool,
 }
 
 /// How a polygon lies to the plane of an end that it is close to.
@@ -40,13 +39,20 @@ pub struct Lying {
     pub height_m: Interval,
 }
 
+impl Scene {
+    /// Area by which it is decided which of two patches in one plane shows, m2: the smaller. A lamp counts as a fifth of its own: what
+    /// is as large or somewhat smaller is what it lies on, tiles of a ceiling, and not what lies on it.
+    pub fn lying_m2(&self, patch: &Patch) -> f64 {
+        patch.area_m2() * if self.patch_emits(patch) { LAMP_AREA } else { 1.0 }
+    }
+}
+
 impl Sheet {
     /// How this patch lies to another one in its plane; `opposed` if it faces the other way.
     ///
     /// A closed body touches what it stands on: where its face lies in the plane of another surface and looks at it, each
-    /// hides the other from everything else. Of two surfaces in one plane that face the same way, one that emits shows and
-    /// hides one that does not (a lamp in a ceiling of tiles); of others the smaller hides the larger (a rug on a floor), of equal ones the
-    /// first the second. Two rooms that share a wall's plane are back to back:
+    /// hides the other from everything else. Of two surfaces in one plane that face the same way, the smaller shows and
+    /// hides the larger (a rug on a floor), where a lamp counts as smaller than it is; of equal ones the first. Two rooms that share a wall's plane are back to back:
     /// neither wall hides the other.
     pub fn lies_to(&self, end: &Sheet, opposed: bool) -> InPlane {
         if self.twin == Some(end.patch) {
@@ -95,10 +101,8 @@ impl Sheet {
     /// Whether of two coincident patches that face the same way, or whose other sides do, this one shows.
     fn shows_before(&self, other: &Sheet) -> bool {
         let first = |s: &Sheet| s.twin.map_or(s.patch, |twin| twin.min(s.patch));
-        if self.shines != other.shines {
-            return self.shines;
-        }
-        match (no_smaller(self.area_m2, other.area_m2), no_smaller(other.area_m2, self.area_m2)) {
+        let [own, others] = [self, other].map(|sheet| sheet.lying_m2);
+        match (no_smaller(own, others), no_smaller(others, own)) {
             (true, true) => first(self) < first(other),
             (is_larger, _) => !is_larger,
         }

@@ -452,3 +452,11 @@ pub(super) const FAR_CORNERS: f64 = 256.0;
 /// - Larger: bright things among surfaces that glow light what is close to them unseen
 /// - Smaller: time where everything glows: with 0 each pair of a model of 66,715 patches that all glow looked at thousands of lamps
 pub(super) const LAMP_LEAST: f64 = 4.0;
+
+/// Area that a lamp counts as where it lies in one plane with others, of which the smaller shows, over its own.
+///
+/// - Unit: 1
+/// - Tried: 0.2; 1
+/// - Larger: lamps in ceilings of tiles of their size are hidden
+/// - Smaller: what lies on lamps is hidden
+pub(super) const LAMP_AREA: f64 = 0.2;

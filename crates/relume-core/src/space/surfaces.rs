@@ -23,11 +23,16 @@ pub(crate) struct LitForest<'a> {
 impl<'a> LitForest<'a> {
     pub(crate) fn new(scene: &Scene, forest: &'a Forest, now: &World) -> LitForest<'a> {
         let single = |v: [f64; 3]| v.map(|x| x as f32);
-        let of_patch = |patch: &crate::scene::Patch| {
-            let exitance = single(now.exitance(scene, patch));
+        let of_patch = |(id, patch): (PatchId, &crate::scene::Patch)| {
+            // What lies wholly on or under something sends nothing to anyone, whatever it emits.
+            let exitance = match forest.is_wholly_covered(forest.patch_root(id)) {
+                true => [0.0; 3],
+                false => single(now.exitance(scene, patch)),
+            };
             FacetMaterial { reflectance: single(now.reflectance(scene, patch)), exitance }
         };
-        let patch_materials = scene.patches.iter().map(of_patch).collect();
+        let patches = (0..).map(PatchId).zip(&scene.patches);
+        let patch_materials = patches.map(of_patch).collect();
         LitForest { forest, patch_materials, places: Vec::new(), groups: None }
     }
 

@@ -17,9 +17,8 @@ pub fn in_plane(
         patch,
         twin: view.patch(patch).twin,
         enclosure: forest.enclosure(patch),
-        area_m2: forest.area_m2(forest.patch_root(patch)),
+        lying_m2: view.patch(patch).lying_m2,
         rounding_m: view.patch(patch).rounding_m,
-        shines: view.patch(patch).shines,
     };
     sheet(patch).lies_at(&sheet(end), lying)
 }

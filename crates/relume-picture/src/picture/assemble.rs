@@ -1,8 +1,8 @@
 //! A snapshot as an ordered list of things to draw.
 //!
-//! Must not know how pixels are made or how radiosity becomes a colour. Order: patches that
-//! emit at any time first, then by area, the smallest first, then by id; leaves (or triangles) in order within, then their outlines. It
-//! decides between equally near things: of surfaces in one plane a lamp is seen, or else the smaller, as in the solution. It
+//! Must not know how pixels are made or how radiosity becomes a colour. Order: patches by
+//! [area](relume_core::scene::Scene::lying_m2), the smallest first, then by id; leaves (or triangles) in order within, then their outlines. It
+//! decides between equally near things: of surfaces in one plane the smaller is seen, as in the solution. It
 //! must not depend on threads.
 
 use std::borrow::Cow;
@@ -140,11 +140,11 @@ impl<'a> Drawing<'a> {
             .filter_map(|(i, patch)| patch.map(|patch| (i, patch)))
             .collect();
         // In single precision without its last digits: areas that rounding sets apart are equal.
-        let order = |i: usize| {
-            let patch = &snapshot.scene.patches[i];
-            (!snapshot.scene.patch_emits(patch), (patch.area_m2() as f32).to_bits() >> 4)
+        let area = |i: usize| {
+            let scene = &snapshot.scene;
+            (scene.lying_m2(&scene.patches[i]) as f32).to_bits() >> 4
         };
-        seen.sort_by_cached_key(|&(i, _)| order(i));
+        seen.sort_by_cached_key(|&(i, _)| area(i));
         let mut drawing = Drawing {
             primitives: Vec::new(),
             fills: Vec::new(),

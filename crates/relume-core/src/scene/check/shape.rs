@@ -81,6 +81,11 @@ impl Part {
         other.bounds.0.cmpge(self.bounds.0).all() && other.bounds.1.cmple(self.bounds.1).all()
     }
 
+    /// Whether a point lies within its bounds or on them.
+    fn reaches(&self, p: DVec3) -> bool {
+        p.cmpge(self.bounds.0).all() && p.cmple(self.bounds.1).all()
+    }
+
     fn contains(&self, p: DVec3) -> bool {
         p.cmpgt(self.bounds.0).all() && p.cmplt(self.bounds.1).all()
     }
@@ -336,9 +341,9 @@ fn overlaps(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
     }
     for (name, (count, with)) in found {
         let message = format!(
-            "{count} polygons overlap polygons of {} in one plane and face the same way (they are coplanar): what \
-             emits is taken to lie on what does not, else the smaller on the larger, of equal ones the first; raise by a millimetre \
-             what is to be on top, or cut the other out beneath it",
+            "{count} polygons overlap polygons of {} in one plane and face the same way (they are coplanar): the \
+             smaller is taken to lie on the larger, where a lamp counts as a fifth of its area, of equal ones the first; raise by a \
+             millimetre what is to be on top, or cut the other out beneath it",
             listed(&with)
         );
         notes.push(note(Severity::Warning, "overlap", name, count, message));
@@ -366,12 +371,17 @@ fn inside_out(scene: &Scene, topology: &Topology, parts: &[Part], notes: &mut Ve
         }
         let others = || parts.iter().enumerate().filter(|(n, _)| *n != number).map(|(_, p)| p);
         let holds = |p: &Part| part.contains(p.bounds.0) && part.contains(p.bounds.1);
-        let empty = !others().any(|p| part.contains((p.bounds.0 + p.bounds.1) / 2.0))
+        // A lamp flush in a wall is inside too.
+        let empty = !others().any(|p| part.reaches((p.bounds.0 + p.bounds.1) / 2.0))
             && !stands.iter().any(|&p| part.contains(p));
         let all_in = parts.len() > 1 && others().all(holds);
+        let is_in_a_room = || others().any(|room| room.volume < 0.0 && room.spans(part));
         let what = match part.volume < 0.0 {
             true if empty && emits_nothing(scene, topology, number) => {
                 "it is closed and faces inward, but nothing is inside"
+            }
+            true if empty && is_in_a_room() => {
+                "it is closed and shines inward, into nothing but itself"
             }
             false if all_in => {
                 "it encloses all the rest but faces outward, so from inside it is black"
@@ -434,7 +444,7 @@ fn duplicates(scene: &Scene, topology: &Topology, notes: &mut Vec<Note>) {
     }
     for (object, (count, with)) in doubled {
         let message = format!(
-            "{count} polygons coincide with polygons of {} and face the same way: what emits shows, or else the first of each, and the \
+            "{count} polygons coincide with polygons of {} and face the same way: a lamp shows, or else the first of each, the \
              others count as covered, so that no light is exchanged twice; delete one of each",
             listed(&with)
         );

@@ -196,6 +196,37 @@ fn flipped_polygons_and_objects_are_found() {
 }
 
 #[test]
+fn a_lamp_inside_out_is_named_and_a_glowing_room_is_not() {
+    let inverted = notes(|b, _, _| {
+        let glow = b.material("bright", [0.5; 3], [10.0; 3]);
+        let bulb = b.node("bulb", None, O, DQuat::IDENTITY);
+        b.cuboid_inward(bulb, "bulb", glow, I * 0.5, I * 0.6);
+    });
+    assert_eq!(found(&inverted, "flipped-normals"), [(Severity::Warning, "bulb".into(), 6)]);
+    let mut b = SceneBuilder::new("furnace");
+    let glow = b.material("bright", [0.5; 3], [10.0; 3]);
+    let room = b.node("room", None, O, DQuat::IDENTITY);
+    b.cuboid_inward(room, "walls", glow, O, I);
+    assert_eq!(found(&check(&b.build().unwrap()), "flipped-normals"), []);
+}
+
+/// The room is not empty: the lamp faces the wrong way.
+#[test]
+fn of_a_lamp_that_faces_out_of_its_ceiling_the_lamp_is_named() {
+    let mut b = SceneBuilder::new("s");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.0; 3], [10.0; 3]);
+    let room = b.node("room", None, O, DQuat::IDENTITY);
+    b.cuboid_inward(room, "walls", grey, O, I);
+    let lamp = b.node("lamp", None, DVec3::Y, DQuat::IDENTITY);
+    let corners = [(0.4, 0.4), (0.4, 0.6), (0.6, 0.6), (0.6, 0.4)];
+    b.polygon(lamp, "lamp", glow, &corners.map(|(x, z)| DVec3::new(x, 0.0, z)));
+    let notes = check(&b.build().unwrap());
+    assert_eq!(found(&notes, "flipped-normals"), []);
+    assert_eq!(found(&notes, "light-lost"), [(Severity::Warning, "lamp".into(), 1)]);
+}
+
+#[test]
 fn coincident_polygons_are_counted_but_not_back_to_back_ones() {
     let twice = notes(|b, _, grey| {
         let n = b.node("again", None, O, DQuat::IDENTITY);

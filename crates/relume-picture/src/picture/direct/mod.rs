@@ -73,8 +73,8 @@ impl Direct {
             }
             let own = PatchId(k as u32);
             for corners in Blocker::parts(&corners(k, frame)) {
-                let (twin, area_m2) = (patch.twin, patch.area_m2());
-                known.push(Known { patch: own, twin, area_m2, shines: scene.patch_emits(patch) });
+                let (twin, lying_m2) = (patch.twin, scene.lying_m2(patch));
+                known.push(Known { patch: own, twin, lying_m2 });
                 boxes.push(Aabb::of(corners.iter().copied()));
                 let plane = Plane::through(frame.origin, frame.normal);
                 blockers.push(Blocker { plane, corners });
@@ -89,7 +89,7 @@ impl Direct {
                 bounds: Aabb::of(corners.iter().copied()),
                 corners,
                 plane: Plane::through(frame.origin, frame.normal),
-                area_m2: scene.patches[k].area_m2(),
+                lying_m2: scene.lying_m2(&scene.patches[k]),
                 exitance: lamp.exitance.map(f64::from),
             })
         };

@@ -20,7 +20,7 @@ pub(super) struct Lamp {
     pub(super) bounds: Aabb,
     /// W/m2.
     pub(super) exitance: [f64; 3],
-    pub(super) area_m2: f64,
+    pub(super) lying_m2: f64,
 }
 
 /// A punctual light with its intensity, W/sr (directional: W/m2).
@@ -47,9 +47,7 @@ pub(super) struct Surroundings {
 pub(super) struct Known {
     pub(super) patch: PatchId,
     pub(super) twin: Option<PatchId>,
-    pub(super) area_m2: f64,
-    /// Whether it emits at any time.
-    pub(super) shines: bool,
+    pub(super) lying_m2: f64,
 }
 
 /// A flat piece of a surface.
@@ -240,7 +238,7 @@ impl Surroundings {
         }
     }
 
-    /// Whether a patch lies on a lamp, in its plane, and hides what it covers: of what faces the same way the smaller lamp does, as in
+    /// Whether a patch lies on a lamp, in its plane, and hides what it covers: of what faces the same way the smaller does, as in
     /// the solution, and what faces the lamp and has one side does.
     fn lies_on(&self, blocker: u32, lamp: &Lamp) -> bool {
         let (known, of) = (&self.known[blocker as usize], &self.blockers[blocker as usize]);
@@ -249,9 +247,8 @@ impl Surroundings {
         if is_its || of.corners.iter().any(is_off) {
             return false;
         }
-        let is_smaller = known.area_m2 < lamp.area_m2 * (1.0 - 1e-6);
-        (known.shines && is_smaller)
-            || (known.twin.is_none() && of.plane.normal.dot(lamp.plane.normal) < 0.0)
+        let is_smaller = known.lying_m2 < lamp.lying_m2 * (1.0 - 1e-6);
+        is_smaller || (known.twin.is_none() && of.plane.normal.dot(lamp.plane.normal) < 0.0)
     }
 
     /// What of the patches found stands between a receiver and something convex: the parts before both planes.

@@ -9,7 +9,7 @@ use super::ends::{BoxShaft, body_of};
 use super::hash::pair_key;
 use super::judge::{SpaceJudge, Stage, culled, passing};
 use super::margin::{Margin, SideMargin};
-use super::oracle::Oracle;
+use super::oracle::RefinementCriterion;
 use super::tree::{Carried, CullReason, Gradients, in_steps};
 use super::tuning::{APART, FACET_RADIUS, MISSED, PLACE, SHARED, SHARED_BY_FACETS, TURNED};
 use super::verdict::{Judgement, Verdict};
@@ -119,7 +119,7 @@ impl SpaceJudge<'_> {
         key: u64,
         brightness: &CoarseBrightness,
     ) -> Judgement {
-        let Oracle::Error { threshold } = self.oracle else {
+        let RefinementCriterion::Error { threshold } = self.criterion else {
             unreachable!("only the error oracle has groups")
         };
         let side = self.larger_radius((a, end_a), (b, end_b));

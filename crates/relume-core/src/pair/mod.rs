@@ -33,7 +33,7 @@ pub use coarse_brightness::{CoarseBrightness, coarsen};
 pub use hash::{PairHash, pair_key};
 pub use judge::{SpaceJudge, Stage};
 pub use margin::{Margin, Shift};
-pub use oracle::Oracle;
+pub use oracle::RefinementCriterion;
 pub use tree::{
     Carried, CullReason, Gradients, Link, PairId, PairTree, State, StateCounts, in_steps,
 };

@@ -13,7 +13,7 @@ use crate::pair::certificate::SpaceCertificateTests;
 use crate::pair::certificate_tests::{CertificateTests, Finding};
 use crate::pair::ends::BoxShaft;
 use crate::pair::margin::Margin;
-use crate::pair::oracle::Oracle;
+use crate::pair::oracle::RefinementCriterion;
 use crate::pair::space::{Hierarchy, Judge};
 use crate::pair::tree::{Carried, CullReason};
 use crate::pair::tuning::EFFORT;
@@ -116,7 +116,8 @@ impl Judge for SpaceJudge<'_> {
             (Kind::Element, Kind::Element) => {
                 // Of what is distant the form-factor oracle goes by what is seen, too.
                 let distant = self.forest.is_distant(a) || self.forest.is_distant(b);
-                let by_area = matches!(self.oracle, Oracle::FormFactor { .. }) && !distant;
+                let by_area =
+                    matches!(self.criterion, RefinementCriterion::FormFactor { .. }) && !distant;
                 if !by_area && !self.is_above_coarse(a, b) {
                     return false;
                 }

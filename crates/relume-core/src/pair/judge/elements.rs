@@ -14,7 +14,7 @@ use super::unoccluded::Exchanged;
 use crate::pair::coarse_brightness::CoarseBrightness;
 use crate::pair::hash::pair_key;
 use crate::pair::margin::Margin;
-use crate::pair::oracle::{End, Oracle, estimate};
+use crate::pair::oracle::{End, RefinementCriterion, estimate};
 use crate::pair::tree::{Carried, CullReason};
 use crate::pair::tuning::{FINEST, LISTED_MAX, SPOT_AROUND};
 use crate::pair::verdict::{Judgement, Verdict};
@@ -71,7 +71,7 @@ impl SpaceJudge<'_> {
     /// Judges a pair of elements that face each other, at or below the coarse level; `x` is what they exchange by points.
     fn decide(&self, pair: &mut Elements<'_>, x: Exchange, known: Option<&Carried>) -> Judgement {
         // The paper's oracle refines without asking for blockers.
-        let asks_first = matches!(self.oracle, Oracle::Error { .. });
+        let asks_first = matches!(self.criterion, RefinementCriterion::Error { .. });
         if asks_first {
             pair.leave_out_what_is_beside(&x);
         }
@@ -91,8 +91,8 @@ impl SpaceJudge<'_> {
             pair.leave_out_what_is_beside(x);
         }
         let seen = self.look(pair, x);
-        let verdict = match (self.stage, self.oracle) {
-            (Stage::Fine(brightness), Oracle::Error { threshold }) => {
+        let verdict = match (self.stage, self.criterion) {
+            (Stage::Fine(brightness), RefinementCriterion::Error { threshold }) => {
                 return self.by_error(pair, &exchanged, seen, known, (brightness, threshold));
             }
             (Stage::Coarse, _) => Verdict::CoarseLink,
@@ -111,8 +111,8 @@ impl SpaceJudge<'_> {
 
     /// Margin of the form-factor oracle where it does not refine a pair; as an error its verdict where it does.
     fn by_form_factor(&self, pair: &Elements<'_>, x: &Exchange) -> Result<Margin, Judgement> {
-        let (Oracle::FormFactor { epsilon, min_area_m2 }, Stage::Fine(_)) =
-            (self.oracle, self.stage)
+        let (RefinementCriterion::FormFactor { epsilon, min_area_m2 }, Stage::Fine(_)) =
+            (self.criterion, self.stage)
         else {
             return Ok(Margin::Firm);
         };
@@ -192,7 +192,9 @@ impl SpaceJudge<'_> {
         x: &Exchange,
         v: &Visibility,
     ) -> Verdict {
-        let Oracle::FormFactor { epsilon, min_area_m2 } = self.oracle else { return Verdict::Link };
+        let RefinementCriterion::FormFactor { epsilon, min_area_m2 } = self.criterion else {
+            return Verdict::Link;
+        };
         let (receiver, place, over, spread, side) = match self.forest.is_distant(a) {
             true => (b, place_b, &x.over_b, v.spread_b, Side::B),
             false => (a, place_a, &x.over_a, v.spread_a, Side::A),

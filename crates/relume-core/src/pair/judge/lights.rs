@@ -11,7 +11,7 @@ use super::space_judge::{SpaceJudge, Stage, carrying, culled, passing};
 use crate::pair::ends::LightPlace;
 use crate::pair::hash::pair_key;
 use crate::pair::margin::{Margin, SideMargin};
-use crate::pair::oracle::{End, Oracle, estimate};
+use crate::pair::oracle::{End, RefinementCriterion, estimate};
 use crate::pair::tree::CullReason;
 use crate::pair::tuning::LISTED_MAX;
 use crate::pair::verdict::{Judgement, Verdict};
@@ -41,7 +41,9 @@ impl SpaceJudge<'_> {
         };
         // Before anything is sampled: both stages must agree down to the coarse level, and a narrow
         // cone may fall between the sample points of a large element.
-        if matches!(self.oracle, Oracle::Error { .. }) && self.forest.coarse(element).is_none() {
+        if matches!(self.criterion, RefinementCriterion::Error { .. })
+            && self.forest.coarse(element).is_none()
+        {
             narrowed.extend_from_slice(candidates);
             return passing(Verdict::Refine(side), 0);
         }
@@ -75,9 +77,9 @@ impl SpaceJudge<'_> {
         &LitEnd { e, x, v }: &LitEnd<'_>,
     ) -> (Verdict, Margin) {
         let may_split = self.forest.can_split(element);
-        match (self.stage, self.oracle) {
+        match (self.stage, self.criterion) {
             (Stage::Coarse, _) => (Verdict::CoarseLink, Margin::Firm),
-            (Stage::Fine(brightness), Oracle::Error { threshold }) => {
+            (Stage::Fine(brightness), RefinementCriterion::Error { threshold }) => {
                 let end = |id, area, reference_area| {
                     let light = brightness.of(self.forest, id);
                     End { area, reference_area, light, own_area: 0.0, surface_area: 0.0 }
@@ -102,7 +104,7 @@ impl SpaceJudge<'_> {
                 let on = if side == Side::A { [error, endless] } else { [endless, error] };
                 (Verdict::Link, Margin::Link { on, both_ways: false })
             }
-            (Stage::Fine(_), Oracle::FormFactor { epsilon, min_area_m2 }) => {
+            (Stage::Fine(_), RefinementCriterion::FormFactor { epsilon, min_area_m2 }) => {
                 let uneven = x.over_a.slope.max(v.spread_a) > epsilon;
                 let room = e.area > min_area_m2 && may_split;
                 (self.refine_if(uneven && room, side), Margin::Firm)

@@ -8,7 +8,7 @@ use crate::transport::{
 use super::places::Elements;
 use super::space_judge::{SpaceJudge, Stage};
 use crate::pair::margin::Margin;
-use crate::pair::oracle::Oracle;
+use crate::pair::oracle::RefinementCriterion;
 use crate::pair::tuning::{
     CLIPPED_MAX_CLOSE, CLIPPED_MAX_REST, CLOSE_SHARE, CLOSER, FINEST, OVERLOOKED_MAX, SAMPLED_MAX,
 };
@@ -36,8 +36,8 @@ impl SpaceJudge<'_> {
         let (most, way) = self.clipped_max(pair, x, occluders);
         let factor = pair.factor(x);
         // Of the canonical brightness, which is coarse, less is asked.
-        let overlooked_max = match (self.stage, self.oracle) {
-            (Stage::Fine(_), Oracle::Error { threshold }) => {
+        let overlooked_max = match (self.stage, self.criterion) {
+            (Stage::Fine(_), RefinementCriterion::Error { threshold }) => {
                 OVERLOOKED_MAX * threshold.max(FINEST) / factor.max(f64::MIN_POSITIVE)
             }
             _ => f64::INFINITY,
@@ -70,7 +70,8 @@ impl SpaceJudge<'_> {
     /// How many polygons in the way of a pair are clipped at most, and how far its light is from another number for those that
     /// are: [`Margin::ENDLESS`] where that changes nothing.
     fn clipped_max(&self, pair: &Elements<'_>, x: &Exchange, occluders: usize) -> (usize, u16) {
-        let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
+        let (Stage::Fine(brightness), RefinementCriterion::Error { threshold }) =
+            (self.stage, self.criterion)
         else {
             return (CLIPPED_MAX, Margin::ENDLESS);
         };

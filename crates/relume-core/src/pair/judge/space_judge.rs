@@ -8,7 +8,7 @@ use crate::transport::{Exchange, Shaft, Side, Simd, Visibility};
 use crate::pair::coarse_brightness::CoarseBrightness;
 use crate::pair::ends::body_of;
 use crate::pair::margin::Margin;
-use crate::pair::oracle::Oracle;
+use crate::pair::oracle::RefinementCriterion;
 use crate::pair::tree::{Carried, CullReason, Gradients, in_steps};
 use crate::pair::tuning::CONNECTED_SHARE;
 use crate::pair::verdict::{Judgement, Verdict};
@@ -31,8 +31,8 @@ pub struct SpaceJudge<'a> {
     pub view: &'a WorldView,
     /// Level down to which pairs are judged.
     pub stage: Stage<'a>,
-    /// Oracle that decides on links.
-    pub oracle: Oracle,
+    /// What decides on links.
+    pub criterion: RefinementCriterion,
     /// Vector instructions.
     pub simd: Simd,
     /// Difference from the last update; `None` in a cold build.
@@ -101,7 +101,7 @@ impl SpaceJudge<'_> {
 
     /// Whether an end is above the level at which the coarse solution links.
     pub(super) fn is_above_coarse(&self, a: ElementId, b: ElementId) -> bool {
-        matches!(self.oracle, Oracle::Error { .. })
+        matches!(self.criterion, RefinementCriterion::Error { .. })
             && (self.forest.coarse(a).is_none() || self.forest.coarse(b).is_none())
     }
 

@@ -6,7 +6,7 @@ use super::errors::{norm_of, refined};
 use super::places::Elements;
 use super::space_judge::{SpaceJudge, Stage, carrying, culled};
 use crate::pair::margin::Margin;
-use crate::pair::oracle::{Estimate, Oracle, estimate};
+use crate::pair::oracle::{Estimate, RefinementCriterion, estimate};
 use crate::pair::tree::CullReason;
 use crate::pair::verdict::{Judgement, Verdict};
 
@@ -25,7 +25,8 @@ impl SpaceJudge<'_> {
     /// Links then serve tables of form factors alone, which ask what whole elements exchange: that is known exactly, and how it is
     /// spread over the ends does not matter. Two turned rectangles 0.1 mm apart would be refined all over to find it again.
     pub(super) fn by_whole_ends(&self, pair: &Elements<'_>, x: &Exchange) -> Option<Judgement> {
-        let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
+        let (Stage::Fine(brightness), RefinementCriterion::Error { threshold }) =
+            (self.stage, self.criterion)
         else {
             return None;
         };
@@ -60,7 +61,8 @@ impl SpaceJudge<'_> {
         }
         let mut by_points = None;
         // What the smaller area by points is enough to refine needs no better one.
-        if let (Stage::Fine(brightness), Oracle::Error { threshold }) = (self.stage, self.oracle)
+        if let (Stage::Fine(brightness), RefinementCriterion::Error { threshold }) =
+            (self.stage, self.criterion)
             && pair.found.is_clear()
         {
             let (clear, nothing) = (Visibility::CLEAR, BlockerSizes::NOTHING);

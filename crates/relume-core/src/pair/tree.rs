@@ -193,7 +193,7 @@ struct Node {
 }
 
 /// Spare capacity that vectors keep, as one part in this many of their length.
-const SLACK: usize = 32;
+const SPARE: usize = 32;
 
 /// Bits of an element's id.
 const ID_BITS: u32 = 30;
@@ -298,7 +298,7 @@ impl<T: Copy + Default + PartialEq> SideTable<T> {
     }
 
     fn trim(&mut self) {
-        self.values.shrink_to(self.values.len() + self.values.len() / SLACK);
+        self.values.shrink_to(self.values.len() + self.values.len() / SPARE);
     }
 
     fn memory_bytes(&self) -> u64 {
@@ -432,7 +432,7 @@ impl PairTree {
 
     /// Gives back room beyond a small reserve.
     pub fn trim(&mut self) {
-        self.nodes.shrink_to(self.nodes.len() + self.nodes.len() / SLACK);
+        self.nodes.shrink_to(self.nodes.len() + self.nodes.len() / SPARE);
         self.expiry.trim();
         self.history.trim();
         self.vacant.iter_mut().for_each(|list| list.shrink_to(2 * list.len()));

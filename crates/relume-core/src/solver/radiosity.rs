@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::element::Renumbering;
 
-use super::field::{Field, Linear, SLACK, grow};
+use super::field::{Field, Linear, SPARE, grow};
 use super::place::Place;
 use super::push::{RowSum, push};
 use super::surfaces::{Surfaces, for_each_below};
@@ -132,7 +132,7 @@ impl Radiosity {
     pub fn trim(&mut self) {
         let Radiosity { radiosity, gathered, pending, deferred, .. } = self;
         for values in [&mut radiosity.0, &mut gathered.0, pending, deferred] {
-            values.shrink_to(values.len() + values.len() / SLACK);
+            values.shrink_to(values.len() + values.len() / SPARE);
         }
         self.trend.trim();
     }

@@ -113,10 +113,16 @@ impl<'a> Shaft<'a> {
     /// Whether anything at or below `id` may block segments of this pair or of one below it,
     /// what rides on `except` aside.
     pub fn is_entered_by(&self, id: ElementId, except: Option<BodyId>) -> bool {
-        self.enters(&self.shafts(), id, except)
+        self.is_entered_below(&self.shafts(), id, except)
     }
 
-    fn enters(&self, shafts: &ShaftsOfBoxes, id: ElementId, except: Option<BodyId>) -> bool {
+    /// [`Shaft::is_entered_by`] with the shafts of the ends' boxes.
+    fn is_entered_below(
+        &self,
+        shafts: &ShaftsOfBoxes,
+        id: ElementId,
+        except: Option<BodyId>,
+    ) -> bool {
         if except.is_some() && self.forest.cluster_body(id) == except {
             return false;
         }
@@ -125,7 +131,10 @@ impl<'a> Shaft<'a> {
             let bounds = self.view.fixed_box(id);
             return self.forest.kind(id) == Kind::Cluster
                 && shafts.world.meets(bounds, self.slack())
-                && self.forest.children(id).any(|c| self.enters(shafts, ElementId(c), except));
+                && self
+                    .forest
+                    .children(id)
+                    .any(|c| self.is_entered_below(shafts, ElementId(c), except));
         }
         let mut entered = false;
         self.walk(shafts, id, -1.0, &mut |_, _| {

@@ -112,7 +112,7 @@ pub(super) const CHUNK: usize = 256;
 
 impl Radiosity {
     /// [`solve`](Radiosity::solve) within bounds, whatever the links. Among white surfaces leaves are levelled (`Levels`); where rows of leaves that sum to more than 1 might make light of
-    /// nothing, from nothing; if it does not settle so or light is made, with levels both ways; then with factors of leaves (`RowScaling`),
+    /// nothing, from nothing; if it does not settle so or light is made, with symmetric levels; then with factors of leaves (`RowScaling`),
     /// with which no row does; and if lines grow even so, with constant elements and factors that lose light.
     pub fn solve_bounded(
         &mut self,
@@ -127,7 +127,7 @@ impl Radiosity {
             self.start_anew(surfaces);
         }
         let was_scaled =
-            !std::mem::take(&mut self.scaling).is_none() || self.levels.are_both_ways();
+            !std::mem::take(&mut self.scaling).is_none() || self.levels.are_symmetric();
         self.constant = false;
         let rows = is_white(surfaces).then(|| RowScaling::none(surfaces, links, true));
         let dirty = self.level(surfaces, links, dirty, rows.as_ref().filter(|_| rows_are_close));
@@ -154,7 +154,7 @@ impl Radiosity {
                 return;
             }
         }
-        if !self.levels.is_none() && self.solve_both_ways(surfaces, links, &mut best, stop) {
+        if !self.levels.is_none() && self.solve_symmetric(surfaces, links, &mut best, stop) {
             return;
         }
         match best.light {
@@ -163,8 +163,8 @@ impl Radiosity {
         }
     }
 
-    /// Solves with levels that count both ways, and if too much light is lost or made so, with constant elements; whether that stands.
-    fn solve_both_ways(
+    /// Solves with symmetric levels, and if too much light is lost or made so, with constant elements; whether that stands.
+    fn solve_symmetric(
         &mut self,
         surfaces: &impl Surfaces,
         links: &Links,
@@ -173,7 +173,7 @@ impl Radiosity {
     ) -> bool {
         for linear in [true, false] {
             if linear || best.light.is_none() {
-                let share = self.solve_levelled_both_ways(surfaces, links, linear, stop);
+                let share = self.solve_symmetric_once(surfaces, links, linear, stop);
                 if best.settles_for(self, share) {
                     return true;
                 }
@@ -200,9 +200,9 @@ impl Radiosity {
         }
     }
 
-    /// Solves from nothing with levels that count both ways, with elements that are constant unless `linear`; light made or lost, over
-    /// what is emitted.
-    fn solve_levelled_both_ways(
+    /// Solves from nothing with symmetric levels: rows and columns are scaled by one line a leaf, so that no light is lost or made.
+    /// Elements are constant unless `linear`. Light lost or made even so, over what is emitted, 1.
+    fn solve_symmetric_once(
         &mut self,
         surfaces: &impl Surfaces,
         links: &Links,
@@ -212,7 +212,7 @@ impl Radiosity {
         self.constant = !linear;
         let rows = RowScaling::none(surfaces, links, linear);
         let levels = Levels::new(surfaces, links, &rows, &self.radiosity);
-        self.levels = levels.both_ways(surfaces, links, &rows);
+        self.levels = levels.made_symmetric(surfaces, links, &rows);
         self.start_anew(surfaces);
         self.solve(surfaces, links, Dirty::All, stop);
         self.set_to_received(surfaces);
@@ -741,7 +741,7 @@ impl Radiosity {
                 deferred: &self.deferred,
                 factors: &self.scaling.factors,
                 levels: self.levels.all(),
-                both_ways: self.levels.are_both_ways(),
+                is_symmetric: self.levels.are_symmetric(),
                 surfaces,
                 material,
                 limit,
@@ -897,7 +897,7 @@ mod tests {
                 Bounds { residual: 1e-7, from_nothing: 1e-7, mean_w_m2: 2e2, rows_are_close };
             b.solve_bounded(&plates, &links, Dirty::All, bounds);
             assert!(b.has_settled() && b.scaling.is_none() == rows_are_close);
-            assert_eq!(b.levels.are_both_ways(), rows_are_close);
+            assert_eq!(b.levels.are_symmetric(), rows_are_close);
             for id in 0..4 {
                 assert!((b.radiosity(id)[0] - 100.0).abs() < 0.5, "{id}: {:?}", b.radiosity(id));
             }

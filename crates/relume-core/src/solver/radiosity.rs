@@ -10,13 +10,17 @@ use super::push::{RowSum, push};
 use super::surfaces::{Surfaces, for_each_below};
 use super::trend::Trend;
 
+mod bounded;
 mod levels;
 mod scaling;
 mod solve;
+#[cfg(test)]
+mod toy;
 
+pub use bounded::Bounds;
 use levels::Levels;
 use scaling::RowScaling;
-pub use solve::{Bounds, Stop};
+pub use solve::Stop;
 
 /// What came over links of groups to whom something did: few elements do, since groups are linked with large ones.
 #[derive(Clone, Debug, Default)]

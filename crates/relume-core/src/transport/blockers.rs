@@ -6,9 +6,12 @@ use glam::DVec3;
 use crate::geometry::{Plane, Pose, is_outside_hull};
 use crate::scene::PatchId;
 
+use super::between::{Between, PlacedSolid};
 use super::clip::keep_in_front;
+use super::clipping::Clipping;
 use super::kernel::Simd;
-use super::prepared_view::{Between, Clipping, PlacedSolid, PreparedView, is_hidden};
+use super::point_view::is_hidden;
+use super::prepared_view::PreparedView;
 use super::shaft::{Shaft, TestFrame};
 use super::side::Side;
 use super::tuning::GRAZED;

@@ -5,10 +5,12 @@
 //! radiosity, time or the pair tree.
 
 mod bend;
+mod between;
 mod blocker_sizes;
 mod blockers;
 mod candidates;
 mod clip;
+mod clipping;
 mod contact;
 mod contour;
 mod crowd;
@@ -17,6 +19,7 @@ mod group;
 mod kernel;
 mod logarithm;
 mod point;
+mod point_view;
 mod prepared_view;
 mod segments;
 mod shaft;
@@ -25,6 +28,7 @@ mod side;
 mod silhouette;
 mod spot;
 mod tally;
+mod target_frame;
 mod tuning;
 mod visibility;
 
@@ -33,6 +37,7 @@ pub use blocker_sizes::BlockerSizes;
 pub use blockers::{clipping, prepare_view};
 pub use candidates::{Candidates, InShaft};
 pub use clip::keep_in_front;
+pub use clipping::Clipping;
 pub use contact::{in_plane, lies_in, overlap_m2};
 pub use crowd::{Crowd, light_past_crowd};
 pub use exchange::{
@@ -42,7 +47,8 @@ pub use exchange::{
 pub use group::{GroupSight, Slope, Spread, common_body};
 pub use kernel::Simd;
 pub use point::form_factor_from_point;
-pub use prepared_view::{Clipping, FactorPast, PreparedView, form_factor_past};
+pub use point_view::{FactorPast, form_factor_past};
+pub use prepared_view::PreparedView;
 pub use segments::{SEGMENTS, SegmentBundle};
 pub use shaft::Shaft;
 pub use share::Visibility;

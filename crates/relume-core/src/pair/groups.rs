@@ -4,13 +4,14 @@ use crate::element::{ElementId, Kind};
 use crate::geometry::no_smaller;
 use crate::transport::{GroupSight, Spread, common_body, light_at};
 
+use super::carried::{Carried, Gradients, in_steps};
 use super::coarse_brightness::CoarseBrightness;
 use super::ends::{BoxShaft, body_of};
 use super::hash::pair_key;
 use super::judge::{SpaceJudge, Stage, culled, passing};
 use super::margin::{Margin, SideMargin};
 use super::oracle::RefinementCriterion;
-use super::tree::{Carried, CullReason, Gradients, in_steps};
+use super::tree::CullReason;
 use super::tuning::{APART, FACET_RADIUS, MISSED, PLACE, SHARED, SHARED_BY_FACETS, TURNED};
 use super::verdict::{Judgement, Verdict};
 use crate::transport::Side;

@@ -9,13 +9,14 @@ use crate::transport::Side;
 
 use super::places::Places;
 use super::space_judge::{SpaceJudge, Stage, culled};
+use crate::pair::carried::Carried;
 use crate::pair::certificate::SpaceCertificateTests;
 use crate::pair::certificate_tests::{CertificateTests, Finding};
 use crate::pair::ends::BoxShaft;
 use crate::pair::margin::Margin;
 use crate::pair::oracle::RefinementCriterion;
 use crate::pair::space::{Hierarchy, Judge};
-use crate::pair::tree::{Carried, CullReason};
+use crate::pair::tree::CullReason;
 use crate::pair::tuning::EFFORT;
 use crate::pair::verdict::{Judgement, Stale};
 use crate::pair::world_change::WorldChange;

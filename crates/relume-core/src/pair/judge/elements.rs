@@ -11,11 +11,12 @@ use super::places::{Elements, Places};
 use super::sight::Seen;
 use super::space_judge::{SpaceJudge, Stage, carrying, culled, passing};
 use super::unoccluded::Exchanged;
+use crate::pair::carried::Carried;
 use crate::pair::coarse_brightness::CoarseBrightness;
 use crate::pair::hash::pair_key;
 use crate::pair::margin::Margin;
 use crate::pair::oracle::{End, RefinementCriterion, estimate};
-use crate::pair::tree::{Carried, CullReason};
+use crate::pair::tree::CullReason;
 use crate::pair::tuning::{FINEST, LISTED_MAX, SPOT_AROUND};
 use crate::pair::verdict::{Judgement, Verdict};
 

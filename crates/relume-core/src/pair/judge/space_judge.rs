@@ -5,11 +5,12 @@ use crate::predict::{Lookahead, MotionBounds};
 use crate::scene::{BodyId, PatchId};
 use crate::transport::{Exchange, Shaft, Side, Simd, Visibility};
 
+use crate::pair::carried::{Carried, Gradients, in_steps};
 use crate::pair::coarse_brightness::CoarseBrightness;
 use crate::pair::ends::body_of;
 use crate::pair::margin::Margin;
 use crate::pair::oracle::RefinementCriterion;
-use crate::pair::tree::{Carried, CullReason, Gradients, in_steps};
+use crate::pair::tree::CullReason;
 use crate::pair::tuning::CONNECTED_SHARE;
 use crate::pair::verdict::{Judgement, Verdict};
 use crate::pair::world_change::WorldChange;

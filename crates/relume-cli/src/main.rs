@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod args;
+mod balance;
 mod bench;
 mod check;
 mod clip;
@@ -11,6 +12,7 @@ mod edits;
 mod errors;
 mod events;
 mod export;
+mod exposure;
 mod factors;
 mod failure;
 mod figures;

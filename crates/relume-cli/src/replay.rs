@@ -85,20 +85,17 @@ impl Told {
 
 fn failure(args: &ReplayArgs, error: LogError) -> Failure {
     let log = args.log.display();
+    // But for what concerns the file, errors begin with the line.
+    let in_line = |error: &LogError| Failure::new(format_args!("{log}, {error}"));
     match error {
         LogError::Unsolved { line, source } => {
             step_failure(source, &format!("at line {line} of {log}"))
         }
-        LogError::Unknown { line, what, name } => {
-            Failure::new(format_args!("{log}, line {line}: the scene has no {what} `{name}`"))
-                .help("`relume info` lists the bodies, materials and lights of the scene")
-        }
+        LogError::Unknown { .. } => in_line(&error)
+            .help("`relume info` lists the bodies, materials and lights of the scene"),
         // It names the remedy.
-        LogError::Refused { line, source } => {
-            Failure::new(format_args!("{log}, line {line}: {source}"))
-        }
-        LogError::Line { line, what } => Failure::new(format_args!("{log}, line {line}: {what}"))
-            .help("`relume help replay` lists the commands"),
+        LogError::Refused { .. } => in_line(&error),
+        LogError::Line { .. } => in_line(&error).help("`relume help replay` lists the commands"),
         other => Failure::new(format_args!("{log}: {other}")),
     }
 }

@@ -4,14 +4,14 @@
 //! in one step each. Whatever ends a run, the directory holds finished frames and a report of
 //! exactly those.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use relume::export::{glb, probe, write_atomically};
-use relume::scene::{BodyId, Light, MaterialId, Scene};
+use relume::scene::Scene;
 use relume::session::{Energy, Options, Session, SessionError, Snapshot};
 use relume_picture::picture::{self, Exposure};
 
@@ -20,10 +20,12 @@ use crate::args::{
     AccuracyFlag, DemoArgs, ExposureFlag, FrameFormat, PictureFlags, RenderArgs, Shading,
     SolveArgs, SolveFlags, UpdateFlag,
 };
+use crate::balance::{NO_LIGHT_GETS_IN, balance, gets_no_light, said_of_unbalanced};
 use crate::clip::{self, Clip, PICTURE_TOLERANCE, TOLERANCE, fixed};
 use crate::clock::now;
 use crate::demo;
 use crate::events::EventTable;
+use crate::exposure::{brightest_frame, stops};
 use crate::failure::Failure;
 use crate::frames;
 use crate::interrupt;
@@ -33,12 +35,11 @@ use crate::memory;
 use crate::output::{self, count, counted};
 use crate::preview::{self, Meanwhile, PATIENCE};
 use crate::progress::Progress;
-use crate::report::{self, PictureOptions, Report, RunOptions, SceneSummary};
+use crate::report::{PictureOptions, Report, RunOptions, SceneSummary};
 use crate::resume;
 use crate::scene_file;
 use crate::show::ShowFlags;
 use crate::size::Size;
-use crate::tuning::UNBALANCED_SAID;
 use crate::viewing::Viewing;
 
 /// `relume demo`
@@ -460,67 +461,6 @@ impl Job {
     }
 }
 
-/// Share of what would come from outside if nothing were in the way, below which what arrives is rounding.
-const GETS_IN: f64 = 1e-4;
-
-const NO_LIGHT_GETS_IN: &str = "\nwarning: next to no light from outside gets in: open what is closed around the scene (--hide NODE) \
-                                or light it from within (--emit MATERIAL=RADIANCE)";
-
-/// Whether all light is from outside at the start, and next to nothing of it arrives.
-fn gets_no_light(scene: &Scene, energy: &Energy) -> bool {
-    let Some(now) = scene.outside.as_ref().and_then(|outside| outside.at(0.0).ok()) else {
-        return false;
-    };
-    let arrives: f64 = now.horizontal_w_m2().iter().flatten().sum();
-    !scene.without_outside().emits() && energy.emitted_w < GETS_IN * arrives * scene.area_m2()
-}
-
-/// A line about finished frames in which more of the light than [`UNBALANCED_SAID`] is unaccounted for.
-fn said_of_unbalanced(report: &Report, wanted: &[u32]) -> Option<String> {
-    let finished = wanted.iter().map(|&frame| (frame, report.finished(frame)));
-    let off: Vec<(u32, report::Finished)> =
-        finished.filter(|(_, of)| of.unbalanced > UNBALANCED_SAID).collect();
-    let (worst, of) = off.iter().max_by(|a, b| a.1.unbalanced.total_cmp(&b.1.unbalanced))?;
-    let numbers: Vec<u32> = off.iter().map(|(frame, _)| *frame).collect();
-    let suspects = match &of.suspects[..] {
-        [] => String::new(),
-        some => format!(
-            "; more light arrives at {} than can: they pierce each other or lie very close",
-            named(some)
-        ),
-    };
-    let frames = if numbers.len() == 1 { "frame" } else { "frames" };
-    Some(format!(
-        "warning: {frames} {}: up to {:.1} % of the light is unaccounted for (frame {worst}){suspects}; a finer --tolerance \
-         makes it less",
-        frames::describe(&numbers),
-        100.0 * of.unbalanced
-    ))
-}
-
-fn named(surfaces: &[String]) -> String {
-    let names: Vec<String> = surfaces.iter().map(|s| format!("`{}`", output::name(s))).collect();
-    names.join(" and ")
-}
-
-/// A line about the energy balance of a frame.
-fn balance(frame: u32, energy: &Energy, suspects: &[String]) -> String {
-    let Energy { emitted_w, absorbed_w, escaped_w } = *energy;
-    let share = 100.0 * energy.unbalanced();
-    let mut line = format!(
-        "\nframe {frame}: {emitted_w:.4} W emitted, {absorbed_w:.4} W absorbed, {escaped_w:.4} W escaped, \
-         {share:.2} % unbalanced"
-    );
-    // What is more is said of all frames.
-    if !suspects.is_empty() && energy.unbalanced() <= UNBALANCED_SAID {
-        line += &format!(
-            "\nwarning: more light arrives at {} than can: they pierce each other or lie very close",
-            named(suspects)
-        );
-    }
-    line
-}
-
 /// What a run has finished. Whatever ends the run, this is written.
 struct Finished {
     report: Report,
@@ -750,54 +690,6 @@ fn ask_for_picture(flags: &PictureFlags, format: FrameFormat) -> Result<(), Fail
     memory::ask(pixels * bytes, format_args!("a picture of {}", flags.size))
 }
 
-/// The first of the frames of the animation in which most is emitted; `None` if nothing ever is.
-///
-/// Cost: one pose for each emitting body, material and frame.
-fn brightest_frame(scene: &Scene, fps: f64) -> Option<u32> {
-    let count = frames::frame_count(scene.motion.duration_s, fps).ok()?;
-    brightest_of(scene, fps, 0..count)
-}
-
-/// The first of some frames in which most is emitted; `None` if nothing is in any.
-pub(crate) fn brightest_of(
-    scene: &Scene,
-    fps: f64,
-    frames: impl Iterator<Item = u32>,
-) -> Option<u32> {
-    // The area that would emit as much if it were all white.
-    let mut lamps: BTreeMap<(BodyId, MaterialId), [f64; 3]> = BTreeMap::new();
-    for patch in scene.patches.iter().filter(|p| scene.patch_emits(p)) {
-        let (share, area_m2) = (scene.emission_share(patch), patch.area_m2());
-        let area = lamps.entry((patch.body, patch.material)).or_default();
-        (0..3).for_each(|c| area[c] += share[c] * area_m2);
-    }
-    let sum = |emission: [f64; 3]| emission.iter().sum::<f64>();
-    let emitted = |frame: u32| {
-        let time_s = frames::time_of(frame, fps);
-        let of_lamp = |(&(body, of), area): (&(BodyId, MaterialId), &[f64; 3])| {
-            let exitance = scene.materials[of.0 as usize].exitance_at(time_s);
-            let there = scene.pose(body, time_s).is_some();
-            if there { sum([0, 1, 2].map(|c| area[c] * exitance[c])) } else { 0.0 }
-        };
-        let of_light = |l: &Light| {
-            let there = scene.motion.pose(l.node, time_s).is_some();
-            if there { sum(l.intensity_at(time_s)) } else { 0.0 }
-        };
-        lamps.iter().map(of_lamp).chain(scene.lights.iter().map(of_light)).sum::<f64>()
-    };
-    let brighter = |best: (Option<u32>, f64), frame: u32| {
-        let now = emitted(frame);
-        if now > best.1 { (Some(frame), now) } else { best }
-    };
-    frames.fold((None, 0.0), brighter).0
-}
-
-/// The stops of a scale, rounded to a thousandth so that what the report says is what was used.
-pub(crate) fn stops(scale: f64) -> f64 {
-    let stops = scale.log2();
-    if stops.is_finite() { (stops * 1000.0).round() / 1000.0 } else { 0.0 }
-}
-
 fn make_directory(dir: &Path) -> Result<(), Failure> {
     if dir.exists() && !dir.is_dir() {
         return Err(Failure::new(format_args!("{} is a file, not a directory", dir.display()))
@@ -806,81 +698,4 @@ fn make_directory(dir: &Path) -> Result<(), Failure> {
     // Without a dot at its end, which names nothing while the folder is not there.
     let to_make: PathBuf = dir.components().collect();
     fs::create_dir_all(to_make).map_err(|error| Failure::write(dir, &error))
-}
-
-#[cfg(test)]
-mod tests {
-    use glam::DVec3;
-    use relume::scene::{Glow, Interpolation, Track};
-
-    use super::*;
-    use crate::args::DemoScene;
-
-    #[test]
-    fn the_exposure_frame_is_the_first_with_most_light() {
-        let mut scene = (demo::demo(DemoScene::Room).build)().unwrap();
-        assert_eq!(brightest_frame(&scene, 24.0), Some(0));
-        let lamp = scene.motion.nodes.iter_mut().find(|n| n.name == "lamp").unwrap();
-        lamp.presence = vec![(0.0, false), (0.25, true)];
-        assert_eq!(brightest_frame(&scene, 24.0), Some(6));
-        let lamp = scene.materials.iter_mut().find(|m| m.emits()).unwrap();
-        let values = vec![DVec3::ONE, DVec3::splat(3.0)];
-        let track = Track { times_s: vec![0.0, 0.5], values, interpolation: Interpolation::Step };
-        lamp.glow = Some(Glow { scale: lamp.exitance, tracks: vec![track] });
-        assert_eq!(brightest_frame(&scene, 24.0), Some(12));
-        for material in &mut scene.materials {
-            (material.exitance, material.glow) = ([0.0; 3], None);
-        }
-        assert_eq!(brightest_frame(&scene, 24.0), None);
-    }
-
-    #[test]
-    fn frames_whose_light_is_off_are_said_and_the_worst_is_named() {
-        let summary = SceneSummary {
-            name: "room".into(),
-            bodies: 1,
-            patches: 6,
-            area_m2: 6.0,
-            bounds: None,
-            content: "00".into(),
-        };
-        let options = RunOptions {
-            frames: "all".into(),
-            fps: 24.0,
-            animation: None,
-            edits: Vec::new(),
-            tolerance: 0.1,
-            oracle: "error".into(),
-            update: "certificate".into(),
-            threads: 1,
-            max_memory_bytes: None,
-            outside: None,
-            picture: None,
-        };
-        let mut report = Report::new(summary, options);
-        let mut add = |frame, absorbed_w, suspects: &[&str]| {
-            let energy = Some(Energy { emitted_w: 100.0, absorbed_w, escaped_w: 0.0 });
-            let suspects = suspects.iter().map(|s| (*s).to_owned()).collect();
-            let mut entry = relume::session::FrameReport::default();
-            (entry.frame, entry.energy, entry.suspects) = (frame, energy, suspects);
-            report.add(&entry, None).unwrap();
-        };
-        add(0, 99.5, &[]);
-        add(1, 102.0, &["floor"]);
-        add(2, 96.0, &["shelf", "wall"]);
-        add(4, 98.0, &[]);
-        let said = said_of_unbalanced(&report, &[0, 1, 2, 4]).unwrap();
-        assert!(said.starts_with("warning: frames 1-2, 4: up to 4.0 % of the light"), "{said}");
-        assert!(said.contains("`shelf` and `wall`"), "{said}");
-        assert_eq!(said_of_unbalanced(&report, &[0]), None);
-        // Frames that are not asked for are another run's.
-        assert!(said_of_unbalanced(&report, &[0, 4]).unwrap().contains("warning: frame 4:"));
-    }
-
-    #[test]
-    fn stops_and_scales() {
-        assert_eq!(fixed(-1.0), Exposure::Fixed(0.5));
-        assert_eq!(stops(8.0), 3.0);
-        assert_eq!(stops(0.0), 0.0);
-    }
 }

@@ -229,3 +229,27 @@ fn what_is_reflected_again_and_again_is_followed() {
         assert!((said - off).abs() < 0.007, "{said} of {off}");
     }
 }
+
+#[test]
+fn accuracy_at_sensors_asks_for_directions_not_for_unit_vectors() {
+    let mut session = Session::new(lit_room(), at_tolerance(0.9)).unwrap();
+    session.step(0, 0.0).unwrap();
+    let frame = session.frame().unwrap();
+    let at = v(0.3, 0.1, 0.2);
+    let facing = |normal| Sensor { at, normal };
+    let unit = frame.accuracy_at(&[facing(v(0.0, 0.6, 0.8))]);
+    assert_eq!(unit.points, 1);
+    for long in [1e-3, 20.0] {
+        let said = frame.accuracy_at(&[facing(v(0.0, 0.6, 0.8) * long)]);
+        let off = (said.mean - unit.mean).abs();
+        assert!(off < 1e-9 && said.points == 1, "{said:?} at length {long}, {unit:?} at 1");
+    }
+    // The mesh too is asked along a direction.
+    let mesh = frame.solution();
+    let floor = |length: f64| mesh.irradiance_at(v(0.3, 0.0, 0.2), DVec3::Y * length);
+    assert!(floor(1.0).is_some() && floor(1e-3) == floor(1.0) && floor(0.0).is_none());
+    // What has no direction or no place is left out.
+    let nowhere = Sensor { at: DVec3::NAN, normal: DVec3::Z };
+    let said = frame.accuracy_at(&[facing(DVec3::ZERO), nowhere, facing(v(0.0, 0.6, 0.8))]);
+    assert_eq!(said.points, 1);
+}

@@ -4,7 +4,8 @@ use serde::Serialize;
 
 use crate::element::{ElementId, ElementKey};
 
-use super::tree::{Carried, PairId};
+use super::carried::Carried;
+use super::tree::PairId;
 
 /// Exact counts of the work of an update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]

@@ -7,12 +7,13 @@ use crate::element::ElementId;
 use crate::predict::{History, Sample, Tick};
 use crate::transport::Side;
 
+use super::carried::Carried;
 use super::changes::{Changes, CoarseLink, Edit, EventKind, LinkEvent, Record};
 use super::evaluate::{Chunk, Outcome};
 use super::hash::{PairHash, pair_key};
 use super::margin::Margin;
 use super::space::Judge;
-use super::tree::{Carried, PairId, PairTree, State};
+use super::tree::{PairId, PairTree, State};
 use super::verdict::{Judgement, Stale, Verdict};
 use super::wave::{Below, Item, List, Wave};
 

@@ -103,6 +103,7 @@ impl<'a> BoxShaft<'a> {
         }
     }
 
+    /// Whether the box of a node meets the shaft.
     fn meets(&self, id: ElementId) -> bool {
         let world = self.view.fixed_box(id);
         let (shaft, bounds) = match &self.own {

@@ -6,10 +6,11 @@ use rayon::prelude::*;
 use crate::element::ElementId;
 use crate::predict::{History, Lookahead, Tick};
 
+use super::carried::Carried;
 use super::certificate_tests::Finding;
 use super::margin::Margin;
 use super::space::Judge;
-use super::tree::{Carried, CullReason, PairId, PairTree, State};
+use super::tree::{CullReason, PairId, PairTree, State};
 use super::tuning::CHUNK;
 use super::verdict::{Judgement, Stale, Verdict};
 use super::wave::{Below, Item, List};

@@ -4,13 +4,14 @@ use crate::element::{ElementId, Kind};
 use crate::geometry::no_smaller;
 use crate::transport::{GroupSight, Spread, common_body, light_at};
 
+use super::carried::{Carried, Gradients, in_steps};
 use super::coarse_brightness::CoarseBrightness;
 use super::ends::{BoxShaft, body_of};
 use super::hash::pair_key;
 use super::judge::{SpaceJudge, Stage, culled, passing};
 use super::margin::{Margin, SideMargin};
-use super::oracle::Oracle;
-use super::tree::{Carried, CullReason, Gradients, in_steps};
+use super::oracle::RefinementCriterion;
+use super::tree::CullReason;
 use super::tuning::{
     APART, FACET_RADIUS, GRAZING, MISSED, NEAR_FLAT, PLACE, SHARED, SHARED_BY_FACETS, TURNED,
 };
@@ -124,7 +125,7 @@ impl SpaceJudge<'_> {
         key: u64,
         brightness: &CoarseBrightness,
     ) -> Judgement {
-        let Oracle::Error { threshold } = self.oracle else {
+        let RefinementCriterion::Error { threshold } = self.criterion else {
             unreachable!("only the error oracle has groups")
         };
         let side = self.larger_radius((a, end_a), (b, end_b));
@@ -213,7 +214,7 @@ impl SpaceJudge<'_> {
     /// Whether what the facets of a group exchange among themselves counts for nothing: that they reflect all that they receive is
     /// the most that they can send.
     fn is_flat(&self, id: ElementId, brightness: &CoarseBrightness) -> bool {
-        let Oracle::Error { threshold } = self.oracle else { return false };
+        let RefinementCriterion::Error { threshold } = self.criterion else { return false };
         let Some(group) = self.forest.group(id) else { return false };
         let Some(factor) = grazing_factor_of(group.normals.angle) else { return false };
         let area_m2 = self.forest.area_m2(id);

@@ -2,7 +2,7 @@
 
 use crate::element::ElementKey;
 
-use super::tree::{Carried, Gradients};
+use super::carried::{Carried, Gradients};
 
 /// A number that depends on the names of the two ends and on nothing else.
 #[inline]

@@ -17,8 +17,8 @@ const HALF_OCTAVE: i32 = 140;
 /// Steps in one that is stored.
 const COARSE: i32 = 10;
 
-/// Given away to rounding: a step, and what [`HALF_OCTAVE`] is off by for source and receiver.
-const SLACK: f64 = 2.0;
+/// Steps given away to rounding: one, and what [`HALF_OCTAVE`] is off by for source and receiver.
+const ROUNDING_STEPS: f64 = 2.0;
 
 /// Margin of a verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,7 +117,7 @@ impl Margin {
     pub fn between(large: f64, small: f64) -> u16 {
         let octaves = libm::log2(large / small);
         // NaN becomes 0.
-        (octaves * STEPS - SLACK).clamp(0.0, f64::from(Margin::ENDLESS - 1)) as u16
+        (octaves * STEPS - ROUNDING_STEPS).clamp(0.0, f64::from(Margin::ENDLESS - 1)) as u16
     }
 
     /// In 16 bits for a link, and in 32 for a refined pair.

@@ -6,6 +6,7 @@
 //! ([`Finding`]). Must not know radiosities beyond the [`CoarseBrightness`] it is handed.
 
 mod brightness;
+mod carried;
 mod certificate;
 mod certificate_tests;
 mod changes;
@@ -28,15 +29,14 @@ mod world_change;
 
 pub use crate::transport::Side;
 pub use brightness::Brightness;
+pub use carried::{Carried, Gradients, in_steps};
 pub use certificate_tests::Finding;
 pub use coarse_brightness::{CoarseBrightness, coarsen};
 pub use hash::{PairHash, pair_key};
 pub use judge::{SpaceJudge, Stage};
 pub use margin::{Margin, Shift};
-pub use oracle::Oracle;
-pub use tree::{
-    Carried, CullReason, Gradients, Link, PairId, PairTree, State, StateCounts, in_steps,
-};
+pub use oracle::RefinementCriterion;
+pub use tree::{CullReason, Link, PairId, PairTree, State, StateCounts};
 pub use world_change::WorldChange;
 // The plane has certificates of its own.
 pub(crate) use certificate_tests::{CertificateTests, Moves};

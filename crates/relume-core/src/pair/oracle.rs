@@ -11,9 +11,9 @@ use super::tuning::{
 };
 use crate::transport::Side;
 
-/// Oracle: criterion by which a pair of elements becomes a link.
+/// Refinement criterion: threshold below which a pair of elements becomes a link; made of the session's oracle and tolerance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Oracle {
+pub enum RefinementCriterion {
     /// An estimate of the error of irradiance that the link causes on its receivers.
     Error {
         /// Largest error of a link relative to the irradiance of its receiver.

@@ -5,9 +5,9 @@ use std::ops::Range;
 use crate::element::{ElementId, ElementKey};
 use crate::predict::{Lookahead, Tick};
 
+use super::carried::Carried;
 use super::certificate_tests::Finding;
 use super::margin::Margin;
-use super::tree::Carried;
 use super::verdict::{Judgement, Stale};
 
 /// Hierarchy of the elements that are ends of pairs.

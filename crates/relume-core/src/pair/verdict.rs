@@ -1,7 +1,8 @@
 //! Verdicts on pairs, and what may make a verdict stale.
 
+use super::carried::Carried;
 use super::margin::Margin;
-use super::tree::{Carried, CullReason};
+use super::tree::CullReason;
 use crate::transport::Side;
 
 /// Decision on a pair.

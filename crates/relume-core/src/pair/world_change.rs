@@ -208,28 +208,33 @@ impl<'a> WorldChange<'a> {
         let rides = body.filter(|_| motion(a) == Motion::All);
         let views = [self.old, new];
         let entered = match (forest.kind(a), forest.kind(b)) {
-            (Kind::Element, Kind::Element) => self.enters(forest, views, (a, b), rides),
-            (Kind::Light, Kind::Element) => self.enters_light(forest, views, a, b),
-            (Kind::Element, Kind::Light) => self.enters_light(forest, views, b, a),
+            (Kind::Element, Kind::Element) => self.mover_is_between(forest, views, (a, b), rides),
+            (Kind::Light, Kind::Element) => self.mover_is_before_light(forest, views, a, b),
+            (Kind::Element, Kind::Light) => self.mover_is_before_light(forest, views, b, a),
             // Lights have no box: their pairs with groups are looked at always.
             (Kind::Light, _) | (_, Kind::Light) => true,
-            _ => views
-                .iter()
-                .any(|v| self.meets(forest, &BoxShaft::new(v, forest, (a, b), body), rides)),
+            _ => views.iter().any(|v| {
+                self.mover_enters_box_shaft(forest, &BoxShaft::new(v, forest, (a, b), body), rides)
+            }),
         };
         if entered { Stale::Occlusion } else { Stale::Nothing }
     }
 
-    fn meets(&self, forest: &Forest, shaft: &BoxShaft<'_>, rides: Option<BodyId>) -> bool {
+    /// Whether the box of a mover meets a shaft; seen from the body `rides` that both ends ride on, all else moves.
+    fn mover_enters_box_shaft(
+        &self,
+        forest: &Forest,
+        shaft: &BoxShaft<'_>,
+        rides: Option<BodyId>,
+    ) -> bool {
         match rides {
-            // Seen from a moving body, everything else moves.
             Some(_) => shaft.is_entered_by(Forest::ROOT, rides),
             None => self.movers.iter().any(|&m| shaft.is_entered_by(forest.body_root(m), None)),
         }
     }
 
     /// Whether a mover stood or stands between two elements.
-    fn enters(
+    fn mover_is_between(
         &self,
         forest: &Forest,
         views: [&WorldView; 2],
@@ -248,10 +253,11 @@ impl<'a> WorldChange<'a> {
             });
         }
         let (a, b) = (&place(views[1], a), &place(views[1], b));
-        self.enter_any(forest, views, (a, b), patches)
+        self.mover_enters_shaft(forest, views, (a, b), patches)
     }
 
-    fn enters_light(
+    /// Whether a mover stood or stands between a punctual light and an element.
+    fn mover_is_before_light(
         &self,
         forest: &Forest,
         views: [&WorldView; 2],
@@ -263,11 +269,11 @@ impl<'a> WorldChange<'a> {
         let e = WorldElement::new(new, forest, element, false);
         let place = LightPlace::new(lamp, &e, new.far_m());
         let patch = forest.patch(element).expect("elements have patches");
-        self.enter_any(forest, views, (&e, &place.stand_in), (patch, patch))
+        self.mover_enters_shaft(forest, views, (&e, &place.stand_in), (patch, patch))
     }
 
     /// Whether a mover stood or stands between two ends that are at rest.
-    fn enter_any(
+    fn mover_enters_shaft(
         &self,
         forest: &Forest,
         views: [&WorldView; 2],

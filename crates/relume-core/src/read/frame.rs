@@ -77,9 +77,7 @@ impl<'a> Frame<'a> {
     /// Irradiances at many sensors in parallel, W/m2, linear RGB, in their order. Cost: some 0.1 us for each element
     /// that is neither far from a sensor nor hidden, more where something is partly in the way.
     pub fn irradiances_at(&self, sensors: &[Sensor]) -> Vec<[f64; 3]> {
-        let unit =
-            |sensor: &Sensor| Sensor { normal: sensor.normal.normalize_or(DVec3::NAN), ..*sensor };
-        let sensors: Vec<Sensor> = sensors.iter().map(unit).collect();
+        let sensors: Vec<Sensor> = sensors.iter().map(Sensor::with_unit_normal).collect();
         sensors::irradiances_at(self.solved, &sensors)
     }
 
@@ -102,10 +100,12 @@ impl<'a> Frame<'a> {
         estimate::errors(self.solved, points, true)
     }
 
-    /// Errors of the irradiance at sensors, estimated at each of them as by [`Frame::accuracy`]; where no light arrives, there is
-    /// none.
+    /// Errors of the irradiance at sensors, estimated at each of them as by [`Frame::accuracy`]. Those where no light arrives are left
+    /// out, and so are those of which the point or the direction of the normal is no number: [`Accuracy::points`] counts the others.
     pub fn accuracy_at(&self, sensors: &[Sensor]) -> Accuracy {
-        accuracy::accuracy_at(self.solved, sensors)
+        let units = sensors.iter().map(Sensor::with_unit_normal);
+        let sensors: Vec<Sensor> = units.filter(Sensor::is_finite).collect();
+        accuracy::accuracy_at(self.solved, &sensors)
     }
 
     /// The link events of this frame, if [`Options::events`](crate::session::Options::events) asks for them: none after a cold build.

@@ -25,8 +25,20 @@ use crate::read::tuning::SENSOR_SPLITS;
 pub struct Sensor {
     /// Where it is, metres.
     pub at: DVec3,
-    /// Unit vector that it faces along.
+    /// Direction that it faces along, of any length but 0.
     pub normal: DVec3,
+}
+
+impl Sensor {
+    /// This sensor with a normal of length 1; no number where the normal has no direction.
+    pub(super) fn with_unit_normal(&self) -> Sensor {
+        Sensor { normal: self.normal.normalize_or(DVec3::NAN), ..*self }
+    }
+
+    /// Whether point and normal are numbers.
+    pub(super) fn is_finite(&self) -> bool {
+        self.at.is_finite() && self.normal.is_finite()
+    }
 }
 
 /// How far a sensor may be off the surface it lies on, relative to the scene's diagonal: what files

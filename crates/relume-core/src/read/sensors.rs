@@ -24,7 +24,7 @@ pub(super) fn irradiances_at(solved: &Solved, sensors: &[Sensor]) -> Vec<[f64; 3
 
 /// Irradiance at a sensor, W/m2.
 pub(super) fn irradiance(solved: &Solved, sensor: &Sensor) -> [f64; 3] {
-    if !(sensor.at.is_finite() && sensor.normal.is_finite()) {
+    if !sensor.is_finite() {
         return [f64::NAN; 3];
     }
     let found = Look::new(solved, sensor, Purpose::Sensor).gather();

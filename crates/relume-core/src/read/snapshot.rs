@@ -117,13 +117,14 @@ impl Snapshot {
     }
 
     /// Irradiance of the mesh at a point of a surface, W/m2, linear RGB: on the nearest patch that faces along `normal` (to
-    /// within 25 degrees) and has the point on it, no further than a 1/1000 of the scene's diagonal away; `None` where there is
+    /// within 25 degrees, of any length but 0) and has the point on it, no further than a 1/1000 of the scene's diagonal away; `None` where there is
     /// none.
     ///
     /// Linear over a leaf, with jumps between leaves: across the edge of a shadow it is right in the
     /// mean and wrong on either side. [`Frame::irradiance_at`](super::Frame::irradiance_at) has no such limit.
     pub fn irradiance_at(&self, point: DVec3, normal: DVec3) -> Option<[f64; 3]> {
         let near_m = 1e-3 * self.scene.bounds_in(&self.world)?.diagonal();
+        let normal = normal.normalize_or_zero();
         let mut found: Vec<(f64, PatchId, DVec2)> = Vec::new();
         for (k, patch) in self.scene.patches.iter().enumerate() {
             let Some(pose) = self.world.pose(patch.body) else { continue };

@@ -7,9 +7,9 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use super::covered::{Face, Hull, Stands, dark_in_gaps, hulls_of, reach_m};
+use super::covered::{Face, Hull, Stands, dark_in_gaps, hulls_of};
 use super::gap::{open_sides, widest_m};
-use super::placed::{IN_PLANE, Placed};
+use super::placed::{IN_PLANE, Placed, reach_m};
 use super::{BodyId, Covered, Patch, PatchId, Scene};
 use crate::geometry::{Aabb, BoxTree, Pose};
 use crate::scene::tuning::{COVERING_CUTS_MAX, GAP_PAIRS_MAX};

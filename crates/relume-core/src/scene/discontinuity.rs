@@ -7,12 +7,10 @@
 use glam::{DVec2, DVec3};
 
 use super::gap::PARALLEL;
-use super::{BodyId, Patch, PatchId, Scene};
-use crate::geometry::{Aabb, Plane, Pose, Segment, segment_within};
+use super::placed::{IN_PLANE, Placed, reach_m};
+use super::{BodyId, Patch, Scene};
+use crate::geometry::{Plane, Pose, Segment, segment_within};
 use crate::scene::tuning::{END_WITHIN, HINGE_INSTANTS};
-
-/// What lies this close to a plane, as a share of the largest coordinate, lies in it: a few roundings of 32-bit numbers.
-const IN_PLANE: f64 = 1e-6;
 
 /// Lines on a patch across which radiosity jumps, in its frame, metres; outer edges of the patch are left out.
 #[derive(Clone, Debug, Default)]
@@ -78,15 +76,13 @@ impl Scene {
         if edges.is_empty() {
             return;
         }
-        for id in at_rest.iter().flat_map(|&body| self.patches_of(body)).map(|(id, _)| id) {
-            let placed = Placed::new(self, id);
-            let slack_m =
-                IN_PLANE * placed.bounds.lo.abs().max(placed.bounds.hi.abs()).max_element();
-            let patch = &self.patches[id.0 as usize];
-            let plane = Plane::through(patch.frame.origin, patch.frame.normal);
+        for (id, patch) in at_rest.iter().flat_map(|&body| self.patches_of(body)) {
+            let placed = Placed::new(id, patch, &Pose::IDENTITY);
+            let slack_m = IN_PLANE * reach_m(&placed.bounds);
+            let plane = Plane::through(placed.origin, placed.normal);
             let lies =
                 |edge: &&[DVec3; 2]| edge.iter().all(|&p| plane.distance(p).abs() <= slack_m);
-            let lines = edges.iter().filter(lies).map(|edge| edge.map(|p| in_frame(patch, p)));
+            let lines = edges.iter().filter(lies).map(|edge| edge.map(|p| placed.in_frame(p)));
             let within = lines.filter_map(|line| segment_within(&patch.corners, line, slack_m));
             out[id.0 as usize].met.extend(within);
         }
@@ -97,14 +93,13 @@ impl Scene {
         let mut placed: Vec<Placed> = bodies
             .iter()
             .flat_map(|&body| self.patches_of(body))
-            .map(|(id, _)| Placed::new(self, id))
+            .map(|(id, patch)| Placed::new(id, patch, &Pose::IDENTITY))
             .collect();
-        let reach = |p: &Placed| p.bounds.lo.abs().max(p.bounds.hi.abs()).max_element();
-        let slack_m = IN_PLANE * placed.iter().map(reach).fold(0.0, f64::max);
+        let slack_m = IN_PLANE * placed.iter().map(|p| reach_m(&p.bounds)).fold(0.0, f64::max);
         placed.iter_mut().for_each(|p| p.bounds = p.bounds.grown(slack_m));
         placed.sort_by(|p, q| p.bounds.lo.x.total_cmp(&q.bounds.lo.x).then(p.id.cmp(&q.id)));
         for (k, one) in placed.iter().enumerate() {
-            let near = one.bounds.grown(one.widest_m);
+            let near = one.bounds.grown(self.end_within_m(one));
             let beside = placed[k + 1..].iter().take_while(|q| q.bounds.lo.x <= near.hi.x);
             for other in beside.filter(|q| q.bounds.meets(&near)) {
                 let touches = other.bounds.meets(&one.bounds);
@@ -126,21 +121,28 @@ impl Scene {
         }
     }
 
+    /// Distance within which others end close before a patch, metres.
+    fn end_within_m(&self, placed: &Placed) -> f64 {
+        let (corners, n) = (&placed.corners, placed.corners.len());
+        let border_m: f64 = (0..n).map(|k| corners[k].distance(corners[(k + 1) % n])).sum();
+        END_WITHIN * 4.0 * self.patches[placed.id.0 as usize].area_m2() / border_m
+    }
+
     /// Whether the polygon `by` lies before `of`, parallel to it, close for their sizes.
     fn is_close_before(&self, (of, by): (&Placed, &Placed), slack_m: f64) -> bool {
-        let [of_frame, by_frame] = [of, by].map(|p| self.patches[p.id.0 as usize].frame);
-        let plane = Plane::through(of_frame.origin, of_frame.normal);
+        let plane = Plane::through(of.origin, of.normal);
         let heights = || by.corners.iter().map(|&c| plane.distance(c));
-        let widest_m = of.widest_m.min(by.widest_m);
-        of_frame.normal.dot(by_frame.normal) <= -PARALLEL
-            && heights().all(|h| h >= -slack_m && h <= widest_m)
-            && heights().any(|h| h > slack_m)
+        if of.normal.dot(by.normal) > -PARALLEL {
+            return false;
+        }
+        let widest_m = self.end_within_m(of).min(self.end_within_m(by));
+        heights().all(|h| h >= -slack_m && h <= widest_m) && heights().any(|h| h > slack_m)
     }
 
     /// Adds where the polygon `by` ends before the patch.
     fn end(&self, (of, by): (&Placed, &Placed), slack_m: f64, out: &mut Discontinuities) {
         let patch = &self.patches[of.id.0 as usize];
-        let corners: Vec<DVec2> = by.corners.iter().map(|&c| in_frame(patch, c)).collect();
+        let corners: Vec<DVec2> = by.corners.iter().map(|&c| of.in_frame(c)).collect();
         let sides = (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]]);
         let within = sides.filter_map(|side| segment_within(&patch.corners, side, slack_m));
         let lamp = &self.patches[by.id.0 as usize];
@@ -162,9 +164,8 @@ impl Scene {
     /// Adds where the polygon `by` meets the plane of `of` within that patch.
     fn met(&self, (of, by): (&Placed, &Placed), slack_m: f64, out: &mut Vec<Segment>) {
         let patch = &self.patches[of.id.0 as usize];
-        let frame = patch.frame;
-        let plane = Plane::through(frame.origin, frame.normal);
-        let in_frame = |p: DVec3| in_frame(patch, p);
+        let plane = Plane::through(of.origin, of.normal);
+        let in_frame = |p: DVec3| of.in_frame(p);
         let n = by.corners.len();
         let above: Vec<f64> = by.corners.iter().map(|&c| plane.distance(c)).collect();
         let is_on = |k: usize| above[k].abs() <= slack_m;
@@ -186,37 +187,11 @@ impl Scene {
     }
 }
 
-/// A point in a patch's frame, metres.
-fn in_frame(patch: &Patch, p: DVec3) -> DVec2 {
-    let d = p - patch.frame.origin;
-    DVec2::new(d.dot(patch.frame.u), d.dot(patch.frame.v))
-}
-
 /// The two points farthest from each other, if there are two.
 fn farthest(points: &[DVec2]) -> Option<Segment> {
     let pairs =
         points.iter().enumerate().flat_map(|(k, &p)| points[..k].iter().map(move |&q| [q, p]));
     pairs.max_by(|p, q| p[0].distance_squared(p[1]).total_cmp(&q[0].distance_squared(q[1])))
-}
-
-/// A patch in the frame of its group.
-struct Placed {
-    id: PatchId,
-    corners: Vec<DVec3>,
-    bounds: Aabb,
-    /// Distance within which others end close before the patch, metres.
-    widest_m: f64,
-}
-
-impl Placed {
-    fn new(scene: &Scene, id: PatchId) -> Placed {
-        let corners: Vec<DVec3> = scene.patches[id.0 as usize].corners_in_body().collect();
-        let bounds = Aabb::of(corners.iter().copied());
-        let n = corners.len();
-        let border_m: f64 = (0..n).map(|k| corners[k].distance(corners[(k + 1) % n])).sum();
-        let widest_m = END_WITHIN * 4.0 * scene.patches[id.0 as usize].area_m2() / border_m;
-        Placed { id, corners, bounds, widest_m }
-    }
 }
 
 #[cfg(test)]

@@ -8,6 +8,11 @@ use crate::geometry::{Aabb, Pose};
 /// What lies this close to a plane, as a share of the largest coordinate, lies in it: a few roundings of 32-bit numbers.
 pub(super) const IN_PLANE: f64 = 1e-6;
 
+/// Largest coordinate of a box, metres.
+pub(super) fn reach_m(bounds: &Aabb) -> f64 {
+    bounds.lo.abs().max(bounds.hi.abs()).max_element()
+}
+
 /// A patch in the frame of its group.
 pub(super) struct Placed {
     pub(super) id: PatchId,

@@ -290,7 +290,12 @@ impl Session {
     /// A step to a world, in the present scene.
     fn goal<'a>(&'a self, world: &'a World, held: &'a Held, from: Option<&'a World>) -> Goal<'a> {
         let Options { tolerance, aim, .. } = self.options;
-        let tuning = Tuning { tolerance, aim, oracle: self.options.pair_oracle(), simd: self.simd };
+        let tuning = Tuning {
+            tolerance,
+            aim,
+            criterion: self.options.refinement_criterion(),
+            simd: self.simd,
+        };
         Goal { bed: &self.bed, world, held, from, tuning }
     }
 

@@ -1,6 +1,7 @@
 //! Options of a session.
 
 use crate::follow::Update;
+use crate::pair::RefinementCriterion;
 pub use crate::space::Aim;
 use crate::space::Bedding;
 
@@ -86,12 +87,12 @@ impl Options {
         Bedding { groups: weighs && self.groups, coarse: weighs }
     }
 
-    /// The oracle in the pair tree's terms.
-    pub(super) fn pair_oracle(&self) -> crate::pair::Oracle {
+    /// Criterion by which the pair tree refines.
+    pub(super) fn refinement_criterion(&self) -> RefinementCriterion {
         match self.oracle {
-            Oracle::Error => crate::pair::Oracle::Error { threshold: self.tolerance * LINK_SHARE },
+            Oracle::Error => RefinementCriterion::Error { threshold: self.tolerance * LINK_SHARE },
             Oracle::FormFactor { epsilon, min_area_m2 } => {
-                crate::pair::Oracle::FormFactor { epsilon, min_area_m2 }
+                RefinementCriterion::FormFactor { epsilon, min_area_m2 }
             }
         }
     }

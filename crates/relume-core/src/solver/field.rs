@@ -152,13 +152,13 @@ impl Field {
     }
 }
 
-/// Vectors that grow are given room for this share more than they need.
-pub(super) const SLACK: usize = 32;
+/// Spare capacity that vectors get as they grow, as one part in this many of their length.
+pub(super) const SPARE: usize = 32;
 
 /// Appends zeros, in the room that there is or else in a little more than is needed.
 pub(super) fn grow(values: &mut Vec<f32>, len: usize) {
     if len > values.capacity() {
-        let slack = if values.is_empty() { 0 } else { len / SLACK };
+        let slack = if values.is_empty() { 0 } else { len / SPARE };
         values.reserve_exact(len + slack - values.len());
     }
     values.resize(len, 0.0);

@@ -37,7 +37,7 @@ impl Level {
         reflected.times(self.factor).plus(&self.direct)
     }
 
-    /// Irradiance from that over the links, W/m2 and per metre: of a level that counts both ways.
+    /// Irradiance from that over the links, W/m2 and per metre: of a symmetric level.
     pub(super) fn received(&self, h: &Linear, place: &Place, moment: f32) -> Linear {
         self.weighed(&h.minus(&self.direct), place, moment).plus(&self.direct)
     }

@@ -1,5 +1,6 @@
 //! For each receiver the sources it gathers from.
 
+use super::field::SPARE;
 use crate::element::Renumbering;
 use crate::pair::Gradients;
 
@@ -39,9 +40,6 @@ struct Span {
 
 /// Links are kept in blocks with room for a multiple of so many.
 const CAPACITY: u32 = 4;
-
-/// Vectors are given room for this share more than they need.
-const SLACK: usize = 32;
 
 fn room(len: u32) -> u32 {
     len.next_multiple_of(CAPACITY)
@@ -112,7 +110,7 @@ impl Links {
     /// Makes room for receivers with higher ids; they have no links yet.
     pub fn extend(&mut self, elements: usize) {
         if elements > self.spans.capacity() {
-            self.spans.reserve_exact(elements + elements / SLACK - self.spans.len());
+            self.spans.reserve_exact(elements + elements / SPARE - self.spans.len());
         }
         if elements > self.spans.len() {
             self.spans.resize(elements, Span::default());
@@ -166,7 +164,7 @@ impl Links {
         let (from, to) = (span.start as usize, self.pool.len());
         let wanted = to + room(len) as usize;
         if wanted > self.pool.capacity() {
-            self.pool.reserve_exact(wanted / SLACK + room(len) as usize);
+            self.pool.reserve_exact(wanted / SPARE + room(len) as usize);
         }
         self.pool.extend_from_within(from..from + span.len as usize);
         self.pool.resize(wanted, Link::default());
@@ -205,8 +203,8 @@ impl Links {
 
     /// Gives back room beyond a small reserve.
     pub fn trim(&mut self) {
-        self.spans.shrink_to(self.spans.len() + self.spans.len() / SLACK);
-        self.pool.shrink_to(self.pool.len() + self.pool.len() / SLACK);
+        self.spans.shrink_to(self.spans.len() + self.spans.len() / SPARE);
+        self.pool.shrink_to(self.pool.len() + self.pool.len() / SPARE);
         self.fresh = Vec::new();
     }
 

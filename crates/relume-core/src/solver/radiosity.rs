@@ -4,19 +4,23 @@ use std::collections::BTreeMap;
 
 use crate::element::Renumbering;
 
-use super::field::{Field, Linear, SLACK, grow};
+use super::field::{Field, Linear, SPARE, grow};
 use super::place::Place;
 use super::push::{RowSum, push};
 use super::surfaces::{Surfaces, for_each_below};
 use super::trend::Trend;
 
+mod bounded;
 mod levels;
 mod scaling;
 mod solve;
+#[cfg(test)]
+mod toy;
 
+pub use bounded::Bounds;
 use levels::Levels;
 use scaling::RowScaling;
-pub use solve::{Bounds, Stop};
+pub use solve::Stop;
 
 /// What came over links of groups to whom something did: few elements do, since groups are linked with large ones.
 #[derive(Clone, Debug, Default)]
@@ -132,7 +136,7 @@ impl Radiosity {
     pub fn trim(&mut self) {
         let Radiosity { radiosity, gathered, pending, deferred, .. } = self;
         for values in [&mut radiosity.0, &mut gathered.0, pending, deferred] {
-            values.shrink_to(values.len() + values.len() / SLACK);
+            values.shrink_to(values.len() + values.len() / SPARE);
         }
         self.trend.trim();
     }
@@ -196,10 +200,10 @@ impl Radiosity {
     }
 
     /// Mean over a leaf of its radiosity times the sum of the form factors from there, W/m2: what its links carry away,
-    /// where both vary together too. Of a leaf that is levelled both ways, all that it reflects.
+    /// where both vary together too. Of a leaf with a symmetric level, all that it reflects.
     pub fn carried(&self, surfaces: &impl Surfaces, id: u32, row: &RowSum) -> [f64; 3] {
         let b = self.radiosity.get(id);
-        if self.levels.are_both_ways() && self.levels.is_closed(id) {
+        if self.levels.are_symmetric() && self.levels.is_closed(id) {
             let emitted = surfaces.material(surfaces.facet_of(id)).exitance;
             let of = |c: usize| {
                 let own = f64::from(emitted[c]);
@@ -233,7 +237,7 @@ impl Radiosity {
             &own,
             &mut |id, h| match (self.scaling.factors.get(id as usize), self.levels.get(id)) {
                 (Some(&factor), _) => visit(id, &h.times(factor)),
-                (None, Some(level)) if !self.levels.are_both_ways() => visit(id, &level.evened(h)),
+                (None, Some(level)) if !self.levels.are_symmetric() => visit(id, &level.evened(h)),
                 (None, Some(level)) => {
                     visit(id, &level.received(h, &surfaces.place(id), surfaces.source_moment()));
                 }

@@ -47,7 +47,7 @@ pub(super) struct Below<'a, S> {
     /// Level of each leaf; empty where there are none.
     pub(super) levels: &'a [Level],
     /// Whether levels count for what is sent as for what is received.
-    pub(super) both_ways: bool,
+    pub(super) is_symmetric: bool,
     pub(super) surfaces: &'a S,
     pub(super) material: &'a FacetMaterial,
     pub(super) limit: f32,
@@ -147,7 +147,7 @@ impl<S: Surfaces> Below<'_, S> {
 
     /// Irradiance of which a leaf sends what it reflects.
     fn levelled(&self, level: &Level, h: &Linear, place: &Place) -> Linear {
-        if !self.both_ways {
+        if !self.is_symmetric {
             return level.evened(h);
         }
         let moment = self.surfaces.source_moment();

@@ -2,7 +2,7 @@
 
 use crate::element::Renumbering;
 
-use super::field::{Field, NINE, SLACK};
+use super::field::{Field, NINE, SPARE};
 use super::surfaces::{Surfaces, for_each_below};
 use super::tuning::WIDE_SHARE;
 
@@ -92,7 +92,7 @@ impl Trend {
     }
 
     pub(super) fn trim(&mut self) {
-        self.steps.shrink_to(self.steps.len() + self.steps.len() / SLACK);
+        self.steps.shrink_to(self.steps.len() + self.steps.len() / SPARE);
     }
 
     pub(super) fn bytes(&self) -> u64 {

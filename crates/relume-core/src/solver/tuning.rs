@@ -95,7 +95,7 @@ pub(super) const GAIN_MAX: f64 = 0.005;
 pub(super) const GAIN_SURE: f64 = 0.0015;
 
 /// Flux that escapes from closed surroundings, or arrives without being sent, or the other way round, over what is emitted, from which
-/// levels count both ways if that keeps light better.
+/// levels are made symmetric if that keeps light better.
 ///
 /// - Unit: 1
 /// - Tried: 0.01 (lamps by boards below ceilings are off by up to a hundredth), 0.005

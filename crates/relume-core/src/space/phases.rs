@@ -7,7 +7,8 @@ use crate::follow::{
     Balance, Clocked, Follower, FrameReport, Level, Motion, Prediction, Space, Update, Void, Why,
 };
 use crate::pair::{
-    self, Changes, CoarseLink, Oracle, PairId, PairTree, SpaceJudge, Stage, WorldChange,
+    self, Changes, CoarseLink, PairId, PairTree, RefinementCriterion, SpaceJudge, Stage,
+    WorldChange,
 };
 use crate::scene::{BodyId, Held, LightId, World};
 use crate::solver::{Dirty, GroupLinks, Radiosity};
@@ -144,7 +145,7 @@ impl Space for SpaceState {
                 Level::Coarse => Stage::Coarse,
                 Level::Fine => Stage::Fine(&self.coarse.brightness),
             },
-            oracle: goal.tuning.oracle,
+            criterion: goal.tuning.criterion,
             simd: goal.tuning.simd,
             change: motion.change,
             motion_bounds: motion.prediction.motion_bounds.as_ref(),
@@ -278,7 +279,7 @@ impl Space for SpaceState {
     }
 
     fn rows_are_close(goal: &Goal<'_>) -> bool {
-        matches!(goal.tuning.oracle, Oracle::Error { .. })
+        matches!(goal.tuning.criterion, RefinementCriterion::Error { .. })
     }
 
     fn mean_radiosity_bound_w_m2(goal: &Goal<'_>) -> f64 {
@@ -349,9 +350,9 @@ impl Space for SpaceState {
 
 /// Share of what is emitted that may be unaccounted for in a result: as much as is asked for, or a tenth.
 fn unbalanced_max(tuning: &Tuning) -> f64 {
-    match tuning.oracle {
-        Oracle::Error { .. } => tuning.tolerance.max(0.1),
-        Oracle::FormFactor { .. } => 0.5,
+    match tuning.criterion {
+        RefinementCriterion::Error { .. } => tuning.tolerance.max(0.1),
+        RefinementCriterion::FormFactor { .. } => 0.5,
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::element::{ElementId, Forest, WorldView};
-use crate::pair::Oracle;
+use crate::pair::RefinementCriterion;
 use crate::scene::{Held, Scene, World};
 use crate::solver::GroupLinks;
 use crate::transport::Simd;
@@ -21,7 +21,7 @@ pub(crate) struct Tuning {
     /// What the tolerance is about.
     pub(crate) aim: Aim,
     /// What decides on pairs.
-    pub(crate) oracle: Oracle,
+    pub(crate) criterion: RefinementCriterion,
     /// Vector instructions.
     pub(crate) simd: Simd,
 }

@@ -6,10 +6,12 @@
 use crate::element::{ElementId, Kind, WorldElement};
 use crate::scene::PatchId;
 
+use super::candidates::Candidates;
 use super::kernel::Simd;
 use super::segments::{SEGMENTS, SegmentBundle};
+use super::shaft::{LIFT, Shaft, ShaftsOfBoxes, Standing, TestFrame};
 use super::share::Visibility;
-use super::visibility::{Candidates, LIFT, Shaft, ShaftsOfBoxes, Standing, Tally};
+use super::tally::Tally;
 
 /// The blockers of a pair, not listed.
 pub struct Crowd<'a> {
@@ -53,7 +55,7 @@ impl Crowd<'_> {
 
     fn look(&self, key: u64, log2_count: u32, crossed: &mut Crossed) -> Visibility {
         let Shaft { a, b, own, .. } = *self.shaft;
-        let ends = own.map_or((a, b), |(_, a, b)| (a, b));
+        let ends = self.shaft.own_frame();
         let mut tally = Tally::default();
         for block in 0..(1_u32 << log2_count) / SEGMENTS as u32 {
             let of = |a: &WorldElement, b: &WorldElement| {
@@ -63,9 +65,9 @@ impl Crowd<'_> {
             crossed.blocked = 0;
             self.cross(&Bundles { world: &world, own: own.as_ref() }, crossed);
             let weights = own.as_ref().unwrap_or(&world);
-            tally.add(weights, crossed.blocked, ends.0, ends.1);
+            tally.add(weights, crossed.blocked, ends.a, ends.b);
         }
-        tally.finish(1 << log2_count, ends.0, ends.1)
+        tally.finish(1 << log2_count, ends.a, ends.b)
     }
 
     /// Finds what the segments of a bundle cross.
@@ -85,11 +87,9 @@ impl Crowd<'_> {
             if view.fixed_box(id).is_empty() || forest.kind(id) == Kind::Light {
                 continue;
             }
-            let (bundle, bounds) = match self.own_bundle(bundles, id) {
-                Some(own) => (own, view.box_in_body(id)),
-                None => (bundles.world, view.fixed_box(id)),
-            };
-            if bundle.that_meet(self.simd, bounds, margin_m) & !done == 0 {
+            let frame = self.frame_of(id);
+            let bundle = bundles.own.filter(|_| frame.is_own).unwrap_or(bundles.world);
+            if bundle.that_meet(self.simd, frame.bounds(id), margin_m) & !done == 0 {
                 continue;
             }
             match forest.patch(id) {
@@ -99,14 +99,12 @@ impl Crowd<'_> {
         }
     }
 
-    /// The bundle in the frame of the pair's own body for what rides on it.
-    fn own_bundle<'b>(&self, bundles: &Bundles<'b>, id: ElementId) -> Option<&'b SegmentBundle> {
-        let (body, ..) = self.shaft.own?;
-        let of_node = match self.shaft.forest.patch(id) {
-            Some(patch) => Some(self.shaft.view.patch(patch).body),
-            None => self.shaft.forest.cluster_body(id),
-        };
-        bundles.own.filter(|_| of_node == Some(body))
+    /// The frame in which a node is tested.
+    fn frame_of(&self, id: ElementId) -> TestFrame<'_> {
+        match self.shaft.forest.patch(id) {
+            Some(patch) => self.shaft.frame_of(patch),
+            None => self.shaft.frame_of_body(self.shaft.forest.cluster_body(id)),
+        }
     }
 
     fn cross_patch(

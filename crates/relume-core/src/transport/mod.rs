@@ -5,7 +5,12 @@
 //! radiosity, time or the pair tree.
 
 mod bend;
+mod between;
+mod blocker_sizes;
+mod blockers;
+mod candidates;
 mod clip;
+mod clipping;
 mod contact;
 mod contour;
 mod crowd;
@@ -14,17 +19,25 @@ mod group;
 mod kernel;
 mod logarithm;
 mod point;
+mod point_view;
 mod prepared_view;
 mod segments;
+mod shaft;
 mod share;
 mod side;
 mod silhouette;
 mod spot;
+mod tally;
+mod target_frame;
 mod tuning;
 mod visibility;
 
 pub use bend::{Bend, Receiver};
+pub use blocker_sizes::BlockerSizes;
+pub use blockers::{clipping, prepare_view};
+pub use candidates::{Candidates, InShaft};
 pub use clip::keep_in_front;
+pub use clipping::Clipping;
 pub use contact::{in_plane, lies_in, overlap_m2};
 pub use crowd::{Crowd, light_past_crowd};
 pub use exchange::{
@@ -34,12 +47,11 @@ pub use exchange::{
 pub use group::{GroupSight, Slope, Spread, common_body};
 pub use kernel::Simd;
 pub use point::form_factor_from_point;
-pub use prepared_view::{Clipping, FactorPast, PreparedView, form_factor_past};
+pub use point_view::{FactorPast, form_factor_past};
+pub use prepared_view::PreparedView;
 pub use segments::{SEGMENTS, SegmentBundle};
+pub use shaft::Shaft;
 pub use share::Visibility;
 pub use side::Side;
 pub use tuning::{CELLS_MAX, CLIPPED_MAX, GROUP_SEGMENTS};
-pub use visibility::{
-    BlockerSizes, Candidates, InShaft, Shaft, clipping, light_visibility, prepare_view,
-    segment_is_clear, visibility,
-};
+pub use visibility::{light_visibility, segment_is_clear, visibility};

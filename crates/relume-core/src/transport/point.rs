@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use fearless_simd::dispatch;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::kernel::Simd;
 
@@ -187,6 +187,22 @@ fn fill_shares(bundles: &mut [EdgeBundle], n: [f64; 3]) {
             bundle.share[k] = edge(at(&bundle.p), at(&bundle.q), n);
         }
     }
+}
+
+/// The middle of what a polygon sends to a point with a normal: of its triangles, each with the kernel at its
+/// middle.
+pub(super) fn middle_of_sent(c: &[DVec2], from: DVec3, normal: DVec3) -> DVec2 {
+    let (mut sum, mut weight) = (DVec2::ZERO, 0.0);
+    for k in 1..c.len() - 1 {
+        let twice = (c[k] - c[0]).perp_dot(c[k + 1] - c[0]);
+        let middle = (c[0] + c[k] + c[k + 1]) / 3.0;
+        let way = middle.extend(0.0) - from;
+        let r2 = way.length_squared();
+        let sent = twice * normal.dot(way).max(0.0) / (r2 * r2);
+        sum += middle * sent;
+        weight += sent;
+    }
+    if weight != 0.0 { sum / weight } else { c[0] }
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@ use super::{ChildRange, Forest, NONE, Node, Siblings};
 use crate::element::exposed::exposed_m2;
 use crate::element::ids::{ElementId, Kind, Renumbering};
 
-/// Vectors of the forest are given room for this share more than they need.
-const SLACK: usize = 32;
+/// Spare capacity that vectors of the forest keep, as one part in this many of their length.
+const SPARE: usize = 32;
 
 impl Forest {
     /// Everything that exists now stays for good.
@@ -176,8 +176,8 @@ impl Forest {
 
     /// Gives back room beyond a small reserve.
     pub fn trim(&mut self) {
-        self.nodes.shrink_to(self.nodes.len() + self.nodes.len() / SLACK);
-        self.siblings.shrink_to(self.siblings.len() + self.siblings.len() / SLACK);
+        self.nodes.shrink_to(self.nodes.len() + self.nodes.len() / SPARE);
+        self.siblings.shrink_to(self.siblings.len() + self.siblings.len() / SPARE);
         self.vacant.iter_mut().for_each(|list| list.shrink_to(2 * list.len()));
     }
 }

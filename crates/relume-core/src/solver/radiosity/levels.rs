@@ -7,7 +7,7 @@
 //! as if the row were 1, and even. Direct light, of which each link errs little, stays as it is.
 //!
 //! What a leaf receives is divided by its row; what it sends goes by its row as it is, so that light is lost or made where leaves with
-//! low rows are brighter than others. *Both ways*, what is sent counts times the same line as what is received: lines with which every row
+//! low rows are brighter than others. *Symmetric* levels multiply what is sent by the line that multiplies what is received: lines with which every row
 //! sums to 1 are found by symmetric scaling (Sinkhorn and Knopp 1967), and light is neither made nor lost.
 
 use fearless_simd::dispatch;
@@ -26,7 +26,7 @@ use crate::solver::surfaces::{FacetMaterial, Surfaces, for_each_below};
 use crate::solver::tuning::{CLOSED, FACTOR_LEAST, LEVEL_MOST, SCALING_ROUNDS};
 use crate::transport;
 
-/// Most by which the line of a level that counts both ways falls over the radius of its leaf: it stays above zero.
+/// Most by which the line of a symmetric level falls over the radius of its leaf: it stays above zero.
 const SLOPE_MOST: f32 = 0.5;
 
 /// Levels of leaves. None where nothing is white.
@@ -34,7 +34,7 @@ const SLOPE_MOST: f32 = 0.5;
 pub(super) struct Levels {
     /// By element; of no meaning for what is no leaf.
     leaves: Vec<Level>,
-    both_ways: bool,
+    is_symmetric: bool,
 }
 
 impl Levels {
@@ -58,17 +58,17 @@ impl Levels {
                 *level = Level { is_closed: true, factor, slope, ..*level };
             });
         }
-        Levels { leaves, both_ways: false }
+        Levels { leaves, is_symmetric: false }
     }
 
-    /// Levels of these leaves that count both ways, with which rows outside closed surroundings sum to as much as `rows`.
-    pub(super) fn both_ways(
+    /// Symmetric levels of these leaves, with which rows outside closed surroundings sum to as much as `rows`.
+    pub(super) fn made_symmetric(
         mut self,
         surfaces: &impl Surfaces,
         links: &Links,
         rows: &RowScaling,
     ) -> Levels {
-        self.both_ways = true;
+        self.is_symmetric = true;
         for level in &mut self.leaves {
             (level.factor, level.slope) = (1.0, [0.0; 2]);
         }
@@ -135,9 +135,9 @@ impl Levels {
         gathered_from(&sent, surfaces, links, linear)
     }
 
-    /// Whether they count for what is sent as for what is received.
-    pub(super) fn are_both_ways(&self) -> bool {
-        self.both_ways
+    /// Whether what leaves send is multiplied by the same lines as what they receive.
+    pub(super) fn are_symmetric(&self) -> bool {
+        self.is_symmetric
     }
 
     /// Level of an element; none where nothing is levelled, and of elements that came since.

@@ -1,0 +1,104 @@
+//! Sizes and distances of the blockers and lamps between two elements, which the error of a link depends on.
+
+use crate::element::WorldElement;
+use crate::scene::PatchId;
+
+use super::candidates::InShaft;
+use super::shaft::Shaft;
+use super::spot::spot;
+use super::tuning::BODY_SHARE;
+
+/// Sizes of the blockers between two ends; infinite where there are none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BlockerSizes {
+    /// For each end how unevenly lamps in the shaft light it (`spot`): 1.
+    pub spots: [f64; 2],
+    /// Area of the smallest blocker, m2.
+    pub least_m2: f64,
+    /// Area of all blockers, m2.
+    pub all_m2: f64,
+    /// For each end, how far an edge of a blocker moves over the other end, at most, in units of how far the point on
+    /// this one moves that it is seen from: the ratio of the blocker's distances from the two centres.
+    pub leverage: [f64; 2],
+    /// For each end, how near a blocker is for its size: the square of its radius over the distance of its centre from the
+    /// nearest blocker, at most 1. Where one stands on an end, light that arrives there stops at a line: 1.
+    pub near: [f64; 2],
+}
+
+impl BlockerSizes {
+    /// Nothing stands between the ends.
+    pub const NOTHING: BlockerSizes = BlockerSizes {
+        spots: [0.0; 2],
+        least_m2: f64::INFINITY,
+        all_m2: f64::INFINITY,
+        leverage: [0.0; 2],
+        near: [0.0; 2],
+    };
+}
+
+/// The larger of two numbers, by end.
+#[inline]
+fn larger(one: [f64; 2], other: [f64; 2]) -> [f64; 2] {
+    [one[0].max(other[0]), one[1].max(other[1])]
+}
+
+impl<'a> Shaft<'a> {
+    /// For each end the largest `spot` of some lamps that shine on it, 1; what surrounds the ends has the areas `around_m2`.
+    fn spots(&self, lamps: &[PatchId], around_m2: [f64; 2]) -> [f64; 2] {
+        let mut most = [0.0; 2];
+        for &patch in lamps {
+            let both = self.view.patch(patch).twin.is_some();
+            let frame = self.frame_of(patch);
+            let (a, b, lamp) = (frame.a, frame.b, frame.occluder(patch));
+            let lamp_m2 = self.forest.area_m2(self.forest.patch_root(patch));
+            let of = |e: &WorldElement, around_m2: f64| {
+                let shines = both || lamp.plane.distance(e.centre) > 0.0;
+                if shines { spot(e, around_m2, (&lamp, lamp_m2)) } else { 0.0 }
+            };
+            most = larger(most, [of(a, around_m2[0]), of(b, around_m2[1])]);
+        }
+        most
+    }
+
+    /// Sizes of some blockers and lamps; of a crowd the blockers are those that stand for it.
+    pub fn sizes_of(
+        &self,
+        InShaft { blockers, lamps, .. }: &InShaft,
+        around_m2: [f64; 2],
+    ) -> BlockerSizes {
+        let spots = self.spots(lamps, around_m2);
+        if blockers.is_empty() {
+            return BlockerSizes { spots, ..BlockerSizes::NOTHING };
+        }
+        let area = |&patch: &PatchId| {
+            let root = self.forest.patch_root(patch);
+            let own = self.forest.area_m2(root);
+            // The shadow of a finely tessellated body has the size of the body.
+            match self.forest.is_in_group(root) {
+                true => own.max(BODY_SHARE * self.forest.connected_m2(patch)),
+                false => own,
+            }
+        };
+        let mut sizes = BlockerSizes {
+            spots,
+            least_m2: blockers.iter().map(area).fold(f64::INFINITY, f64::min),
+            all_m2: blockers.iter().map(area).sum(),
+            ..BlockerSizes::NOTHING
+        };
+        for &patch in blockers {
+            self.place(patch, &mut sizes);
+        }
+        sizes
+    }
+
+    /// Adds where a blocker is: how far from each end.
+    fn place(&self, blocker: PatchId, BlockerSizes { leverage, near, .. }: &mut BlockerSizes) {
+        let frame = self.frame_of(blocker);
+        let (a, b, polygon) = (frame.a, frame.b, frame.occluder(blocker));
+        let from = |e: &WorldElement| polygon.distance(e.centre).max(f64::MIN_POSITIVE);
+        let (from_a, from_b) = (from(a), from(b));
+        *leverage = larger(*leverage, [from_b / from_a, from_a / from_b]);
+        let (by_a, by_b) = ((a.radius / from_a).min(1.0), (b.radius / from_b).min(1.0));
+        *near = larger(*near, [by_a * by_a, by_b * by_b]);
+    }
+}

@@ -293,3 +293,35 @@ fn a_body_that_is_absent_casts_no_shadow_and_carries_nothing() {
     let left = (e.emitted_w - e.absorbed_w - e.escaped_w) / e.emitted_w;
     assert!(left.abs() < 1e-3, "{e:?}");
 }
+
+/// Past the edge of a shadow lines lead below 0. What they are below it there is not taken from the light of other lamps.
+#[test]
+fn light_below_zero_is_not_taken_from_the_rest() {
+    let mut below = 0;
+    for k in 0..6 {
+        let mut b = SceneBuilder::new("two lamps");
+        let black = b.material("black", [0.0; 3], [0.0; 3]);
+        let (strong, weak) =
+            (b.material("a", [0.0; 3], [90.0; 3]), b.material("b", [0.0; 3], [3.0; 3]));
+        let node = common::still(&mut b, "room");
+        let down = |x, y, z| common::flipped(facing_up(x, y, z));
+        b.polygon(node, "floor", black, &floor());
+        b.polygon(node, "a", strong, &down([-0.1, 0.1], [-0.1, 0.1], 1.2));
+        b.polygon(node, "b", weak, &down([-2.0, 2.0], [-2.0, 2.0], 2.0));
+        let node = b.node("crate", None, v(0.1 + 0.07 * f64::from(k), 0.2, 0.2), DQuat::IDENTITY);
+        b.cuboid(node, "crate", black, DVec3::splat(-0.2), DVec3::splat(0.2));
+        let (session, _) = solved(b.build().unwrap(), at_tolerance(0.1));
+        let frame = session.frame().unwrap();
+        let [of_a, of_b] = ["a", "b"].map(|name| patches_of(session.scene(), name));
+        let all = frame.solution();
+        let [without_a, without_b] = [of_a, of_b].map(|lamps| frame.solution_beside(&lamps));
+        for (k, leaf) in all.leaves.iter().enumerate() {
+            let [b, a] = [&without_a, &without_b].map(|rest| rest.indirect[k].irradiance[0]);
+            let sum = leaf.irradiance[0];
+            assert!(a + b > sum - 1e-4, "{a} + {b} is not {sum}");
+            below += u32::from(a == 0.0 && sum < 0.98 * b);
+        }
+    }
+    println!("{below} leaves");
+    assert!(below > 0, "no line leads below 0 here");
+}

@@ -7,7 +7,7 @@ use crate::scene::PatchId;
 use crate::solver::{Links, Radiosity};
 use crate::space::Solved;
 
-use super::snapshot::{self, LampLight, Snapshot};
+use super::snapshot::{self, Gathered, LampLight};
 
 /// What some patches emit. What they reflect is left to the links: in the gap above a lamp it is far from uniform.
 pub(super) fn lights(solved: &Solved, lamps: &[PatchId]) -> Vec<LampLight> {
@@ -19,14 +19,15 @@ pub(super) fn lights(solved: &Solved, lamps: &[PatchId]) -> Vec<LampLight> {
     lamps.iter().map(of_patch).collect()
 }
 
-/// A snapshot of the light that comes straight from what some patches emit, and from punctual lights.
+/// The lines of all leaves in the light that comes straight from what some patches emit, and from punctual lights: they may lead
+/// below 0.
 pub(super) fn of(
     solved: &Solved,
     links: &Links,
     radiosity: &Radiosity,
     lamps: &[LampLight],
-) -> Snapshot {
-    snapshot::take(solved, links, &self::radiosity(solved, links, radiosity, lamps))
+) -> Vec<Gathered> {
+    snapshot::lines(solved, links, &self::radiosity(solved, links, radiosity, lamps))
 }
 
 /// That light, as the links have it.

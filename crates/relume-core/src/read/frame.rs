@@ -178,7 +178,8 @@ impl<'a> Frame<'a> {
     fn beside(&self, links: &Links, radiosity: &Radiosity, lamps: &[PatchId]) -> Snapshot {
         let lights = direct::lights(self.solved, lamps);
         let direct = direct::of(self.solved, links, radiosity, &lights);
-        snapshot::take(self.solved, links, radiosity).beside(&direct, lights)
+        let (all, lines) = snapshot::take_with_lines(self.solved, links, radiosity);
+        all.beside((&lines, &direct), lights)
     }
 
     /// The radiosity of all surfaces, as flat arrays.

@@ -102,17 +102,21 @@ impl Leaf {
 }
 
 impl Snapshot {
-    /// The same, knowing what of its light is direct: a snapshot of the same leaves.
-    pub(super) fn beside(mut self, direct: &Snapshot, lamps: Vec<LampLight>) -> Snapshot {
+    /// The same, knowing what of its light is direct: the lines of its leaves without and with the rest.
+    ///
+    /// Lines lead below 0 past the edges of shadows, each part for itself: only their difference is clamped.
+    pub(super) fn beside(
+        mut self,
+        (all, direct): (&[Gathered], &[Gathered]),
+        lamps: Vec<LampLight>,
+    ) -> Snapshot {
         self.lamps = lamps;
-        let rest = |(all, direct): (&Leaf, &Leaf)| Gathered {
+        let rest = |(all, direct): (&Gathered, &Gathered)| Gathered {
             irradiance: [0, 1, 2].map(|c| (all.irradiance[c] - direct.irradiance[c]).max(0.0)),
-            gradient: [0, 1].map(|axis| {
-                let of = |leaf: &Leaf| leaf.irradiance_gradient[axis];
-                [0, 1, 2].map(|c| of(all)[c] - of(direct)[c])
-            }),
+            gradient: [0, 1]
+                .map(|axis| [0, 1, 2].map(|c| all.gradient[axis][c] - direct.gradient[axis][c])),
         };
-        self.indirect = self.leaves.iter().zip(&direct.leaves).map(rest).collect();
+        self.indirect = all.iter().zip(direct).map(rest).collect();
         self
     }
 
@@ -154,11 +158,27 @@ impl Snapshot {
 
 /// The leaves of a solved forest with a solution over it.
 pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Snapshot {
+    take_with_lines(solved, links, radiosity).0
+}
+
+/// The same, with the line of each leaf as it is: it may lead below 0.
+pub(super) fn take_with_lines(
+    solved: &Solved,
+    links: &Links,
+    radiosity: &Radiosity,
+) -> (Snapshot, Vec<Gathered>) {
     let scene = &solved.space.scene;
-    let bends = Bends { solved, links, radiosity };
-    let reader = Reader { solved, surfaces: solved.space.surfaces(), radiosity, bends };
-    let patches = (0..scene.patches.len()).into_par_iter();
-    let by_patch: Vec<Vec<Leaf>> = patches.map(|k| reader.of_patch(PatchId(k as u32))).collect();
+    let reader = Reader::new(solved, links, radiosity);
+    let of_patch = |patch| {
+        let (mut leaves, mut lines) = (Vec::new(), Vec::new());
+        reader.of_patch(patch, &mut |leaf, line| {
+            leaves.push(leaf);
+            lines.push(line);
+        });
+        (leaves, lines)
+    };
+    let patches = (0..scene.patches.len() as u32).into_par_iter().map(PatchId);
+    let (by_patch, lines): (Vec<Vec<Leaf>>, Vec<Vec<Gathered>>) = patches.map(of_patch).unzip();
     let mut leaf_offsets = vec![0];
     let mut end = 0;
     leaf_offsets.extend(by_patch.iter().map(|leaves| {
@@ -167,7 +187,7 @@ pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Sna
     }));
     let leaves = by_patch.concat();
     let error = solved.space.tuning.tolerance * VISIBLE;
-    Snapshot {
+    let snapshot = Snapshot {
         scene: Arc::clone(scene),
         time_s: solved.time_s,
         error_w_m2: error * mean_irradiance_w_m2(&leaves),
@@ -176,7 +196,20 @@ pub(super) fn take(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Sna
         leaf_offsets,
         indirect: Vec::new(),
         lamps: Vec::new(),
-    }
+    };
+    (snapshot, lines.concat())
+}
+
+/// The lines of the leaves of a solved forest with a solution over it: they may lead below 0.
+pub(super) fn lines(solved: &Solved, links: &Links, radiosity: &Radiosity) -> Vec<Gathered> {
+    let reader = Reader::new(solved, links, radiosity);
+    let of_patch = |patch| {
+        let mut lines = Vec::new();
+        reader.of_patch(patch, &mut |_, line| lines.push(line));
+        lines
+    };
+    let patches = (0..solved.space.scene.patches.len() as u32).into_par_iter().map(PatchId);
+    patches.map(of_patch).collect::<Vec<_>>().concat()
 }
 
 /// Reads leaves of a solved forest.
@@ -187,14 +220,18 @@ struct Reader<'a> {
     bends: Bends<'a>,
 }
 
-impl Reader<'_> {
-    /// Leaves of all facets of a patch; none where it is absent or distant.
-    fn of_patch(&self, patch: PatchId) -> Vec<Leaf> {
+impl<'a> Reader<'a> {
+    fn new(solved: &'a Solved, links: &'a Links, radiosity: &'a Radiosity) -> Reader<'a> {
+        let bends = Bends { solved, links, radiosity };
+        Reader { solved, surfaces: solved.space.surfaces(), radiosity, bends }
+    }
+
+    /// Hands over the leaves of all facets of a patch with their lines; none where it is absent or distant.
+    fn of_patch(&self, patch: PatchId, add: &mut dyn FnMut(Leaf, Gathered)) {
         let SpaceState { scene, forest, view, .. } = &self.solved.space;
         let body = scene.patches[patch.0 as usize].body;
-        let mut out = Vec::new();
         if !view.is_present(body) || scene.is_distant(body) {
-            return out;
+            return;
         }
         let mut stack = vec![forest.patch_root(patch)];
         let mut facets = 0;
@@ -202,16 +239,15 @@ impl Reader<'_> {
             match forest.kind(id) {
                 Kind::Polygon => stack.extend(forest.children(id).rev().map(ElementId)),
                 _ => {
-                    self.of_facet(facets, id, &mut out);
+                    self.of_facet(facets, id, add);
                     facets += 1;
                 }
             }
         }
-        out
     }
 
-    /// Adds the leaves of a facet; `number` counts those of its patch.
-    fn of_facet(&self, number: u32, facet: ElementId, out: &mut Vec<Leaf>) {
+    /// Hands over the leaves of a facet; `number` counts those of its patch.
+    fn of_facet(&self, number: u32, facet: ElementId, add: &mut dyn FnMut(Leaf, Gathered)) {
         let forest = &self.solved.space.forest;
         let material = self.surfaces.material(facet.0);
         let mut bent = self.bends.of_leaves(facet.0).into_iter();
@@ -221,7 +257,7 @@ impl Reader<'_> {
             let h = h.moved(&self.surfaces.place(id), [extent.centroid.x, extent.centroid.y]);
             let h = h.plus(&bent.next().expect("the same leaves"));
             let irradiance = h.mean.map(|x| x.max(0.0));
-            out.push(Leaf {
+            let leaf = Leaf {
                 facet: number,
                 path: forest.key(ElementId(id)).path,
                 corners: forest.shape(ElementId(id)).corners,
@@ -230,7 +266,8 @@ impl Reader<'_> {
                 radiosity: std::array::from_fn(|c| {
                     material.exitance[c] + material.reflectance[c] * irradiance[c]
                 }),
-            });
+            };
+            add(leaf, Gathered { irradiance: h.mean, gradient: h.gradient });
         });
     }
 }

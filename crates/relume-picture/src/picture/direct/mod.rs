@@ -17,7 +17,7 @@ mod tree;
 use std::cell::RefCell;
 use std::sync::OnceLock;
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use relume_core::element::WorldView;
 use relume_core::geometry::{Aabb, Plane};
 use relume_core::scene::{Frame, LightId, Patch, PatchId, World};
@@ -84,9 +84,12 @@ impl Direct {
             let k = lamp.patch.0 as usize;
             let frame = frames[k].as_ref()?;
             let corners = corners(k, frame);
+            let turn = DMat3::from_cols(frame.u, frame.v, frame.normal).transpose();
             Some(Lamp {
                 patch: lamp.patch,
                 bounds: Aabb::of(corners.iter().copied()),
+                turned: corners.iter().map(|&c| turn * c).collect(),
+                turn,
                 corners,
                 plane: Plane::through(frame.origin, frame.normal),
                 lying_m2: scene.lying_m2(&scene.patches[k]),

@@ -2,13 +2,13 @@
 //!
 //! Must not know snapshots.
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use relume_core::element::WorldLight;
 use relume_core::geometry::{Aabb, Plane};
 use relume_core::scene::{LightKind, PatchId};
 use relume_core::transport::{form_factor_from_point, keep_in_front, light_at};
 
-use super::cut::{Blocker, Cutter, Hides};
+use super::cut::{Blocker, Cutter, Hides, Screen};
 use super::tree::Tree;
 use crate::picture::tuning::{PATCHWORK_FAR, PATCHWORK_LAMPS};
 
@@ -18,6 +18,10 @@ pub(super) struct Lamp {
     pub(super) corners: Vec<DVec3>,
     pub(super) plane: Plane,
     pub(super) bounds: Aabb,
+    /// To its axes, of which the third is its normal.
+    pub(super) turn: DMat3,
+    /// Its corners in these.
+    pub(super) turned: Vec<DVec3>,
     /// W/m2.
     pub(super) exitance: [f64; 3],
     pub(super) lying_m2: f64,
@@ -67,7 +71,8 @@ struct LampSight {
     lamp: u32,
     /// Whether it reaches below the horizon of the leaf.
     crosses: bool,
-    blockers: Vec<Blocker>,
+    /// What hides of it, in its axes.
+    screens: Vec<Screen>,
 }
 
 /// What a leaf sees of the lamps.
@@ -127,7 +132,8 @@ impl Sight {
                 continue;
             }
             let crosses = lamp.corners.iter().any(|&c| receiver.plane.distance(c) < 0.0);
-            sight.lamps.push(LampSight { lamp: index, crosses, blockers });
+            let screens = blockers.iter().map(|b| Screen::new(b, &lamp.turn)).collect();
+            sight.lamps.push(LampSight { lamp: index, crosses, screens });
         }
         for (index, punctual) in (0..).zip(&around.lights) {
             let ends = receiver.corners.iter().map(|&c| around.end(&punctual.light, c));
@@ -154,7 +160,7 @@ impl Sight {
             let lamp = &around.lamps[sight.lamp as usize];
             let size_m = nodes[0].distance(nodes[8]);
             !sight.crosses
-                && sight.blockers.is_empty()
+                && sight.screens.is_empty()
                 && nodes.iter().all(|&c| lamp.plane.distance(c) > around.slack_m)
                 && lamp.bounds.distance(&bounds) > PATCHWORK_FAR * size_m
         };
@@ -178,7 +184,7 @@ impl Sight {
 
     /// Whether anything stands between it and a lamp.
     pub(super) fn is_shaded(&self) -> bool {
-        self.lamps.iter().any(|sight| !sight.blockers.is_empty())
+        self.lamps.iter().any(|sight| !sight.screens.is_empty())
             || self.lights.iter().any(|(_, blockers)| !blockers.is_empty())
     }
 
@@ -198,20 +204,26 @@ impl Sight {
             if lamp.plane.distance(point) <= around.slack_m {
                 continue;
             }
-            let seen: &[DVec3] = if sight.crosses {
+            if sight.crosses {
                 cut.clear();
                 cut.extend_from_slice(&lamp.corners);
                 keep_in_front(&mut cut, &horizon);
                 if cut.len() < 3 {
                     continue;
                 }
-                &cut
+            }
+            let factor = if sight.screens.is_empty() {
+                let seen = if sight.crosses { &cut } else { &lamp.corners };
+                form_factor_from_point(point, normal, seen)
             } else {
-                &lamp.corners
-            };
-            let factor = match sight.blockers.is_empty() {
-                true => form_factor_from_point(point, normal, seen),
-                false => cutter.factor((point, normal), seen, &sight.blockers, around.slack_m),
+                let seen = if sight.crosses {
+                    cut.iter_mut().for_each(|c| *c = lamp.turn * *c);
+                    &cut
+                } else {
+                    &lamp.turned
+                };
+                let at = (lamp.turn * point, lamp.turn * normal);
+                cutter.factor(at, seen, &sight.screens, around.slack_m)
             };
             (0..3).for_each(|c| sum[c] += factor * lamp.exitance[c]);
         }

@@ -484,6 +484,38 @@ fn a_lamp_that_a_crate_slides_over_goes_out_and_on_again() {
     assert!(warm[0][0] > 1.0 && warm[2][0] > 1.0, "{warm:?}");
 }
 
+/// A white table whose legs stick in its top and come out of its sides by three micrometres, a millimetre from their ends: strips of a
+/// fiftieth of an element are exposed there, and light grew between them and the legs.
+#[test]
+fn slivers_beside_what_covers_the_rest_make_no_light() {
+    let mut b = SceneBuilder::new("table");
+    let wall = b.double_sided_material("wall", [0.9; 3], [0.0; 3]);
+    let white = b.double_sided_material("white", [0.9; 3], [0.0; 3]);
+    let glow = b.double_sided_material("glow", [0.8; 3], [30.0; 3]);
+    let add = |b: &mut SceneBuilder, name: &str, material, lo: DVec3, hi: DVec3| {
+        let node = b.node(name, None, DVec3::ZERO, DQuat::IDENTITY);
+        for side in open_box((lo + hi) / 2.0, (hi - lo) / 2.0, &[]) {
+            b.polygon(node, name, material, &side);
+        }
+    };
+    add(&mut b, "room", wall, DVec3::ZERO, v(4.555, 3.746, 3.108));
+    let lamp = b.node("lamp", None, DVec3::ZERO, DQuat::IDENTITY);
+    b.polygon(lamp, "lamp", glow, &facing_up([1.145, 1.734], [0.982, 1.571], 3.008));
+    // Single precision of a file.
+    let (x, y) = ([0.490_095_82, 1.238_824_1], [2.421_322_3, 3.170_05]);
+    add(&mut b, "top", white, v(x[0] - 1e-3, y[0], 0.75), v(x[1] - 1e-3, y[1], 0.79));
+    for (k, (x, y)) in [0, 1].into_iter().flat_map(|i| [(x[i], y[0]), (x[i], y[1])]).enumerate() {
+        let [x, y] = [[x, 0.8], [y, 2.8]]
+            .map(|[at, middle]| if at < middle { [at, at + 0.05] } else { [at - 0.05, at] });
+        let by = v(-1e-4, 3e-6, -3e-7);
+        add(&mut b, &format!("leg {k}"), white, v(x[0], y[0], 0.0) + by, v(x[1], y[1], 0.77) + by);
+    }
+    let [emitted, absorbed, escaped] = energies(b.build().unwrap(), &[0.0])[0];
+    let lost = (emitted - absorbed - escaped) / emitted;
+    assert!(lost.abs() < 0.01, "{lost} of {emitted} W are lost");
+    assert!((absorbed / emitted - 1.0).abs() < 0.02, "{absorbed} W of {emitted} W");
+}
+
 /// A panel some micrometres before a wall of a room: a smaller one, and one as large as the wall, from one side or both.
 #[test]
 fn panels_close_before_walls_lose_no_light() {

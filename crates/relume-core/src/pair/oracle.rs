@@ -127,13 +127,14 @@ pub(super) fn estimate(
     let link = LinkSize {
         exchange: x.area_m2,
         noise,
-        least_shadow: SHADOW_AREAS * blockers.least_m2,
+        least_shadow: SHADOW_AREAS * blockers.least_shadow_m2[0],
         shadow: SHADOW_AREAS * blockers.all_m2,
         reference_area: reference_area_m2,
         threshold,
         leverage: blockers.leverage[0],
     };
-    let back = LinkSize { leverage: blockers.leverage[1], ..link };
+    let least_shadow = SHADOW_AREAS * blockers.least_shadow_m2[1];
+    let back = LinkSize { leverage: blockers.leverage[1], least_shadow, ..link };
     let (over_a, over_b) = (Over { end: a, uneven: &over_a }, Over { end: b, uneven: &over_b });
     let (on_a, on_b) = (one_way(&link, over_a, over_b), one_way(&back, over_b, over_a));
     Estimate {
@@ -153,7 +154,7 @@ struct LinkSize {
     exchange: f64,
     noise: f64,
     /// Area that weighs 1 where the edges of shadows are concerned, if that of the receiver is not smaller: that of the
-    /// smallest thing's between.
+    /// smallest shadow's.
     least_shadow: f64,
     /// Area within which neighbouring sources are hidden alike: that of the shadow of all between.
     shadow: f64,

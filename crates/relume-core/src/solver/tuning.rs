@@ -137,13 +137,21 @@ pub(super) const WHITE: f32 = 0.85;
 /// - Smaller: what lies beside an opening of 1 % is too bright by as much
 pub(super) const CLOSED: f64 = 0.99;
 
-/// Most that the reflected light of a leaf is multiplied with, and divided by.
+/// Most that the reflected light of a leaf is multiplied with.
 ///
 /// - Unit: 1
 /// - Tried: 2
 /// - Larger: leaves that see little are bright by chance
-/// - Smaller: light is made in narrow gaps
+/// - Smaller: light is lost in narrow gaps
 pub(super) const LEVEL_MOST: f32 = 2.0;
+
+/// Most that the light of a leaf is divided by, so that its row sums to 1.
+///
+/// - Unit: 1
+/// - Tried: 2 and 4 (a leaf of which a strip of a fiftieth was exposed had a row of 14, and light grew without end), 256
+/// - Larger: nothing was seen
+/// - Smaller: rows above 1, and light that grows between white surfaces
+pub(super) const DIVIDED_MOST: f32 = 256.0;
 
 /// Flux that scaled rows may lose or make where lines reach below zero, over what is emitted, before elements are taken to be constant.
 ///
@@ -153,13 +161,13 @@ pub(super) const LEVEL_MOST: f32 = 2.0;
 /// - Smaller: constant elements, and their errors, where lines would do
 pub(super) const LOST_MAX: f64 = 0.1;
 
-/// Least factor of a leaf; the largest is its inverse.
+/// Largest factor of a leaf.
 ///
 /// - Unit: 1
-/// - Tried: 0.25
-/// - Larger: rows above 1
-/// - Smaller: light that comes from a few neighbours only
-pub(super) const FACTOR_LEAST: f32 = 0.25;
+/// - Tried: 4
+/// - Larger: light that comes from a few neighbours only
+/// - Smaller: light is lost where rows are low
+pub(super) const FACTOR_MOST: f32 = 4.0;
 
 /// Most that the row of a leaf is raised to, over what it sums to.
 ///

@@ -13,8 +13,8 @@ use super::tuning::BODY_SHARE;
 pub struct BlockerSizes {
     /// For each end how unevenly lamps in the shaft light it (`spot`): 1.
     pub spots: [f64; 2],
-    /// Area of the smallest blocker, m2.
-    pub least_m2: f64,
+    /// Area of the smallest shadow on each end, of those that blockers would throw in the light of the other end's middle, m2.
+    pub least_shadow_m2: [f64; 2],
     /// Area of all blockers, m2.
     pub all_m2: f64,
     /// For each end, how far an edge of a blocker moves over the other end, at most, in units of how far the point on
@@ -29,7 +29,7 @@ impl BlockerSizes {
     /// Nothing stands between the ends.
     pub const NOTHING: BlockerSizes = BlockerSizes {
         spots: [0.0; 2],
-        least_m2: f64::INFINITY,
+        least_shadow_m2: [f64::INFINITY; 2],
         all_m2: f64::INFINITY,
         leverage: [0.0; 2],
         near: [0.0; 2],
@@ -81,22 +81,26 @@ impl<'a> Shaft<'a> {
         };
         let mut sizes = BlockerSizes {
             spots,
-            least_m2: blockers.iter().map(area).fold(f64::INFINITY, f64::min),
             all_m2: blockers.iter().map(area).sum(),
             ..BlockerSizes::NOTHING
         };
-        for &patch in blockers {
-            self.place(patch, &mut sizes);
+        for patch in blockers {
+            self.place(*patch, area(patch), &mut sizes);
         }
         sizes
     }
 
-    /// Adds where a blocker is: how far from each end.
-    fn place(&self, blocker: PatchId, BlockerSizes { leverage, near, .. }: &mut BlockerSizes) {
+    /// Adds where a blocker of this area is: how far from each end.
+    fn place(&self, blocker: PatchId, area_m2: f64, sizes: &mut BlockerSizes) {
+        let BlockerSizes { leverage, near, least_shadow_m2, .. } = sizes;
         let frame = self.frame_of(blocker);
         let (a, b, polygon) = (frame.a, frame.b, frame.occluder(blocker));
         let from = |e: &WorldElement| polygon.distance(e.centre).max(f64::MIN_POSITIVE);
         let (from_a, from_b) = (from(a), from(b));
+        // As a slide is thrown on a screen: close to the light it is as large as what it shows.
+        let [on_a, on_b] =
+            [from_a / from_b, from_b / from_a].map(|by| area_m2 * (1.0 + by) * (1.0 + by));
+        *least_shadow_m2 = [least_shadow_m2[0].min(on_a), least_shadow_m2[1].min(on_b)];
         *leverage = larger(*leverage, [from_b / from_a, from_a / from_b]);
         let (by_a, by_b) = ((a.radius / from_a).min(1.0), (b.radius / from_b).min(1.0));
         *near = larger(*near, [by_a * by_a, by_b * by_b]);

@@ -23,7 +23,7 @@ use crate::solver::links::Links;
 use crate::solver::push::push;
 use crate::solver::settle::reflected;
 use crate::solver::surfaces::{FacetMaterial, Surfaces, for_each_below};
-use crate::solver::tuning::{CLOSED, FACTOR_LEAST, LEVEL_MOST, SCALING_ROUNDS};
+use crate::solver::tuning::{CLOSED, DIVIDED_MOST, FACTOR_MOST, LEVEL_MOST, SCALING_ROUNDS};
 use crate::transport;
 
 /// Most by which the line of a symmetric level falls over the radius of its leaf: it stays above zero.
@@ -52,7 +52,7 @@ impl Levels {
             let closed = Closed { surfaces, rows };
             closed.find(facet.0, &mut |leaf| {
                 let row = &rows.rows[leaf as usize];
-                let factor = (1.0 / row.mean).clamp(1.0 / LEVEL_MOST, LEVEL_MOST);
+                let factor = (1.0 / row.mean).clamp(DIVIDED_MOST.recip(), LEVEL_MOST);
                 let slope = row.gradient.map(|g| g / row.mean);
                 let level = &mut leaves[leaf as usize];
                 *level = Level { is_closed: true, factor, slope, ..*level };
@@ -98,7 +98,7 @@ impl Levels {
                     return;
                 }
                 let before = level.factor;
-                level.factor = (before / sum.sqrt()).clamp(FACTOR_LEAST, 1.0 / FACTOR_LEAST);
+                level.factor = (before / sum.sqrt()).clamp(DIVIDED_MOST.recip(), FACTOR_MOST);
                 change = change.max((level.factor / before - 1.0).abs());
                 if !level.is_closed {
                     return;

@@ -14,7 +14,7 @@ use crate::solver::place::Place;
 use crate::solver::push::{RowSum, push};
 use crate::solver::settle::Fit;
 use crate::solver::surfaces::{Surfaces, for_each_below};
-use crate::solver::tuning::{FACTOR_LEAST, RAISED_MOST, SCALING_ROUNDS};
+use crate::solver::tuning::{DIVIDED_MOST, FACTOR_MOST, RAISED_MOST, SCALING_ROUNDS};
 
 /// Factors of leaves, and the sums of their rows with them; by id, of no meaning for what is no leaf.
 #[derive(Clone, Debug, Default)]
@@ -95,7 +95,7 @@ impl RowScaling {
                 if row.mean > 0.0 && wanted > 0.0 {
                     off = off.max((row.mean - wanted).abs());
                     let better = *factor * (wanted / row.mean).sqrt();
-                    *factor = better.clamp(FACTOR_LEAST, 1.0 / FACTOR_LEAST);
+                    *factor = better.clamp(DIVIDED_MOST.recip(), FACTOR_MOST);
                 }
             }
             if off < CLOSE {

@@ -344,7 +344,10 @@ fn empty_scenes() {
         &refusal(|j| j["scenes"][0]["nodes"] = json!([])),
         &["scene `scene` has no polygon", "no nodes"],
     );
-    says(&refusal(|j| j["meshes"][0]["primitives"][0]["mode"] = json!(1)), &["no polygon"]);
+    says(
+        &refusal(|j| j["meshes"][0]["primitives"][0]["mode"] = json!(1)),
+        &["points or lines alone"],
+    );
     says(
         &refusal(|j| j["nodes"][0] = json!({"name": "empty"})),
         &["none of its 1 nodes has a mesh"],
@@ -397,7 +400,7 @@ const ASSIMP: [(&str, &str); 15] = [
     ("wrongTypes/badArray.gltf", "at meshes[0].primitives"),
     ("wrongTypes/badObject.gltf", "at materials[0].pbrMetallicRoughness"),
     ("wrongTypes/badUint.gltf", "baseColorTexture.index"),
-    ("Mesh_PrimitiveMode/Mesh_PrimitiveMode_00.gltf", "has no polygon to light"),
+    ("Mesh_PrimitiveMode/Mesh_PrimitiveMode_00.gltf", "points or lines alone"),
     ("glTF/CesiumMilkTruck/CesiumMilkTruck.gltf", "its version is 1.0"),
     ("glTF/BoxTextured-glTF-Binary/BoxTextured.glb", "its version is 1"),
 ];

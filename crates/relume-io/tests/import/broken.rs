@@ -471,3 +471,16 @@ fn cameras_that_make_no_picture_are_left_out_or_mended() {
         says(&said, &["left out", "choose a view"]);
     }
 }
+
+#[test]
+fn too_many_polygons_are_told_by_their_mesh_and_how_often_it_is_shown() {
+    let mut g = Gltf::new();
+    let place = g.floats("VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    let triangle = json!({"attributes": {"POSITION": place}, "material": 0});
+    let mesh = g.push("meshes", json!({"name": "leaf", "primitives": vec![triangle; 4800]}));
+    for k in 0..1000 {
+        g.node(json!({"name": format!("tree {k}"), "mesh": mesh}));
+    }
+    let said = scene_of(&g).unwrap_err().to_string();
+    assert!(said.contains("its mesh has 4800 and is shown 1000 times"), "{said}");
+}

@@ -669,7 +669,8 @@ impl Run<'_> {
 /// Share of a picture that shows light, below which that is said.
 const LIT_MIN: f64 = 0.01;
 const ALMOST_DARK: &str = "warning: the view sees almost no light: look from elsewhere (--overview, --camera NAME, --eye \
-                           X,Y,Z), or light what it sees (--emit MATERIAL=RADIANCE)";
+                           X,Y,Z), light what it sees (--emit MATERIAL=RADIANCE), or, if that is black, let it reflect \
+                           (--reflect MATERIAL=R)";
 
 /// Bytes a pixel while a picture is drawn: in tiles and whole.
 const PIXEL_BYTES: u64 = 6;

@@ -1,9 +1,10 @@
-//! Coordinates that nothing can be computed with, in words, and where a text has them.
+//! What nothing can be computed with, in words: coordinates, where a text has them, and meshes without area.
 //!
 //! Must not know formats beyond what begins a line.
 
 use glam::DVec3;
 
+use relume_core::scene::SceneError;
 use relume_core::scene::limits::{COORDINATE_MAX_M, is_place};
 
 /// A place that is none, and why.
@@ -51,6 +52,17 @@ pub(crate) fn first_row_out_of_range<'a>(
 /// What is said of it.
 pub(crate) fn said((line, word): (usize, &str)) -> String {
     format!("line {line}: the coordinate `{word}` is out of range: {COORDINATE_MAX_M:e} m at most")
+}
+
+/// The error of a scene all of whose meshes are points or lines.
+pub(crate) fn of_points(scene: String) -> SceneError {
+    SceneError::Empty {
+        scene,
+        what: "it has points or lines alone, and these have no area".into(),
+        remedy: "make surfaces of them in a program for meshes (of a cloud of points by reconstruction, of lines by giving \
+                 them a thickness), and export these as triangles"
+            .into(),
+    }
 }
 
 #[cfg(test)]

@@ -114,10 +114,19 @@ fn turn(light: &json::Environment) -> Option<DQuat> {
     (turn.length() > 1e-6).then(|| turn.normalize())
 }
 
-/// The six faces of a cube, linear radiance but for a factor; as the extension has them, mirrored, so that they look from within as
-/// pictures do: +X, -X, +Y, -Y, +Z, -Z.
+/// The six faces of a cube, linear radiance but for a factor: +X, -X, +Y, -Y, +Z, -Z.
 struct Cube {
     faces: Vec<RgbaImage>,
+    lie: Lie,
+}
+
+/// How faces lie. The extension has those of cube maps, each "flipped about its vertical axis to correspond with the way glTF
+/// references texture space". The sample file of its authors (EnvironmentTest of glTF-Sample-Models) is upside down, as that
+/// purpose asks for; by the letter faces are mirrored, and look from within as pictures do. The coefficients tell which.
+#[derive(Clone, Copy)]
+enum Lie {
+    UpsideDown,
+    Mirrored,
 }
 
 fn cube(
@@ -143,7 +152,13 @@ fn cube(
     }
     let pixels = u64::from(WIDTHS[1]) * u64::from(WIDTHS[1] / 2);
     document.fits("its environment", pixels * BYTES_PER_PIXEL)?;
-    Ok(Ok(Cube { faces }))
+    let mut cube = Cube { faces, lie: Lie::Mirrored };
+    let mirrored = cube.likeness(light);
+    cube.lie = Lie::UpsideDown;
+    if mirrored > cube.likeness(light) {
+        cube.lie = Lie::Mirrored;
+    }
+    Ok(Ok(cube))
 }
 
 /// A picture of all directions: its size and its pixels.
@@ -155,24 +170,57 @@ impl Cube {
         let side = self.faces.iter().map(RgbaImage::width).max().unwrap_or(1);
         let width = side.saturating_mul(4).clamp(WIDTHS[0], WIDTHS[1]);
         let each = side.saturating_mul(4).div_ceil(width).clamp(2, 8);
-        let linear: Vec<f64> = (0..256).map(|c| linear(f64::from(c) / 255.0)).collect();
+        let linear = linear_of_bytes();
         let at = |direction: DVec3| self.at(direction, &linear);
         let mut picture = equirectangular(width, each, light, &at)?;
         scale(&mut picture, light);
         Ok(picture)
     }
 
+    /// The cosine of the angle between the coefficients of the pictures and those of the light, both without the first; 0 where
+    /// either has none.
+    fn likeness(&self, light: &json::Environment) -> f64 {
+        let linear = linear_of_bytes();
+        let [width, height] = [WIDTHS[0], WIDTHS[0] / 2].map(f64::from);
+        let mut found = [[0.0; 3]; 9];
+        for y in 0..WIDTHS[0] / 2 {
+            let theta = (f64::from(y) + 0.5) / height * PI;
+            let (sin, cos) = (libm::sin(theta), libm::cos(theta));
+            for x in 0..WIDTHS[0] {
+                let phi = f64::from(x) / width * 2.0 * PI;
+                let d = DVec3::new(sin * libm::sin(phi), cos, -sin * libm::cos(phi));
+                let radiance = self.at(d, &linear);
+                for (sum, harmonic) in found.iter_mut().zip(harmonics(d)) {
+                    (0..3).for_each(|c| sum[c] += sin * harmonic * radiance[c]);
+                }
+            }
+        }
+        let order = |k: usize| if k < 4 { 2.0 * PI / 3.0 } else { PI / 4.0 };
+        let (mut both, mut ours, mut theirs) = (0.0, 0.0, 0.0);
+        for k in 1..9 {
+            for c in 0..3 {
+                let (a, b) = (order(k) * found[k][c], light.irradiance_coefficients[k][c]);
+                (both, ours, theirs) = (both + a * b, ours + a * a, theirs + b * b);
+            }
+        }
+        if ours * theirs > 0.0 { both / (ours * theirs).sqrt() } else { 0.0 }
+    }
+
     /// What comes from a direction in the frame of the pictures.
     fn at(&self, d: DVec3, linear: &[f64]) -> [f64; 3] {
         let by = d.abs();
         let (face, across, down, depth) = if by.x >= by.y && by.x >= by.z {
-            if d.x > 0.0 { (0, d.z, -d.y, by.x) } else { (1, -d.z, -d.y, by.x) }
+            if d.x > 0.0 { (0, -d.z, -d.y, by.x) } else { (1, d.z, -d.y, by.x) }
         } else if by.y >= by.z {
-            if d.y > 0.0 { (2, -d.x, d.z, by.y) } else { (3, -d.x, -d.z, by.y) }
+            if d.y > 0.0 { (2, d.x, d.z, by.y) } else { (3, d.x, -d.z, by.y) }
         } else if d.z > 0.0 {
-            (4, -d.x, -d.y, by.z)
+            (4, d.x, -d.y, by.z)
         } else {
-            (5, d.x, -d.y, by.z)
+            (5, -d.x, -d.y, by.z)
+        };
+        let (across, down) = match self.lie {
+            Lie::UpsideDown => (across, -down),
+            Lie::Mirrored => (-across, down),
         };
         let image = &self.faces[face];
         let pick = |x: f64, count: u32| {
@@ -282,6 +330,11 @@ fn harmonics(DVec3 { x, y, z }: DVec3) -> [f64; 9] {
         SECOND * x * z,
         0.546_274_215_296_039_6 * (x * x - y * y),
     ]
+}
+
+/// Linear values of all bytes of sRGB.
+fn linear_of_bytes() -> Vec<f64> {
+    (0..256).map(|c| linear(f64::from(c) / 255.0)).collect()
 }
 
 /// Linear value of an sRGB one.

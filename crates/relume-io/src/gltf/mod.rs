@@ -31,6 +31,7 @@ mod tree;
 use document::Document;
 
 use crate::ImportOptions;
+use crate::range::of_points;
 use relume_core::scene::draft::Draft;
 use relume_core::scene::{Note, SceneError, Severity};
 
@@ -43,7 +44,19 @@ pub(super) fn draft(path: &Path, options: &ImportOptions) -> Result<Draft, Scene
     let mut draft = tree::draft(&document, options)?;
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned());
     draft.name = stem.unwrap_or_else(|| document.file.clone());
+    unless_of_points(&document, &draft)?;
     Ok(draft)
+}
+
+/// An error where nothing that is shown has a surface, for all of it is points or lines.
+fn unless_of_points(document: &Document, draft: &Draft) -> Result<(), SceneError> {
+    let drawn = || document.root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let is_without_area = |mode: Option<u32>| mode.is_some_and(|mode| mode < 4);
+    let has_surfaces = draft.nodes.iter().any(|node| !node.surfaces.is_empty());
+    if has_surfaces || drawn().next().is_none() || !drawn().all(|p| is_without_area(p.mode)) {
+        return Ok(());
+    }
+    Err(of_points(draft.name.clone()))
 }
 
 /// A note in one line.

@@ -355,18 +355,22 @@ impl Tree<'_> {
             return Ok(());
         }
         let polygons: usize = read.iter().map(|primitive| primitive.loops.len()).sum();
-        let more = self.uses.of(mesh).saturating_mul(polygons as u64);
+        let shown = self.uses.of(mesh);
+        let more = shown.saturating_mul(polygons as u64);
         self.promised = self.promised.saturating_add(more);
         match self.promised > POLYGONS_MAX as u64 {
-            true => Err(self.too_many_polygons(me)),
+            true => {
+                let why = format!(": its mesh has {polygons} and is shown {shown} times");
+                Err(self.too_many_polygons(me, if shown > 1 { &why } else { "" }))
+            }
             false => Ok(()),
         }
     }
 
-    fn too_many_polygons(&self, me: usize) -> SceneError {
+    fn too_many_polygons(&self, me: usize, why: &str) -> SceneError {
         SceneError::Geometry {
             subject: format!("node `{}`", self.draft.nodes[me].name),
-            what: format!("with it the scene has more than {POLYGONS_MAX} polygons"),
+            what: format!("with it the scene has more than {POLYGONS_MAX} polygons{why}"),
             remedy: "leave out objects or instances, or simplify their meshes".into(),
         }
     }
@@ -383,7 +387,7 @@ impl Tree<'_> {
             self.without_material += usize::from(primitive.material.is_none());
             self.polygons += primitive.loops.len();
             if self.polygons > POLYGONS_MAX {
-                return Err(self.too_many_polygons(me));
+                return Err(self.too_many_polygons(me, ""));
             }
             let Polygons { loops: polygons, tints, prints, .. } = primitive;
             let material = MaterialId(material as u32);

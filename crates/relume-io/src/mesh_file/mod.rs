@@ -3,13 +3,14 @@
 //! Coordinates are taken as metres, whatever axis is up. Each object or group is a body of its own. Reads and
 //! translates; what makes a scene valid is [`Scene::from_draft`]'s. Must not know light transport.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use glam::{DQuat, DVec2, DVec3};
 
 use crate::ImportOptions;
 use crate::folder::{Folder, read_scene};
-use crate::range::{first_out_of_range, out_of_range, said};
+use crate::range::{first_out_of_range, of_points, out_of_range, said};
 use crate::surface::Tints;
 use crate::tuning::REFLECTANCE_OF_NONE;
 use paint::Paint;
@@ -61,6 +62,8 @@ impl Format {
 #[derive(Default)]
 struct Contents {
     objects: Vec<Object>,
+    /// Whether there are any vertices, also where no polygon has them.
+    has_vertices: bool,
     materials: Vec<Material>,
     /// Images of the materials, where they have any; as many, or none.
     paints: Vec<Option<Paint>>,
@@ -100,7 +103,12 @@ pub(super) fn import(
         allow_outside: options.allow_outside,
         max_memory_bytes: options.max_memory_bytes,
     };
-    let (bytes, stem) = read_scene(path, options.max_memory_bytes)?;
+    let (mut bytes, stem) = read_scene(path, options.max_memory_bytes)?;
+    if format == Format::Obj
+        && let Cow::Owned(text) = mtl::text(&bytes)
+    {
+        bytes = text.into_bytes();
+    }
     let out_of_range = match format {
         Format::Obj => first_out_of_range(&bytes, "v"),
         Format::Stl => first_out_of_range(&bytes, "vertex"),
@@ -119,6 +127,10 @@ pub(super) fn import(
         Format::Stl => stl::read(bytes, &stem, &folder),
         Format::Ply => ply::read(&bytes, &stem, &folder),
     }?;
+    let mut parts = contents.objects.iter().flat_map(|o| &o.parts);
+    if contents.has_vertices && parts.all(|p| p.triangles.is_empty()) {
+        return Err(of_points(stem));
+    }
     let draft = draft(contents, stem, (format, options.pictures))?;
     let edits = options.edits.clone();
     Scene::from_draft(Draft { edits, near_origin: options.near_origin, ..draft })
@@ -140,7 +152,7 @@ fn draft(
     name: String,
     (format, pictures): (Format, bool),
 ) -> Result<Draft, SceneError> {
-    let Contents { objects, mut materials, paints, mut notes } = contents;
+    let Contents { objects, mut materials, paints, mut notes, .. } = contents;
     let none = materials.len();
     let is_bare = |p: &&Part| p.material.is_none() && p.colours.is_none();
     let parts = || objects.iter().flat_map(|o| &o.parts);

@@ -2,6 +2,7 @@
 //!
 //! Must not know meshes.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -28,6 +29,32 @@ pub(super) fn with_values(text: &str) -> String {
         }
     };
     text.lines().filter(has_value).flat_map(|line| [line, "\n"]).collect()
+}
+
+/// The text of a file: UTF-16 where its first character, the byte order mark, says so, otherwise UTF-8.
+pub(super) fn text(bytes: &[u8]) -> Cow<'_, str> {
+    let wide = |from: fn([u8; 2]) -> u16| {
+        let units = bytes[2..].chunks_exact(2).map(|pair| from([pair[0], pair[1]]));
+        char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
+    };
+    match bytes {
+        [0xFE, 0xFF, ..] => Cow::Owned(wide(u16::from_be_bytes)),
+        [0xFF, 0xFE, ..] => Cow::Owned(wide(u16::from_le_bytes)),
+        [0xEF, 0xBB, 0xBF, rest @ ..] => String::from_utf8_lossy(rest),
+        _ => String::from_utf8_lossy(bytes),
+    }
+}
+
+/// A file's name as another system writes it: backslashes part folders, but before a space they only say that it belongs to the name.
+pub(super) fn file_name(text: &str) -> String {
+    text.trim().replace("\\ ", " ").replace('\\', "/")
+}
+
+/// The names of a line that has several.
+pub(super) fn file_names(line: &str) -> Vec<String> {
+    // No name has this character.
+    let kept = line.replace("\\ ", "\0");
+    kept.split_whitespace().map(|name| file_name(&name.replace('\0', " "))).collect()
 }
 
 /// What a material reflects, or what the image of that is multiplied with.
@@ -120,7 +147,7 @@ fn reference(text: &str) -> Reference {
             _ => {}
         }
     }
-    found.name = rest.replace('\\', "/");
+    found.name = file_name(rest);
     found
 }
 
@@ -151,13 +178,16 @@ type Key = (Option<String>, Option<String>, u16);
 /// Images of one file's materials, each read once.
 pub(super) struct Textures<'a> {
     folder: &'a Folder,
+    /// Where files of materials are that are not beside the scene file, as paths from there that end with a slash: images may be named
+    /// from there.
+    elsewhere: Vec<String>,
     images: BTreeMap<String, Result<Arc<RgbaImage>, String>>,
     pyramids: BTreeMap<Key, Arc<Pyramid>>,
 }
 
 impl<'a> Textures<'a> {
-    pub(super) fn new(folder: &'a Folder) -> Textures<'a> {
-        Textures { folder, images: BTreeMap::new(), pyramids: BTreeMap::new() }
+    pub(super) fn new(folder: &'a Folder, elsewhere: Vec<String>) -> Textures<'a> {
+        Textures { folder, elsewhere, images: BTreeMap::new(), pyramids: BTreeMap::new() }
     }
 
     /// What images make of a material; `None` where it looks the same everywhere.
@@ -244,7 +274,7 @@ impl<'a> Textures<'a> {
         Ok(made)
     }
 
-    /// An image beside the scene file, where its path says or by its name alone; or why there is none.
+    /// An image where its path says, from the scene file or from files of materials, or by its name alone; or why there is none.
     fn image(&mut self, name: &str) -> Result<Result<Arc<RgbaImage>, String>, SceneError> {
         if let Some(known) = self.images.get(name) {
             return Ok(known.clone());
@@ -252,9 +282,14 @@ impl<'a> Textures<'a> {
         let last = name.rsplit('/').next().unwrap_or(name);
         let read = |name: &str| self.folder.read(name, "an image", IMAGE_MAX);
         let bytes = match read(name) {
-            Err(SceneError::Outside { .. } | SceneError::Read { .. }) if last != name => {
+            Err(error @ (SceneError::Outside { .. } | SceneError::Read { .. })) => {
+                let folders: Vec<&str> =
+                    self.elsewhere.iter().map(String::as_str).chain([""]).collect();
+                let places =
+                    [name, last].map(|name| folders.iter().map(move |at| format!("{at}{name}")));
+                let found = places.into_iter().flatten().find_map(|place| read(&place).ok());
                 // What is said is said of the path that the file has.
-                read(last).or_else(|_| read(name))
+                found.ok_or(error)
             }
             found => found,
         };

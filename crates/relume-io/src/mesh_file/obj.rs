@@ -19,25 +19,29 @@ use crate::folder::Folder;
 use crate::tuning::{REFLECTANCE_MAX, REFLECTANCE_OF_NONE};
 use relume_core::scene::{Material, Note, SceneError};
 
+/// As messages call it.
+const MATERIAL_FILE: &str = "a material file";
+
 /// Bytes of the largest MTL file that is read.
 const MTL_MAX: usize = 1 << 26;
 
 pub(super) fn read(bytes: &[u8], stem: &str, folder: &Folder) -> Result<Contents, SceneError> {
     let (text, names) = with_names(&String::from_utf8_lossy(bytes));
     let options = LoadOptions { ignore_points: true, ignore_lines: true, ..LoadOptions::default() };
-    let library = Library { folder, names, notes: RefCell::default(), refused: RefCell::default() };
+    let library = Library::new(folder, names);
     let mut source = Cursor::new(text.as_bytes());
     let loaded = tobj::load_obj_buf(&mut source, &options, |path| library.load(path));
-    let Library { names, notes, refused, .. } = library;
+    let Library { names, notes, refused, elsewhere, .. } = library;
     if let Some(error) = refused.into_inner() {
         return Err(error);
     }
     let (models, materials) = loaded.map_err(|e| damaged(folder, Format::Obj, e))?;
-    let mut contents = Contents { notes: notes.into_inner(), ..Contents::default() };
+    let has_vertices = text.lines().any(|line| line.split_whitespace().next() == Some("v"));
+    let mut contents = Contents { notes: notes.into_inner(), has_vertices, ..Contents::default() };
     let materials = materials.unwrap_or_default();
     let named = names.len();
     let numbers = used_or_defined(&models, &materials, named, (stem, &mut contents.notes));
-    let mut textures = Textures::new(folder);
+    let mut textures = Textures::new(folder, elsewhere.into_inner());
     let mut order: Vec<usize> = (0..materials.len()).filter(|&m| numbers[m].is_some()).collect();
     order.sort_by_key(|&m| numbers[m]);
     for material in order.into_iter().map(|m| &materials[m]) {
@@ -198,36 +202,56 @@ struct Library<'a> {
     /// See [`with_names`].
     names: Vec<String>,
     notes: RefCell<Vec<Note>>,
+    /// Folders of those that are not beside the scene file, with a slash at the end.
+    elsewhere: RefCell<Vec<String>>,
     /// The first that may not be opened.
     refused: RefCell<Option<SceneError>>,
 }
 
 impl Library<'_> {
+    fn new(folder: &Folder, names: Vec<String>) -> Library<'_> {
+        let (notes, elsewhere, refused) = Default::default();
+        Library { folder, names, notes, elsewhere, refused }
+    }
+
     fn load(&self, path: &Path) -> tobj::MTLLoadResult {
         let name = path.to_string_lossy().into_owned();
         if name == NAMES {
             let text: String = self.names.iter().map(|name| format!("newmtl {name}\n")).collect();
             return tobj::load_mtl_buf(&mut Cursor::new(text.as_bytes()));
         }
-        let missing = |what: String| {
+        let missing = |name: &str, what: String| {
             let message = format!("{what}; what uses its materials is grey");
-            self.notes.borrow_mut().push(warning("material-file", &name, 1, message));
-            Err(LoadError::OpenFileFailed)
+            self.notes.borrow_mut().push(warning("material-file", name, 1, message));
         };
-        match self.folder.read(&name, "a material file", MTL_MAX) {
-            Ok(bytes) => {
-                let text = mtl::with_values(&String::from_utf8_lossy(&bytes));
-                tobj::load_mtl_buf(&mut Cursor::new(text.as_bytes()))
-                    .or_else(|e| missing(format!("the file of materials cannot be read ({e})")))
-            }
-            Err(SceneError::Read { source, .. }) => {
-                missing(format!("the file of materials cannot be read ({source})"))
-            }
-            Err(error) => {
-                self.refused.borrow_mut().get_or_insert(error);
-                Err(LoadError::OpenFileFailed)
+        // A name may have spaces, and a line may have several names.
+        let whole = mtl::file_name(&name);
+        let names = match self.folder.read(&whole, MATERIAL_FILE, MTL_MAX) {
+            Err(SceneError::Read { .. }) => mtl::file_names(&name),
+            _ => vec![whole],
+        };
+        let mut all = String::new();
+        for name in &names {
+            match self.folder.read(name, MATERIAL_FILE, MTL_MAX) {
+                Ok(bytes) => {
+                    all.push_str(&mtl::with_values(&mtl::text(&bytes)));
+                    all.push('\n');
+                    if let Some(end) = name.rfind('/') {
+                        self.elsewhere.borrow_mut().push(name[..=end].to_owned());
+                    }
+                }
+                Err(SceneError::Read { source, .. }) => {
+                    missing(name, format!("the file of materials cannot be read ({source})"));
+                }
+                Err(error) => {
+                    self.refused.borrow_mut().get_or_insert(error);
+                    return Err(LoadError::OpenFileFailed);
+                }
             }
         }
+        tobj::load_mtl_buf(&mut Cursor::new(all.as_bytes())).inspect_err(|e| {
+            missing(&name, format!("the file of materials cannot be read ({e})"));
+        })
     }
 }
 

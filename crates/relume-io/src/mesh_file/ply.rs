@@ -186,6 +186,7 @@ pub(super) fn read(bytes: &[u8], stem: &str, folder: &Folder) -> Result<Contents
         let message = format!("elements that are not read: {}", unused.join(", "));
         contents.notes.push(info("ply", stem, unused.len(), message));
     }
+    contents.has_vertices = !points.is_empty();
     let parts = vec![Part { material: None, points, triangles, places: None, colours }];
     contents.objects = vec![Object { name: stem.to_owned(), parts }];
     Ok(contents)

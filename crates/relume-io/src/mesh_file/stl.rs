@@ -15,6 +15,7 @@ pub(super) fn read(
 ) -> Result<Contents, SceneError> {
     let wrong = |what: &dyn std::fmt::Display| damaged(folder, Format::Stl, what);
     hide_text_in_binary(&mut bytes);
+    part_word_from_name(&mut bytes);
     let mut source = Cursor::new(bytes);
     let reader = stl_io::create_stl_reader(&mut source).map_err(|e| wrong(&e))?;
     let mut points = Vec::new();
@@ -39,5 +40,14 @@ fn hide_text_in_binary(bytes: &mut [u8]) {
     let count = u32::from_le_bytes([count[0], count[1], count[2], count[3]]);
     if bytes.len() as u64 == 84 + 50 * u64::from(count) {
         bytes[..5].fill(b' ');
+    }
+}
+
+/// The reader wants a space after the word that begins text; others write a tab, or the end of the line.
+fn part_word_from_name(bytes: &mut Vec<u8>) {
+    if bytes.starts_with(b"solid")
+        && bytes.get(5).is_some_and(|b| *b != b' ' && b.is_ascii_whitespace())
+    {
+        bytes.insert(5, b' ');
     }
 }

@@ -344,7 +344,10 @@ fn empty_scenes() {
         &refusal(|j| j["scenes"][0]["nodes"] = json!([])),
         &["scene `scene` has no polygon", "no nodes"],
     );
-    says(&refusal(|j| j["meshes"][0]["primitives"][0]["mode"] = json!(1)), &["no polygon"]);
+    says(
+        &refusal(|j| j["meshes"][0]["primitives"][0]["mode"] = json!(1)),
+        &["points or lines alone"],
+    );
     says(
         &refusal(|j| j["nodes"][0] = json!({"name": "empty"})),
         &["none of its 1 nodes has a mesh"],
@@ -397,7 +400,7 @@ const ASSIMP: [(&str, &str); 15] = [
     ("wrongTypes/badArray.gltf", "at meshes[0].primitives"),
     ("wrongTypes/badObject.gltf", "at materials[0].pbrMetallicRoughness"),
     ("wrongTypes/badUint.gltf", "baseColorTexture.index"),
-    ("Mesh_PrimitiveMode/Mesh_PrimitiveMode_00.gltf", "has no polygon to light"),
+    ("Mesh_PrimitiveMode/Mesh_PrimitiveMode_00.gltf", "points or lines alone"),
     ("glTF/CesiumMilkTruck/CesiumMilkTruck.gltf", "its version is 1.0"),
     ("glTF/BoxTextured-glTF-Binary/BoxTextured.glb", "its version is 1"),
 ];
@@ -467,4 +470,17 @@ fn cameras_that_make_no_picture_are_left_out_or_mended() {
         assert_eq!(seen, None);
         says(&said, &["left out", "choose a view"]);
     }
+}
+
+#[test]
+fn too_many_polygons_are_told_by_their_mesh_and_how_often_it_is_shown() {
+    let mut g = Gltf::new();
+    let place = g.floats("VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    let triangle = json!({"attributes": {"POSITION": place}, "material": 0});
+    let mesh = g.push("meshes", json!({"name": "leaf", "primitives": vec![triangle; 4800]}));
+    for k in 0..1000 {
+        g.node(json!({"name": format!("tree {k}"), "mesh": mesh}));
+    }
+    let said = scene_of(&g).unwrap_err().to_string();
+    assert!(said.contains("its mesh has 4800 and is shown 1000 times"), "{said}");
 }

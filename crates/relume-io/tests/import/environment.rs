@@ -57,21 +57,43 @@ fn shines(g: &Gltf, directions: &[DVec3]) -> Vec<bool> {
     directions.iter().map(|d| found.radiance(d.normalize())[0] > 0.0).collect()
 }
 
-#[test]
-fn each_face_is_seen_in_its_direction_as_from_within() {
-    let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z];
-    // Direction, what is up in the picture, and what is right of it as seen from the middle.
-    let faces = [(x, y, z), (-x, y, -z), (y, -z, -x), (-y, z, -x), (z, y, -x), (-z, y, x)];
+/// Checks where the upper left texel of each face is seen: of a face its direction, what is up in the picture, and what is right of
+/// it as seen from the middle.
+fn check_faces(faces: [(DVec3, DVec3, DVec3); 6], coefficients: &dyn Fn(DVec3) -> Value) {
     for (k, &(ahead, up, right)) in faces.iter().enumerate() {
         let mut all = vec![face([BLACK; 4]); 6];
-        // The upper left texel.
         all[k] = face([WHITE, BLACK, BLACK, BLACK]);
-        let g = lit(&all, 0.0, json!({}));
         let towards = [-0.5, 0.5].map(|a| [0.5, -0.5].map(|b| ahead + a * right + b * up));
+        let mut g = lit(&all, 0.0, json!({}));
+        g.json["extensions"]["EXT_lights_image_based"]["lights"][0]["irradianceCoefficients"] =
+            coefficients(towards[0][0]);
         let seen =
             shines(&g, &[towards[0][0], towards[0][1], towards[1][0], towards[1][1], -ahead]);
         assert_eq!(seen, [true, false, false, false, false], "face {k}");
     }
+}
+
+/// Coefficients of light from a direction, without the first, which says how much it is in all.
+fn light_from(d: DVec3) -> Value {
+    let first = [0.0, d.y, d.z, d.x, 0.0, 0.0, 0.0, 0.0, 0.0];
+    json!(first.map(|c| [c; 3]))
+}
+
+/// As in the sample file of the extension's authors: the faces of cube maps, upside down.
+#[test]
+fn each_face_is_seen_in_its_direction_upside_down() {
+    let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z];
+    let faces = [(x, -y, -z), (-x, -y, z), (y, z, x), (-y, -z, x), (z, -y, x), (-z, -y, -x)];
+    check_faces(faces, &|_| light_from(DVec3::ZERO));
+    check_faces(faces, &light_from);
+}
+
+/// The extension by the letter; told from the other by the coefficients.
+#[test]
+fn each_face_is_seen_in_its_direction_as_from_within_where_the_coefficients_say_so() {
+    let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z];
+    let faces = [(x, y, z), (-x, y, -z), (y, -z, -x), (-y, z, -x), (z, y, -x), (-z, y, x)];
+    check_faces(faces, &light_from);
 }
 
 #[test]

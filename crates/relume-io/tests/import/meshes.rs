@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::gltf::{cube_indices, cube_positions};
 use super::{read, with_code};
 use relume_core::geometry::Aabb;
-use relume_core::scene::{Scene, SceneError};
+use relume_core::scene::{Scene, SceneError, Severity};
 use relume_io::{ImportOptions, import};
 
 /// A scene of a file of this content.
@@ -67,6 +67,10 @@ fn stl_binary(header: &[u8]) -> Vec<u8> {
 #[test]
 fn stl_in_text_and_in_both_guises_of_binary() {
     is_the_cube(&scene_of("cube.stl", stl_text().as_bytes()).unwrap());
+    for start in ["solid\tcube\n", "solid\r\n", "solid\n"] {
+        let text = stl_text().replacen("solid cube\n", start, 1);
+        is_the_cube(&scene_of("cube.stl", text.as_bytes()).unwrap());
+    }
     is_the_cube(&scene_of("cube.STL", &stl_binary(b"made by hand")).unwrap());
     is_the_cube(
         &scene_of("cube.stl", &stl_binary(b"solid cube\nmade by a program that does not care"))
@@ -254,6 +258,30 @@ fn painted(faces: &str, material: &str, texels: &[[u8; 4]; 4]) -> Scene {
     import(&path, &ImportOptions { pictures: true, ..ImportOptions::default() }).unwrap()
 }
 
+/// As relative to the file that names them, and by their names alone.
+#[test]
+fn images_are_found_from_files_of_materials_in_other_folders() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(folder.path().join("m/maps")).unwrap();
+    let image = image::RgbaImage::from_pixel(2, 2, image::Rgba([255, 0, 0, 255]));
+    image.save(folder.path().join("m/maps/red.png")).unwrap();
+    image.save(folder.path().join("m/plain.png")).unwrap();
+    let path = folder.path().join("a.obj");
+    std::fs::write(&path, format!("{SQUARE}f 1/1 2/2 3/3 4/4\n").replace("a.mtl", "m/a.mtl"))
+        .unwrap();
+    for name in ["maps/red.png", "C:\\work\\plain.png"] {
+        let material = format!("newmtl m\nKd 0.5 0.5 0.5\nmap_Kd {name}\n");
+        std::fs::write(folder.path().join("m/a.mtl"), material).unwrap();
+        let scene = read(&path).unwrap();
+        assert!(
+            with_code(&scene.notes, "texture").iter().all(|n| n.severity == Severity::Info),
+            "{name}: {:?}",
+            scene.notes
+        );
+        assert_eq!(scene.reflectance(&scene.patches[0]), [0.5, 0.0, 0.0], "{name}");
+    }
+}
+
 /// What the side of a patch reflects and emits that looks at a place above it.
 fn seen_at(scene: &Scene, x: f64, y: f64) -> Option<([f64; 3], [f64; 3])> {
     let is_at = |p: &&relume_core::scene::Patch| {
@@ -348,6 +376,45 @@ fn colours_of_vertices_in_obj_and_ply_are_reflectances() {
 }
 
 #[test]
+fn names_of_material_files_are_read_as_other_systems_write_them() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("a b")).unwrap();
+    let path = folder.path().join("room.obj");
+    std::fs::write(folder.path().join("a b/room.mtl"), MTL).unwrap();
+    std::fs::write(folder.path().join("more.mtl"), "newmtl nothing\nKd 0.2 0.2 0.2\n").unwrap();
+    let of = |line: &str| {
+        std::fs::write(&path, OBJ.replace("mtllib room.mtl", line)).unwrap();
+        let scene = read(&path).unwrap();
+        let reflects =
+            |name: &str| scene.materials.iter().find(|m| m.name == name).map(|m| m.reflectance[0]);
+        (reflects("red"), reflects("nothing"), with_code(&scene.notes, "material-file").len())
+    };
+    // Backslashes, a name with a space, two names, one of them with a space, and one of them missing.
+    assert_eq!(of("mtllib a b\\room.mtl"), (Some(0.8), Some(0.5), 0));
+    assert_eq!(of("mtllib a b/room.mtl"), (Some(0.8), Some(0.5), 0));
+    assert_eq!(of("mtllib a\\ b/room.mtl more.mtl"), (Some(0.8), Some(0.2), 0));
+    assert_eq!(of("mtllib none.mtl more.mtl"), (Some(0.5), Some(0.2), 1));
+}
+
+#[test]
+fn text_of_two_bytes_a_character_is_read() {
+    let wide = |text: &str, of: fn(u16) -> [u8; 2]| {
+        let units = std::iter::once(0xFEFF).chain(text.encode_utf16());
+        units.flat_map(of).collect::<Vec<u8>>()
+    };
+    for of in [u16::to_be_bytes, u16::to_le_bytes] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("room.obj");
+        std::fs::write(&path, wide(OBJ, of)).unwrap();
+        std::fs::write(folder.path().join("room.mtl"), wide(MTL, of)).unwrap();
+        let scene = read(&path).unwrap();
+        assert_eq!(scene.bodies.len(), 3);
+        let red = scene.materials.iter().find(|m| m.name == "red").unwrap();
+        assert_eq!(red.reflectance, [0.8, 0.1, 0.98]);
+    }
+}
+
+#[test]
 fn files_of_materials_elsewhere_are_opened_only_if_asked_for() {
     let parent = tempfile::tempdir().unwrap();
     let folder = parent.path().join("scene");
@@ -366,6 +433,10 @@ fn what_is_wrong_with_them_is_said() {
     let said = |name: &str, content: &[u8]| scene_of(name, content).unwrap_err().to_string();
     let cut = |bytes: &[u8]| bytes[..bytes.len() - 30].to_vec();
     let many = String::from_utf8(ply("ascii")).unwrap();
+    let points_alone =
+        b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+        property float z\nend_header\n0 0 0\n"
+            .to_vec();
     for (name, content, words) in [
         ("a.obj", b"v 1 2 x\n".to_vec(), "is not a valid OBJ file"),
         ("a.obj", b"v 0 0 0\nf 1 2 3\n".to_vec(), "is not a valid OBJ file"),
@@ -374,7 +445,9 @@ fn what_is_wrong_with_them_is_said() {
             b"v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n".to_vec(),
             "line 3: the coordinate `nan`",
         ),
-        ("a.obj", b"v 0 0 0\n".to_vec(), "no polygon"),
+        ("a.obj", b"v 0 0 0\n".to_vec(), "points or lines alone"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nl 1 2\n".to_vec(), "points or lines alone"),
+        ("a.ply", points_alone, "points or lines alone"),
         ("a.obj", Vec::new(), "no polygon"),
         ("a.stl", Vec::new(), "is not a valid STL file"),
         ("a.stl", cut(&stl_binary(b"")), "is not a valid STL file"),

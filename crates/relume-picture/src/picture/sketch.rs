@@ -21,7 +21,7 @@ use super::overview::preview::Preview;
 use super::project::Projector;
 use super::render::Settings;
 use super::tone::{SrgbEncoder, luminance};
-use super::tuning::{LIT, RAYS};
+use super::tuning::RAYS;
 
 /// Places within a pixel that are looked at.
 const WITHIN: [DVec2; 4] = [
@@ -96,21 +96,26 @@ impl Sketch {
         seen as f64 / pixels(METERED).count() as f64
     }
 
-    /// Share of what a view sees of surfaces on which light is to be expected, lamps included: what is within six stops of
-    /// the typical. `None` where it sees no surface.
+    /// Share of what a view sees of surfaces on which light is to be expected: what is within six stops of the typical, or
+    /// black and in the light. Lamps count too, unless they are most of what is seen: then they have no shape but their
+    /// outline, and count where light arrives. `None` where it sees no surface.
     pub fn lit(&self, view: &View) -> Option<f64> {
         let (caster, preview) = self.traced.as_ref()?;
         let projector = Projector::new(view, METERED.0, METERED.1);
-        let (mut lit, mut all) = (0_u32, 0_u32);
+        let (mut lit, mut lamps, mut lit_lamps, mut all) = (0_u32, 0_u32, 0_u32, 0_u32);
         for pixel in pixels(METERED) {
             if let Some(seen) = self.seen(caster, &projector, pixel + 0.5) {
                 let point = preview.point_at(seen.patch, seen.at);
-                let is_lit = preview.is_lit && preview.brightness[point] > LIT;
+                let is_lit = u32::from(preview.is_lit(point));
                 all += 1;
-                lit += u32::from(is_lit || preview.emits(point));
+                match preview.emits(point) {
+                    true => (lamps, lit_lamps) = (lamps + 1, lit_lamps + is_lit),
+                    false => lit += is_lit,
+                }
             }
         }
-        (all > 0).then(|| f64::from(lit) / f64::from(all))
+        let counted = if 2 * lamps > all { lit_lamps } else { lamps };
+        (all > 0).then(|| f64::from(lit + counted) / f64::from(all))
     }
 
     /// Draws what a view sees. Of the settings size, exposure, tone and background count.
@@ -292,10 +297,14 @@ mod tests {
     use super::super::tone::Tone;
     use super::*;
 
-    /// A floor of reflectance 0.5 and 2 m, and a lamp far below it that shines on the floor's black back.
     fn floor() -> Scene {
+        floor_of(0.5)
+    }
+
+    /// A floor of 2 m that reflects this much, and a lamp far below it that shines on the floor's black back.
+    fn floor_of(reflectance: f64) -> Scene {
         let mut b = SceneBuilder::new("floor");
-        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+        let grey = b.material("grey", [reflectance; 3], [0.0; 3]);
         let glow = b.material("glow", [0.5; 3], [1.0; 3]);
         let n = b.node("n", None, DVec3::ZERO, DQuat::IDENTITY);
         let square =
@@ -340,13 +349,26 @@ mod tests {
     }
 
     #[test]
+    fn what_is_black_is_lit_where_light_arrives() {
+        let view = View::look_at(DVec3::new(0.0, 3.0, 0.5), DVec3::ZERO, 0.3);
+        let black = floor_of(0.0);
+        assert_eq!(Sketch::new(&black, 0.0).lit(&view), Some(0.0), "it turns its back to the lamp");
+        let sky = Some(Sky::Uniform([1.0; 3]));
+        let scene = black.with_outside(Outside { sky, ..Outside::default() }).unwrap();
+        let sketch = Sketch::new(&scene, 0.0);
+        assert_eq!(sketch.lit(&view), Some(1.0));
+        let lamp_only = View::look_at(DVec3::new(0.0, -2.0, 0.5), DVec3::new(0.0, -5.0, 0.0), 0.3);
+        assert_eq!(sketch.lit(&lamp_only), Some(1.0), "the sky shines on the lamp");
+    }
+
+    #[test]
     fn what_a_lamp_does_not_reach_is_not_lit() {
         let sketch = Sketch::new(&floor(), 0.0);
         let floor_only = View::look_at(DVec3::new(0.0, 3.0, 0.5), DVec3::ZERO, 0.3);
         assert_eq!(sketch.lit(&floor_only), Some(0.0));
         assert_eq!(sketch.draw(&floor_only, &settings()).pixel(16, 12), [0; 3]);
         let lamp_only = View::look_at(DVec3::new(0.0, -2.0, 0.5), DVec3::new(0.0, -5.0, 0.0), 0.3);
-        assert_eq!(sketch.lit(&lamp_only), Some(1.0));
+        assert_eq!(sketch.lit(&lamp_only), Some(0.0), "a lamp alone has no shape");
         let away = View::look_at(DVec3::new(0.0, 3.0, 0.5), DVec3::new(0.0, 9.0, 0.0), 0.5);
         assert_eq!(sketch.lit(&away), None);
         let background = SrgbEncoder::new().encode(0.2);

@@ -15,7 +15,7 @@ use relume_core::scene::{Light, LightKind, Patch, PatchId, Scene};
 
 use super::super::tone::luminance;
 use super::super::tuning::{
-    BOUNCES, CELLS, LAMP_POINTS, LIGHTS, MANY, POINTS, POINTS_OF_PATCH, STOPS,
+    BOUNCES, CELLS, LAMP_POINTS, LIGHTS, LIT, MANY, POINTS, POINTS_OF_PATCH, STOPS,
 };
 use super::caster::{Caster, LIFT};
 
@@ -51,6 +51,8 @@ pub(in super::super) struct Preview {
     pub(in super::super) brightness: Vec<f64>,
     /// Luminance of the reflected radiosity of each point after some bounces, W/m2.
     pub(in super::super) reflected: Vec<f64>,
+    /// Whether light arrives at a point, on lamps too: so much that it is bright, or, where it reflects nothing, any.
+    lit: Vec<bool>,
     /// Whether anything is lit at all.
     pub(in super::super) is_lit: bool,
 }
@@ -69,7 +71,8 @@ impl Preview {
         let (points, ranges) = spread(scene, time_s, poses, caster);
         let (brightness, reflected) = (Vec::new(), vec![0.0; points.len()]);
         let lamps = Lamps::new(scene, time_s, poses, caster);
-        let mut preview = Preview { points, lamps, ranges, brightness, reflected, is_lit: false };
+        let (lit, is_lit) = (vec![false; points.len()], false);
+        let mut preview = Preview { points, lamps, ranges, brightness, reflected, lit, is_lit };
         let of_sky = |k: usize| sky.map_or(0.0, |sky| preview.sky_irradiance(sky, caster, k));
         let direct: Vec<f64> = (0..preview.points.len())
             .into_par_iter()
@@ -84,7 +87,18 @@ impl Preview {
         }
         preview.is_lit = true;
         preview.reflected = preview.bounce(scene, caster, &direct);
-        preview.brightness = preview.brightnesses(&preview.reflected);
+        let typical = preview.typical();
+        let of_point = |(point, &b): (&Point, &f64)| match point.emits {
+            true => 1.0,
+            false => beside_typical(b, typical),
+        };
+        preview.brightness = preview.points.iter().zip(&preview.reflected).map(of_point).collect();
+        preview.lit = (0..preview.points.len())
+            .map(|k| match preview.points[k].reflectance > 0.0 {
+                true => beside_typical(preview.reflected[k], typical) > LIT,
+                false => direct[k] > 0.0,
+            })
+            .collect();
         preview
     }
 
@@ -106,6 +120,11 @@ impl Preview {
     /// Whether a point is on a lamp.
     pub(in super::super) fn emits(&self, point: usize) -> bool {
         self.points[point].emits
+    }
+
+    /// Whether light arrives at a point, be it on a lamp or black.
+    pub(in super::super) fn is_lit(&self, point: usize) -> bool {
+        self.lit[point]
     }
 
     /// Irradiance that comes directly from lamps and lights to a place on a surface, in units of the scene, W/m2.
@@ -184,19 +203,21 @@ impl Preview {
         self.directions(k, rays).filter_map(met).collect()
     }
 
-    fn brightnesses(&self, reflected: &[f64]) -> Vec<f64> {
+    /// The logarithm of the typical reflected radiosity.
+    fn typical(&self) -> f64 {
         // What is met where light is, not where surface is, as most of a scene may be dark; and its logarithm,
         // as there may be bright spots.
-        let lit = || self.points.iter().zip(reflected).filter(|(_, b)| **b > 0.0);
+        let lit = || self.points.iter().zip(&self.reflected).filter(|(_, b)| **b > 0.0);
         let weight: f64 = lit().map(|(point, b)| point.area_m2 * b).sum();
-        let typical =
-            lit().map(|(point, b)| point.area_m2 * b * libm::log2(*b)).sum::<f64>() / weight;
-        let of_point = |(point, &b): (&Point, &f64)| match point.emits {
-            true => 1.0,
-            false if b > 0.0 => (1.0 + (libm::log2(b) - typical) / STOPS).clamp(0.0, 1.0),
-            false => 0.0,
-        };
-        self.points.iter().zip(reflected).map(of_point).collect()
+        lit().map(|(point, b)| point.area_m2 * b * libm::log2(*b)).sum::<f64>() / weight
+    }
+}
+
+/// How bright a reflected radiosity is beside the typical one, of which the logarithm is given.
+fn beside_typical(reflected: f64, typical: f64) -> f64 {
+    match reflected > 0.0 {
+        true => (1.0 + (libm::log2(reflected) - typical) / STOPS).clamp(0.0, 1.0),
+        false => 0.0,
     }
 }
 

@@ -100,6 +100,13 @@ pub(crate) struct Drawing<'a> {
     quantity: Quantity,
 }
 
+/// Place of a patch among others in its plane, the first of which is seen: by area in single precision without its last digits, so that
+/// areas that rounding sets apart are equal.
+fn order(snapshot: &Snapshot, patch: usize) -> u32 {
+    let scene = &snapshot.scene;
+    (scene.lying_m2(&scene.patches[patch]) as f32).to_bits() >> 4
+}
+
 impl<'a> Drawing<'a> {
     /// All leaves of all patches whose front faces the camera; the backs of patches are left out.
     pub(crate) fn new(
@@ -139,12 +146,7 @@ impl<'a> Drawing<'a> {
             .enumerate()
             .filter_map(|(i, patch)| patch.map(|patch| (i, patch)))
             .collect();
-        // In single precision without its last digits: areas that rounding sets apart are equal.
-        let area = |i: usize| {
-            let scene = &snapshot.scene;
-            (scene.lying_m2(&scene.patches[i]) as f32).to_bits() >> 4
-        };
-        seen.sort_by_cached_key(|&(i, _)| area(i));
+        seen.sort_by_cached_key(|&(i, _)| order(snapshot, i));
         let mut drawing = Drawing {
             primitives: Vec::new(),
             fills: Vec::new(),

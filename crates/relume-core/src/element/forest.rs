@@ -148,7 +148,6 @@ struct Fixed {
     shines: bool,
     /// Area of the patches connected with each patch, itself among them, by patch, m2.
     connected_m2: Vec<f64>,
-    alike_m2: Vec<f64>,
     /// Whether a node stands for light from outside, by id; empty if none does.
     distant: Vec<bool>,
     /// Whether it is a wide part of the sky, by id; empty if nothing is distant.
@@ -577,11 +576,6 @@ impl Forest {
     /// Area of the patches that are connected with a patch by common corners, itself among them, m2.
     pub fn connected_m2(&self, patch: PatchId) -> f64 {
         self.fixed.connected_m2[patch.0 as usize]
-    }
-
-    /// The same, of those alone that emit if it does, and do not if it does not, m2.
-    pub fn alike_m2(&self, patch: PatchId) -> f64 {
-        self.fixed.alike_m2[patch.0 as usize]
     }
 
     /// Whether a node may hold a patch with a normal opposed to `normal`, which is in the frame of the node's

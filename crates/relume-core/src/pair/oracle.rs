@@ -7,7 +7,7 @@ use super::brightness::Brightness;
 use super::margin::Margin;
 use super::tuning::{
     ALIKE_FACTOR, ALIKE_SHARE, BENT, EDGE, EDGE_REFLECTED, JUMP, NOISE, PREFERENCE, SEEN,
-    SHADOW_AREAS, SOURCE_VARIATION, SPOT, STEEP,
+    SHADOW_AREAS, SMALL_SHADOW, SOURCE_VARIATION, SPOT, STEEP,
 };
 use crate::transport::Side;
 
@@ -39,8 +39,6 @@ pub(super) struct End {
     pub(super) own_area: f64,
     /// Area of the surface that it is a part of and that may send alike: of its patch, or of the sky; m2.
     pub(super) surface_area: f64,
-    /// Area of what it is connected with that emits as it does, or as it does not; m2.
-    pub(super) alike_area: f64,
 }
 
 /// Norm that errors are measured in.
@@ -127,13 +125,13 @@ pub(super) fn estimate(
     let link = LinkSize {
         exchange: x.area_m2,
         noise,
-        least_shadow: SHADOW_AREAS * blockers.least_shadow_m2[0],
+        least_shadow: SMALL_SHADOW * blockers.least_shadow_m2[0],
         shadow: SHADOW_AREAS * blockers.all_m2,
         reference_area: reference_area_m2,
         threshold,
         leverage: blockers.leverage[0],
     };
-    let least_shadow = SHADOW_AREAS * blockers.least_shadow_m2[1];
+    let least_shadow = SMALL_SHADOW * blockers.least_shadow_m2[1];
     let back = LinkSize { leverage: blockers.leverage[1], least_shadow, ..link };
     let (over_a, over_b) = (Over { end: a, uneven: &over_a }, Over { end: b, uneven: &over_b });
     let (on_a, on_b) = (one_way(&link, over_a, over_b), one_way(&back, over_b, over_a));
@@ -229,11 +227,8 @@ fn one_way(
     let Brightness { radiosity, reflected, .. } = source.light;
     let varies = SOURCE_VARIATION * (source.area / link.reference_area).min(4.0);
     // What a small source does unevenly its neighbours do too, in the same sense: splitting the
-    // source does not mend it, so it counts as if the source were as large as the receiver, or as all that is like it.
-    let whole = |area: f64| match source.area > 0.0 {
-        true => (area.min(source.alike_area) / source.area).max(1.0),
-        false => 1.0,
-    };
+    // source does not mend it, so it counts as if the source were as large as the receiver.
+    let whole = |area: f64| if source.area > 0.0 { (area / source.area).max(1.0) } else { 1.0 };
     let (whole, in_shadow) = (whole(receiver.area), whole(receiver.area.min(link.shadow)));
     let alike = EDGE * link.alike(receiver, source).max(in_shadow);
     let edge = alike * (radiosity - reflected) + alike.max(EDGE_REFLECTED) * reflected;

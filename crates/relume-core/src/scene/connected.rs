@@ -1,38 +1,35 @@
 //! Which patches are connected. Pure geometry in the bodies' own frames.
 
 use super::weld::{Sets, Weld};
-use super::{BodyId, Patch, PatchId, Scene};
+use super::{BodyId, PatchId, Scene};
 
 impl Scene {
     /// Area of the patches that are connected with each patch by common corners, itself among them, m2. Bodies that never move
     /// are connected with each other, a body that moves or was inserted only within itself. Exact up to rounding; both sides of a double-sided
-    /// polygon count. Patches of which one `is_apart` and the other is not are not connected.
-    pub(crate) fn connected_areas_m2(&self, is_apart: &dyn Fn(&Patch) -> bool) -> Vec<f64> {
+    /// polygon count.
+    pub(crate) fn connected_areas_m2(&self) -> Vec<f64> {
         let mut out = vec![0.0; self.patches.len()];
         let bodies = (0..self.bodies.len() as u32).map(BodyId);
         let (moving, at_rest): (Vec<BodyId>, Vec<BodyId>) =
             bodies.partition(|&body| self.moves(body) || self.is_inserted(body));
-        self.connect(&at_rest, is_apart, &mut out);
-        moving.into_iter().for_each(|body| self.connect(&[body], is_apart, &mut out));
+        self.connect(&at_rest, &mut out);
+        moving.into_iter().for_each(|body| self.connect(&[body], &mut out));
         out
     }
 
     /// Adds the areas of the patches of some bodies that share a frame.
-    fn connect(&self, bodies: &[BodyId], is_apart: &dyn Fn(&Patch) -> bool, out: &mut [f64]) {
+    fn connect(&self, bodies: &[BodyId], out: &mut [f64]) {
         let patches = || bodies.iter().flat_map(|&body| self.patches_of(body));
         let mut weld = Weld::of_corners(patches().flat_map(|(_, p)| p.corners_in_body()));
         let mut sets = Sets::default();
         let mut firsts: Vec<(PatchId, u32)> = Vec::new();
         for (id, patch) in patches() {
-            // Every point twice: for those that are apart, and for the others.
-            let own = u32::from(is_apart(patch));
-            let number = |c| 2 * weld.vertex(c) + own;
-            let numbers: Vec<u32> = patch.corners_in_body().map(number).collect();
-            sets.extend(2 * weld.points.len());
+            let numbers: Vec<u32> = patch.corners_in_body().map(|c| weld.vertex(c)).collect();
+            sets.extend(weld.points.len());
             numbers.windows(2).for_each(|pair| sets.join(pair[0], pair[1]));
             firsts.push((id, numbers[0]));
         }
-        let mut areas = vec![0.0; 2 * weld.points.len()];
+        let mut areas = vec![0.0; weld.points.len()];
         for &(id, first) in &firsts {
             areas[sets.root(first) as usize] += self.patches[id.0 as usize].area_m2();
         }
@@ -66,21 +63,6 @@ mod tests {
                 b.animate_translation(node, track);
             }
         }
-        assert_eq!(b.build().unwrap().connected_areas_m2(&|_| false), [2.0, 2.0, 1.0]);
-    }
-
-    #[test]
-    fn a_lamp_is_not_connected_with_the_ceiling_around_it() {
-        let mut b = SceneBuilder::new("row");
-        let grey = b.material("grey", [0.5; 3], [0.0; 3]);
-        let glow = b.material("glow", [0.5; 3], [1.0; 3]);
-        let node = b.node("row", None, DVec3::ZERO, DQuat::IDENTITY);
-        for (x, material) in [(0.0, grey), (1.0, grey), (2.0, glow)] {
-            let corners = [(x, 0.0), (x + 1.0, 0.0), (x + 1.0, 1.0), (x, 1.0)];
-            b.polygon(node, "square", material, &corners.map(|(x, y)| DVec3::new(x, y, 0.0)));
-        }
-        let scene = b.build().unwrap();
-        assert_eq!(scene.connected_areas_m2(&|_| false), [3.0, 3.0, 3.0]);
-        assert_eq!(scene.connected_areas_m2(&|patch| scene.patch_emits(patch)), [2.0, 2.0, 1.0]);
+        assert_eq!(b.build().unwrap().connected_areas_m2(), [2.0, 2.0, 1.0]);
     }
 }

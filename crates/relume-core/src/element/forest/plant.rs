@@ -173,8 +173,7 @@ impl Forest {
         self.fixed_mut().normals = self.boxes_of_normals(scene);
         self.fixed_mut().shines = !scene.lights.is_empty();
         self.set_glowing(scene.glowing(&|_| [0.0; 3]));
-        self.fixed_mut().connected_m2 = scene.connected_areas_m2(&|_| false);
-        self.fixed_mut().alike_m2 = scene.connected_areas_m2(&|patch| scene.patch_emits(patch));
+        self.fixed_mut().connected_m2 = scene.connected_areas_m2();
     }
 
     fn boxes_of_normals(&self, scene: &Scene) -> Vec<Aabb> {

@@ -47,7 +47,6 @@ impl SpaceJudge<'_> {
                 }
                 false => self.forest.area_m2(self.forest.patch_root(self.patch_of(id))),
             },
-            alike_area: self.forest.alike_m2(self.patch_of(id)),
         };
         [end(pair.ids.0, place_a.area), end(pair.ids.1, place_b.area)]
     }

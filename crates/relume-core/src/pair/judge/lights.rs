@@ -82,14 +82,7 @@ impl SpaceJudge<'_> {
             (Stage::Fine(brightness), RefinementCriterion::Error { threshold }) => {
                 let end = |id, area, reference_area| {
                     let light = brightness.of(self.forest, id);
-                    End {
-                        area,
-                        reference_area,
-                        light,
-                        own_area: 0.0,
-                        surface_area: 0.0,
-                        alike_area: 0.0,
-                    }
+                    End { area, reference_area, light, own_area: 0.0, surface_area: 0.0 }
                 };
                 let receiver = end(element, e.area, self.reference_area(brightness, element));
                 let source = end(light, 0.0, f64::INFINITY);

@@ -221,12 +221,12 @@ fn heaps_receive_what_they_do_without_groups() {
             session.step(0, 0.0).unwrap();
             patch_means(&session.frame().unwrap().solution())
         };
-        let want = solve(Options { groups: false, ..at_tolerance(0.1) });
+        let want = solve(Options { groups: false, ..at_tolerance(0.05) });
         let (by_area, by_patch) = difference(&solve(at_tolerance(0.2)), &want);
         let (plain, _) = difference(&solve(Options { groups: false, ..at_tolerance(0.2) }), &want);
         println!("seed {seed}: {by_area:.4} by area (without {plain:.4}), {by_patch:.4} by patch");
-        // Found: at most 0.007 and 0.065.
-        assert!(by_area < 0.02 && by_patch < 0.1, "seed {seed}: {by_area} {by_patch}");
+        // Found: at most 0.010 and 0.113.
+        assert!(by_area < 0.02 && by_patch < 0.12, "seed {seed}: {by_area} {by_patch}");
     }
 }
 

@@ -158,7 +158,7 @@ impl<'a> Group<'a> {
             }
             let covered = &mut out[of.id.0 as usize];
             let found = add(scene, of.id, vec![corners], (covered, left));
-            if found && lies == InPlane::Touches && opposed {
+            if found && opposed {
                 covered.contacts.push(by.id);
             }
         }

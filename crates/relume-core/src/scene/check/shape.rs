@@ -81,11 +81,6 @@ impl Part {
         other.bounds.0.cmpge(self.bounds.0).all() && other.bounds.1.cmple(self.bounds.1).all()
     }
 
-    /// Whether a point lies within its bounds or on them.
-    fn reaches(&self, p: DVec3) -> bool {
-        p.cmpge(self.bounds.0).all() && p.cmple(self.bounds.1).all()
-    }
-
     fn contains(&self, p: DVec3) -> bool {
         p.cmpgt(self.bounds.0).all() && p.cmplt(self.bounds.1).all()
     }
@@ -372,8 +367,8 @@ fn inside_out(scene: &Scene, topology: &Topology, parts: &[Part], notes: &mut Ve
         let others = || parts.iter().enumerate().filter(|(n, _)| *n != number).map(|(_, p)| p);
         let holds = |p: &Part| part.contains(p.bounds.0) && part.contains(p.bounds.1);
         // A lamp flush in a wall is inside too.
-        let empty = !others().any(|p| part.reaches((p.bounds.0 + p.bounds.1) / 2.0))
-            && !stands.iter().any(|&p| part.contains(p));
+        let is_in = |p: &Part| part.spans(p) || part.contains((p.bounds.0 + p.bounds.1) / 2.0);
+        let empty = !others().any(is_in) && !stands.iter().any(|&p| part.contains(p));
         let all_in = parts.len() > 1 && others().all(holds);
         let is_in_a_room = || others().any(|room| room.volume < 0.0 && room.spans(part));
         let what = match part.volume < 0.0 {

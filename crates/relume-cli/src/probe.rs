@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use relume::scene::{BodyId, Scene};
-use relume::session::{Aim, Frame, Options, Sensor, Session};
+use relume::session::{Aim, Frame, MountedSensor, Options, Sensor, Session};
 
 use crate::accuracy::Estimates;
 use crate::args::{AccuracyFlag, ProbeArgs};
@@ -36,8 +36,11 @@ pub(crate) fn probe(args: &ProbeArgs) -> Result<(), Failure> {
     // A sensor in a dark shell reads nothing, whether its walls are there or not; on the mesh it needs them.
     let clip = if args.interpolate { clip } else { clip.without_dark_sides() };
     let mut sink = Sink::open(args.output.as_deref())?;
-    // Gathered readings need no more than the right light from elements.
-    let aim = if args.interpolate { Aim::Mesh } else { Aim::Points };
+    // Gathered readings need no more than the right light from what their sensors see.
+    let aim = match args.interpolate {
+        true => Aim::Mesh,
+        false => Aim::Sensors(riders.iter().map(Rider::mounted).collect()),
+    };
     let options = Options { aim, ..clip.options(args.update, false)? };
     let mut session = clip.session_with(options)?;
     let size = Size::of(&clip, session.options());
@@ -80,6 +83,10 @@ struct Rider<'a> {
 }
 
 impl Rider<'_> {
+    fn mounted(&self) -> MountedSensor {
+        MountedSensor { body: self.body, sensor: self.local }
+    }
+
     /// Where it is in the world; `None` while its body is absent.
     fn at(&self, scene: &Scene, time_s: f64) -> Option<Sensor> {
         let Some(body) = self.body else { return Some(self.local) };

@@ -3,7 +3,7 @@
 use crate::common::{at_tolerance, facing_up, flipped, judged, lit_room, v};
 use glam::{DQuat, DVec3};
 use relume_core::scene::{MaterialId, Scene, SceneBuilder};
-use relume_core::session::{Aim, Options, PointError, Sensor, Session};
+use relume_core::session::{Aim, MountedSensor, Options, PointError, Sensor, Session};
 use relume_judge::path::{self, Site};
 use relume_judge::{Random, World};
 
@@ -135,6 +135,52 @@ fn a_solution_made_for_points_has_few_links_and_reads_within_the_tolerance() {
             assert!(5 * made < 4 * of_mesh, "{}: {made} links of {of_mesh}", scene.name);
         }
     }
+}
+
+#[test]
+fn a_solution_made_for_given_sensors_has_fewer_links_and_reads_within_the_tolerance() {
+    let all = |e: [f64; 3]| e.iter().sum::<f64>();
+    let mut sums = [0, 0];
+    for scene in [lit_room(), behind_a_slit(), between_blocks()] {
+        let scene = Arc::new(scene);
+        let solved = |tolerance: f64, aim: Aim| {
+            let options = Options { aim, ..at_tolerance(tolerance) };
+            let mut session = Session::new(Arc::clone(&scene), options).unwrap();
+            session.step(0, 0.0).unwrap();
+            session
+        };
+        // In one place, as on a desk, that some light reaches.
+        let mut sensors = places(&scene, 48, &mut Random::of_part(8, 0));
+        let judge = solved(0.01, Aim::Mesh);
+        let reaches = |sensor: &Sensor| all(judge.frame().unwrap().irradiances_at(&[*sensor])[0]);
+        sensors.retain(|sensor| reaches(sensor) > 1e-3);
+        let middle = sensors[0].at;
+        sensors.sort_by(|a, b| a.at.distance(middle).total_cmp(&b.at.distance(middle)));
+        sensors.truncate(8);
+        let mounted = sensors.iter().map(|&sensor| MountedSensor { body: None, sensor });
+        let here = Aim::Sensors(mounted.collect());
+        let fine = judge.frame().unwrap().irradiances_at(&sensors);
+        let links = |session: &Session| session.frame().unwrap().report().links;
+        for tolerance in [0.1, 0.02] {
+            let session = solved(tolerance, here.clone());
+            let found = session.frame().unwrap().irradiances_at(&sensors);
+            let errors = found.iter().zip(&fine).map(|(&e, &right)| all(e) / all(right) - 1.0);
+            let rms = (errors.map(|e| e * e).sum::<f64>() / fine.len() as f64).sqrt();
+            let (made, of_points) = (links(&session), links(&solved(tolerance, Aim::Points)));
+            println!(
+                "{} at {tolerance}: {made} links of {of_points}, RMS {:.2} %",
+                scene.name,
+                100.0 * rms
+            );
+            assert!(rms < tolerance, "{} at {tolerance}: {rms}", scene.name);
+            assert!(made < of_points, "{}: {made} links of {of_points}", scene.name);
+            if tolerance < 0.1 {
+                sums = [sums[0] + made, sums[1] + of_points];
+            }
+        }
+    }
+    // A small room has few links anyway.
+    assert!(5 * sums[0] < 4 * sums[1], "{sums:?}");
 }
 
 #[test]

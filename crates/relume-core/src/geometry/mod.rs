@@ -4,6 +4,7 @@
 
 mod bounds;
 mod box_tree;
+mod choice;
 mod convex;
 mod cut;
 mod hull;
@@ -13,6 +14,7 @@ mod tuning;
 
 pub use bounds::{Aabb, Interval, ShaftOfBoxes, shaft_meets_box};
 pub use box_tree::BoxTree;
+pub use choice::{at_share, spread};
 pub use convex::{ConvexPolygon, Plane, polygon_area, split_convex};
 pub use cut::{Segment, cut_along, segment_within};
 pub use hull::is_outside_hull;

@@ -12,11 +12,12 @@ use rayon::prelude::*;
 use crate::element::Shape;
 use crate::follow::Accuracy;
 use crate::scene::PatchId;
-use crate::space::Solved;
+use crate::space::{Sensor, Solved};
+use crate::transport::{Hit, Rays};
 
-use super::choice::spread;
-use super::gather::{Look, Purpose, Sensor};
-use super::rays::{Hit, Rays};
+use super::gather::{Look, Purpose};
+use crate::geometry::spread;
+
 use super::sensors::irradiance;
 use super::snapshot::{self, Leaf};
 use super::tuning::{ACCURACY_RAYS, BRIGHT, DARK, LAMPS, STEPS, WALK_LEAST, WALKS};

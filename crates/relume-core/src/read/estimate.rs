@@ -11,16 +11,16 @@ use crate::element::{ElementId, Kind};
 use crate::follow::Accuracy;
 use crate::scene::PatchId;
 use crate::solver::{Linear, Radiosity, Surfaces};
-use crate::space::Solved;
+use crate::space::{Sensor, Solved};
 
 use super::accuracy::{all, nine_tenths, point_of, sensor_on};
 use super::bends::Bends;
-use super::choice::spread;
 use super::direct;
-use super::gather::{Look, Purpose, Sensor};
+use super::gather::{Look, Purpose};
 use super::tuning::{
     CHECK_COST_PER_PATCH, CHECK_LITTLE, CHECK_POINTS, CHECK_SHARE, DARK, DOUBT_MAX, DRAWN_EVENLY,
 };
+use crate::geometry::spread;
 
 /// Irradiance that the mesh says at a point of a surface, beside what arrives there if all else is right.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,13 +8,12 @@ use crate::geometry::Pose;
 use crate::pair::PairTree;
 use crate::scene::PatchId;
 use crate::solver::{Links, Radiosity};
-use crate::space::{Solved, row_sums_of};
+use crate::space::{Sensor, Solved, row_sums_of};
 
 use super::estimate::{self, PointError};
 use super::events::{self, Event};
 use super::factors::{Factors, Grouping};
 use super::fluxes::{self, Flux};
-use super::gather::Sensor;
 use super::sensors;
 use super::snapshot::{self, Snapshot};
 use super::{accuracy, direct, reconstruct};

@@ -6,11 +6,11 @@
 //! is gathered and what its line says, and so on. The mean over walks is the light that all walks together follow;
 //! the better the leaves, the less it scatters (lines as control variates).
 
-use crate::space::Solved;
+use crate::space::{Sensor, Solved};
 
-use super::choice::{at_share, spread};
-use super::gather::{Gathered, Look, Part, Purpose, Sensor};
+use super::gather::{Gathered, Look, Part, Purpose};
 use super::tuning::{GAP_DARK, GAP_FOLLOWED, GAP_NARROW, GAP_REACH, GAP_WALKS, IN_A_GAP};
+use crate::geometry::{at_share, spread};
 
 /// The gap that a sensor is in.
 pub(super) struct Gap {

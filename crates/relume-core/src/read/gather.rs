@@ -14,32 +14,11 @@ use crate::transport::{
     segment_is_clear,
 };
 
-use crate::space::{Solved, place_of};
+use crate::space::{Sensor, Solved, place_of};
 
-use super::choice::at_share;
-use super::tuning::{CHECK_FAR, GAP_FAR, GATHER_FAR, GATHER_PART};
+use super::tuning::{BEYOND_FAR, CHECK_FAR, GAP_FAR, GATHER_FAR, GATHER_PART};
+use crate::geometry::at_share;
 use crate::read::tuning::SENSOR_SPLITS;
-
-/// A place and a direction at which irradiance is asked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sensor {
-    /// Where it is, metres.
-    pub at: DVec3,
-    /// Direction that it faces along, of any length but 0.
-    pub normal: DVec3,
-}
-
-impl Sensor {
-    /// This sensor with a normal of length 1; no number where the normal has no direction.
-    pub(super) fn with_unit_normal(&self) -> Sensor {
-        Sensor { normal: self.normal.normalize_or(DVec3::NAN), ..*self }
-    }
-
-    /// Whether point and normal are numbers.
-    pub(super) fn is_finite(&self) -> bool {
-        self.at.is_finite() && self.normal.is_finite()
-    }
-}
 
 /// How far a sensor may be off the surface it lies on, relative to the scene's diagonal: what files
 /// with six digits hold. What is no further above its tangent plane hides nothing.
@@ -281,9 +260,11 @@ impl<'a> Look<'a> {
         let far = match self.purpose {
             Purpose::Check => CHECK_FAR,
             _ if self.reach_m > 0.0 => GAP_FAR,
+            Purpose::Beyond => BEYOND_FAR,
             _ => GATHER_FAR,
         };
-        let as_one = in_the_way.is_empty() && e.radius < far * distance;
+        let is_rough = self.purpose == Purpose::Beyond && self.reach_m == 0.0;
+        let as_one = (is_rough || in_the_way.is_empty()) && e.radius < far * distance;
         if !children.is_empty() && !as_one {
             children.for_each(|child| self.add_element(ElementId(child), &in_the_way, out));
             return;

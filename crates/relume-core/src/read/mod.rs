@@ -4,7 +4,6 @@
 
 mod accuracy;
 mod bends;
-mod choice;
 mod coarse_values;
 mod compare;
 mod direct;
@@ -18,7 +17,7 @@ mod gather;
 mod lossy;
 mod names;
 mod pieces;
-mod rays;
+
 mod reconstruct;
 mod sensors;
 mod snapshot;
@@ -32,7 +31,6 @@ pub use events::{Event, EventKind};
 pub use factors::{Closure, Factors, Grouping, Open, PartFactors};
 pub use fluxes::Flux;
 pub use frame::{Frame, Hash, Mesh};
-pub use gather::Sensor;
 pub use lossy::{Missed, RadiosityError, missed, radiosity_error};
 pub use names::ElementName;
 pub use snapshot::{Gathered, LampLight, Leaf, Snapshot};

@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use crate::space::Solved;
+use crate::space::{Sensor, Solved};
 
 use super::gap::Gap;
-use super::gather::{Gathered, Look, Purpose, Sensor};
+use super::gather::{Gathered, Look, Purpose};
 use super::tuning::GATHER_LITTLE;
 
 /// Sensors that one task handles.

@@ -27,9 +27,11 @@ pub use crate::pair::Work;
 pub use crate::read::{
     Closure, CoarseQuantity, CoarseValue, Difference, ElementName, Elements, Event, EventKind,
     Factors, Flux, Frame, Gathered, Grouping, Hash, LampLight, Leaf, Mesh, Missed, Open,
-    PartFactors, PointError, RadiosityError, RadiosityGap, Sensor, Snapshot, Which, compare,
-    missed, radiosity_error, radiosity_gap,
+    PartFactors, PointError, RadiosityError, RadiosityGap, Snapshot, Which, compare, missed,
+    radiosity_error, radiosity_gap,
 };
+
+pub use crate::space::{MountedSensor, Sensor};
 
 use replant::{Edited, Start};
 
@@ -289,10 +291,9 @@ impl Session {
 
     /// A step to a world, in the present scene.
     fn goal<'a>(&'a self, world: &'a World, held: &'a Held, from: Option<&'a World>) -> Goal<'a> {
-        let Options { tolerance, aim, .. } = self.options;
         let tuning = Tuning {
-            tolerance,
-            aim,
+            tolerance: self.options.tolerance,
+            aim: self.options.aim.clone(),
             criterion: self.options.refinement_criterion(),
             simd: self.simd,
         };

@@ -2,7 +2,7 @@
 //! of them linked, a fixed number of sweeps from the emission. A pure function of the scene at one
 //! instant: links are summed in the order of the coarse elements, whatever their history.
 
-use crate::element::{ElementId, Forest, Kind, Renumbering};
+use crate::element::{ElementId, Forest, Kind, Renumbering, WorldView};
 use crate::pair::{self, Brightness, Carried, Changes, CoarseBrightness, CoarseLink};
 use crate::scene::{LightId, PatchId, Scene, World};
 use crate::solver::{Dirty, Link, Links, Radiosity, Stop, Surfaces};
@@ -10,6 +10,7 @@ use crate::solver::{Dirty, Link, Links, Radiosity, Stop, Surfaces};
 use crate::follow::set_pairs;
 
 use super::importance::{Aim, weigh_by_points};
+use super::sensor_views::CoarseScene;
 use super::surfaces::{CoarseReceivers, CoarseSurfaces, LitForest};
 use super::tuning::{COARSE_SHARE, COARSE_SWEEPS, DARK_FLOOR, LOST, REFERENCE_SHARE};
 
@@ -85,10 +86,10 @@ impl Coarse {
     /// Solves over the coarse links as the scene shines in a world; `coarse` are the coarse elements of `seed` by number.
     pub(super) fn solve(
         &mut self,
-        (scene, now): (&Scene, &World),
+        (scene, now, view): (&Scene, &World, &WorldView),
         seed: &Forest,
         coarse: &[u32],
-        aim: Aim,
+        aim: &Aim,
     ) {
         for &id in coarse {
             self.links.sort(id);
@@ -101,15 +102,15 @@ impl Coarse {
             self.radiosity.set(group.0, surfaces.material(group.0).exitance);
         }
         self.radiosity.solve(&surfaces, &self.links, Dirty::All, Stop::Sweeps(COARSE_SWEEPS));
-        self.brightness = self.measure((scene, now), (seed, coarse), &surfaces, aim);
+        self.brightness = self.measure((scene, now, view), (seed, coarse), &surfaces, aim);
     }
 
     fn measure(
         &self,
-        (scene, now): (&Scene, &World),
+        (scene, now, view): (&Scene, &World, &WorldView),
         (seed, coarse): (&Forest, &[u32]),
         surfaces: &CoarseSurfaces<'_>,
-        aim: Aim,
+        aim: &Aim,
     ) -> CoarseBrightness {
         let total_area = seed.made_m2();
         let mean = |v: [f32; 3]| v.iter().map(|&x| f64::from(x)).sum::<f64>() / 3.0;
@@ -144,9 +145,16 @@ impl Coarse {
             |&id: &u32| surfaces.area_m2(id) * self.open.of(id).iter().map(brings).sum::<f64>();
         let known = if arriving > LOST * coarse.iter().map(open).sum::<f64>() {
             let mut known: Vec<Brightness> = coarse.iter().zip(&irradiance).map(light_of).collect();
-            if aim == Aim::Points {
-                let scene = (&self.links, seed, coarse);
-                weigh_by_points(scene, surfaces, &mut known);
+            let radiosity = &self.radiosity;
+            let views = match aim {
+                Aim::Sensors(sensors) => {
+                    CoarseScene { now, view, forest: seed, coarse, surfaces, radiosity, floor }
+                        .views(sensors)
+                }
+                _ => Vec::new(),
+            };
+            if *aim != Aim::Mesh {
+                weigh_by_points((&self.links, seed, coarse), surfaces, &views, &mut known);
             }
             known
         } else {

@@ -15,6 +15,7 @@ use crate::solver::{Dirty, GroupLinks, Radiosity};
 
 use super::bed::Bed;
 use super::coarse::{self, Coarse};
+use super::importance::Aim;
 use super::promise::Promise;
 use super::state::{SpaceState, Tuning};
 use super::surfaces::LitForest;
@@ -55,10 +56,10 @@ impl Space for SpaceState {
     const ROOT: ElementId = Forest::ROOT;
 
     fn unsolved(goal: &Goal<'_>) -> SpaceState {
-        let &Goal { bed, world, held, tuning, .. } = goal;
+        let &Goal { bed, world, held, ref tuning, .. } = goal;
         SpaceState {
             scene: Arc::clone(&bed.scene),
-            tuning,
+            tuning: tuning.clone(),
             world: world.clone(),
             held: held.clone(),
             forest: bed.seed.clone(),
@@ -173,11 +174,14 @@ impl Space for SpaceState {
         let relit = change.is_none() || self.world.any_relit(&was.world);
         let is_known = self.coarse.brightness.is_known();
         let is_otherwise = !self.touched.is_empty() || !self.regrouped.is_empty();
-        if !changed && !relit && is_known && !is_otherwise {
+        // What sensors see changes with whatever moves.
+        let seen_otherwise = matches!(goal.tuning.aim, Aim::Sensors(_)) && self.world != was.world;
+        if !changed && !relit && is_known && !is_otherwise && !seen_otherwise {
             return;
         }
         let before = std::mem::take(&mut self.coarse.brightness);
-        self.coarse.solve((scene, &self.world), seed, coarse_ids, goal.tuning.aim);
+        let at = (&**scene, &self.world, &self.view);
+        self.coarse.solve(at, seed, coarse_ids, &goal.tuning.aim);
         if let Some(change) = change {
             let shifts = self.coarse.brightness.shifts(&before);
             change.set_brightness_shifts(seed, coarse_ids, shifts);

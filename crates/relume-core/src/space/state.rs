@@ -14,7 +14,7 @@ use super::surfaces::LitForest;
 use super::tuning::REFERENCE_SHARE;
 
 /// What a scene is solved with.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Tuning {
     /// Relative error of irradiance aimed at.
     pub(crate) tolerance: f64,

@@ -46,6 +46,70 @@ pub(super) const POINTS_MOST: f64 = 2.0;
 /// - Smaller: sensors in gaps err
 pub(super) const POINTS_NEAR: f64 = 2.0;
 
+/// As `POINTS_SHARE`, where the sensors are known.
+///
+/// - Unit: 1
+/// - Tried: 0, 0.02, 0.05, 0.1, 0.2 (docs/tolerance.md)
+/// - Larger: more links than sensors need
+/// - Smaller: sensors behind narrow openings err by more than the tolerance
+pub(super) const SENSORS_SHARE: f64 = 0.05;
+
+/// As `POINTS_MOST`, where the sensors are known.
+///
+/// - Unit: 1
+/// - Tried: 1, 2, 4, 5, 20
+/// - Larger: more links where light comes by one bright spot (60 % more in a room with a cove at 5 in place of 2)
+/// - Smaller: sensors behind a slit err by more than the tolerance (1.9 times at 2, 1.1 times at 5)
+pub(super) const SENSORS_CAP: f64 = 4.0;
+
+/// As `POINTS_NEAR`, where the sensors are known.
+///
+/// - Unit: 1
+/// - Tried: 0, 0.5, 1, 2
+/// - Larger: more links than sensors need
+/// - Smaller: sensors in gaps err
+pub(super) const SENSORS_NEAR: f64 = 0.5;
+
+/// Rays by which is found what sensors see, all sensors together.
+///
+/// - Unit: 1
+/// - Tried: 8192
+/// - Larger: a frame takes longer
+/// - Smaller: links are spent where they bring little
+pub(super) const SENSORS_RAYS: usize = 8192;
+
+/// Rays of one sensor, at least and at most.
+///
+/// - Unit: 1
+/// - Tried: 16 and 512
+/// - Larger: a frame takes longer
+/// - Smaller: links are spent where they bring little
+pub(super) const SENSOR_RAYS: [usize; 2] = [16, 512];
+
+/// Emitters that would be met by fewer of a sensor's rays, on average, are looked at one by one.
+///
+/// - Unit: 1
+/// - Tried: 4
+/// - Larger: what is partly hidden counts as seen, or as not seen
+/// - Smaller: the light of small lamps is found by chance
+pub(super) const FEW_RAYS: f64 = 4.0;
+
+/// Share of a sensor's view above which what is large for its distance makes a gap.
+///
+/// - Unit: 1
+/// - Tried: 0.5 (as where sensors are read), none (sensors in gaps of 5 mm read nothing, or half)
+/// - Larger: sensors in gaps err
+/// - Smaller: links that sensors beside walls do not need
+pub(super) const GAP_NEAR: f64 = 0.5;
+
+/// Sensors that are looked from at most.
+///
+/// - Unit: 1
+/// - Tried: 256
+/// - Larger: a frame takes longer
+/// - Smaller: sensors that are unlike most err
+pub(super) const SENSORS_MOST: usize = 256;
+
 /// Sweeps of the coarse solution; five bounces bring a closed room within 10 %.
 ///
 /// - Unit: sweeps

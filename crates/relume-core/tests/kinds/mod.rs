@@ -5,6 +5,7 @@
 //!
 //! with, if wanted, `RELUME_KINDS=pillar,street` and `RELUME_TOLERANCES=0.1,0.02` in the environment.
 
+mod at_sensors;
 mod scenes;
 
 use std::sync::Arc;

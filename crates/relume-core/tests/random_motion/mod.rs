@@ -14,7 +14,9 @@ use self::judge::{Seen, agree, follow, reduced};
 use self::recipe::{Flavour, Recipe};
 use crate::common::Random;
 use crate::common::audit::{Audit, audit};
-use relume_core::session::{Aim, Session};
+use glam::DVec3;
+use relume_core::scene::BodyId;
+use relume_core::session::{Aim, MountedSensor, Sensor, Session};
 
 /// Steps of each draw.
 const STEPS: usize = 16;
@@ -94,6 +96,22 @@ fn solutions_for_points() {
         check_recipes(flavour, 100..103, |seed| {
             let drawn = Recipe::draw(flavour, seed, STEPS);
             Recipe { aim: Aim::Points, solve: Ok([0.05, 0.1, 0.2][seed as usize % 3]), ..drawn }
+        });
+    }
+}
+
+#[test]
+fn solutions_for_given_sensors() {
+    use Flavour::{Contact, Families, Free, Glows, Jumps, Lights};
+    for flavour in [Free, Contact, Jumps, Lights, Families, Glows] {
+        check_recipes(flavour, 200..204, |seed| {
+            let drawn = Recipe::draw(flavour, seed, STEPS);
+            let riding = |k: u32| MountedSensor {
+                body: k.checked_sub(1).map(BodyId),
+                sensor: Sensor { at: DVec3::splat(0.3), normal: DVec3::Y },
+            };
+            let aim = Aim::Sensors((0..3).map(riding).collect());
+            Recipe { aim, solve: Ok([0.05, 0.1][seed as usize % 2]), ..drawn }
         });
     }
 }

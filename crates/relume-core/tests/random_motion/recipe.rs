@@ -158,7 +158,7 @@ impl Recipe {
 
     pub(crate) fn options(&self) -> Options {
         match self.solve {
-            Ok(tolerance) => Options { aim: self.aim, ..at_tolerance(tolerance) },
+            Ok(tolerance) => Options { aim: self.aim.clone(), ..at_tolerance(tolerance) },
             Err((epsilon, min_area)) => {
                 Options { tolerance: 0.1, ..form_factor_oracle(epsilon, min_area) }
             }

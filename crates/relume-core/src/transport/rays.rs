@@ -8,16 +8,16 @@ use crate::scene::PatchId;
 
 /// A leaf that a ray meets from its front.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Hit {
-    pub(super) patch: PatchId,
-    pub(super) leaf: ElementId,
+pub(crate) struct Hit {
+    pub(crate) patch: PatchId,
+    pub(crate) leaf: ElementId,
     /// Where, metres.
-    pub(super) at: DVec3,
+    pub(crate) at: DVec3,
 }
 
 /// What rays are cast through.
 #[derive(Clone, Copy)]
-pub(super) struct Rays<'a> {
+pub(crate) struct Rays<'a> {
     view: &'a WorldView,
     forest: &'a Forest,
 }
@@ -31,12 +31,12 @@ struct Ray {
 }
 
 impl<'a> Rays<'a> {
-    pub(super) fn new(view: &'a WorldView, forest: &'a Forest) -> Rays<'a> {
+    pub(crate) fn new(view: &'a WorldView, forest: &'a Forest) -> Rays<'a> {
         Rays { view, forest }
     }
 
     /// The leaf that a ray meets first; `None` where it meets the back of something, or leaves the scene.
-    pub(super) fn first(&self, from: DVec3, direction: DVec3) -> Option<Hit> {
+    pub(crate) fn first(&self, from: DVec3, direction: DVec3) -> Option<Hit> {
         let ray = Ray { from, direction, inverse: direction.recip() };
         let mut nearest: Option<(f64, PatchId)> = None;
         let mut stack = vec![Forest::ROOT];
@@ -117,7 +117,7 @@ impl<'a> Rays<'a> {
     }
 
     /// A leaf where it is.
-    pub(super) fn place(&self, leaf: ElementId) -> WorldElement {
+    pub(crate) fn place(&self, leaf: ElementId) -> WorldElement {
         debug_assert_eq!(self.forest.kind(leaf), Kind::Element);
         WorldElement::new(self.view, self.forest, leaf, false)
     }

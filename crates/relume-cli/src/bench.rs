@@ -4,7 +4,7 @@
 //! one that follows the motion, and one set up for this frame alone. So whatever else the machine
 //! does hits both alike, and ratios hold where seconds do not.
 
-use relume::export::{probe, write_atomically};
+use relume::export::write_atomically;
 use relume::session::Session;
 use relume_picture::picture::{self, Exposure};
 
@@ -14,6 +14,7 @@ use crate::clock::now;
 use crate::failure::Failure;
 use crate::figures::{Cold, Figures, Held, Measured};
 use crate::interrupt;
+use crate::lock::Lock;
 use crate::memory;
 use crate::output::{self, count, counted};
 use crate::plan::Plan;
@@ -53,9 +54,7 @@ pub(crate) fn measure<'a, Q: Sequence>(
     sequence: &'a Q,
     draw: Option<Draw<'a, Q::Session>>,
 ) -> Result<(), Failure> {
-    if let Some(path) = plan.json {
-        probe(path).map_err(|error| Failure::write(path, &error))?;
-    }
+    let _lock = plan.json.map(Lock::of_file).transpose()?;
     if plan.compare {
         enough(sequence)?;
         return strategies::compare(plan, sequence);

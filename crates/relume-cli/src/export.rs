@@ -8,7 +8,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use indicatif::HumanBytes;
 use relume::Pose;
-use relume::export::{self, Lit, LitPart, PageView, probe, write_atomically};
+use relume::export::{self, Lit, LitPart, PageView, write_atomically};
 use relume::scene::Projection;
 use relume::session::{Session, Snapshot};
 use relume_picture::picture::{Exposure, Recorder, Recording, Tone};
@@ -24,6 +24,7 @@ use crate::failure::Failure;
 use crate::frames;
 use crate::interrupt;
 use crate::light;
+use crate::lock::Lock;
 use crate::output::{self, count, counted};
 use crate::progress::Progress;
 use crate::size::Size;
@@ -79,7 +80,7 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
             Failure::usage("a viewer turns the scene by itself").help("leave out --turntable")
         );
     }
-    probe(&args.output).map_err(|error| Failure::write(&args.output, &error))?;
+    let _lock = Lock::of_file(&args.output)?;
     match form {
         Form::Vtp | Form::Pvd => return numbers::export(args, form == Form::Pvd),
         Form::Glb | Form::Html | Form::Usda => {}

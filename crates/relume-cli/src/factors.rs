@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use rayon::prelude::*;
-use relume::export::{self, Npz, WholeFile, probe, write_atomically};
+use relume::export::{self, Npz, WholeFile, write_atomically};
 use relume::scene::Scene;
 use relume::session::{self, Closure, Factors, FrameReport, Grouping, PartFactors};
 use serde::Serialize;
@@ -14,6 +14,7 @@ use crate::clip::{Clip, TOLERANCE, solved, step_failure};
 use crate::clock::now;
 use crate::failure::Failure;
 use crate::interrupt;
+use crate::lock::Lock;
 use crate::notes;
 use crate::output::{self, Sink, count, counted};
 use crate::progress::Progress;
@@ -43,9 +44,11 @@ pub(crate) fn factors(args: &FactorsArgs) -> Result<(), Failure> {
     if !args.clip.quiet {
         say(&clip.scene, &things, args.by, args.clip.verbose);
     }
-    if let Some(path) = &args.report {
-        probe(path).map_err(|error| Failure::write(path, &error))?;
-    }
+    let is_archive = matches!(format, FactorFormat::Npz | FactorFormat::NpzSparse);
+    // Tables take their own.
+    let archive = args.output.as_deref().filter(|_| is_archive);
+    let files = archive.into_iter().chain(args.report.as_deref());
+    let _locks = files.map(Lock::of_file).collect::<Result<Vec<_>, _>>()?;
     let mut table = Table::open(args, format, &clip, &things)?;
     let progress = Progress::new(clip.frames.len(), 0, args.clip.quiet);
     let outcome = frames(args, &clip, &things, &progress, &mut table);

@@ -1,11 +1,11 @@
-//! One run at a time in a folder.
+//! One run at a time in a folder, and at a file.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use relume::export::remove_remains;
+use relume::export::{probe, remove_remains};
 
 use crate::failure::Failure;
 
@@ -25,14 +25,37 @@ pub(crate) struct Lock {
 impl Lock {
     /// Takes the lock of a folder, or says who has it.
     pub(crate) fn take(dir: &Path) -> Result<Lock, Failure> {
-        let path = dir.join(".relume.lock");
+        let lock = Lock::at(dir.join(".relume.lock"), dir)?;
+        remove_remains(dir, &is_named_by_runs);
+        nothing_in_the_way(dir).map(|()| lock)
+    }
+
+    /// Takes the lock of a file that will be written, once it is known that it can be, or says who has it. A device has none,
+    /// and neither has what only runs write into their folder, which has one itself.
+    pub(crate) fn of_file(path: &Path) -> Result<Option<Lock>, Failure> {
+        probe(path).map_err(|error| Failure::write(path, &error))?;
+        let target = fs::canonicalize(path);
+        let file = target.as_deref().unwrap_or(path);
+        let is_other = fs::metadata(file).is_ok_and(|known| !known.is_file());
+        let name = file.file_name().and_then(|name| name.to_str());
+        let Some(name) = name.filter(|name| !is_other && !is_named_by_runs(name)) else {
+            return Ok(None);
+        };
+        let lock = Lock::at(file.with_file_name(format!(".{name}.lock")), path)?;
+        let dir = file.parent().filter(|dir| *dir != Path::new("")).unwrap_or(Path::new("."));
+        remove_remains(dir, &|remains| remains == name);
+        Ok(Some(lock))
+    }
+
+    /// Takes the lock at a path; `of` is what it is for.
+    fn at(path: PathBuf, of: &Path) -> Result<Lock, Failure> {
         loop {
             let mut options = OpenOptions::new();
             options.read(true).write(true).create(true).truncate(false);
             let mut file = options.open(&path).map_err(|error| Failure::write(&path, &error))?;
             match file.try_lock() {
                 Ok(()) => {}
-                Err(TryLockError::WouldBlock) => return Err(taken(dir, &mut file)),
+                Err(TryLockError::WouldBlock) => return Err(taken(of, &mut file)),
                 // A file system without locks: nothing can be promised there.
                 Err(TryLockError::Error(_)) => return Ok(Lock { _file: file, path }),
             }
@@ -43,9 +66,7 @@ impl Lock {
             let number = std::process::id().to_string();
             let written = file.set_len(0).and_then(|()| file.write_all(number.as_bytes()));
             written.map_err(|error| Failure::write(&path, &error))?;
-            remove_remains(dir, &is_named_by_runs);
-            let lock = Lock { _file: file, path };
-            return nothing_in_the_way(dir).map(|()| lock);
+            return Ok(Lock { _file: file, path });
         }
     }
 }
@@ -57,7 +78,7 @@ impl Drop for Lock {
     }
 }
 
-fn taken(dir: &Path, file: &mut File) -> Failure {
+fn taken(of: &Path, file: &mut File) -> Failure {
     let mut number = String::new();
     // Who has only just taken it may not have written its number yet.
     for _ in 0..LOOKS {
@@ -70,9 +91,13 @@ fn taken(dir: &Path, file: &mut File) -> Failure {
         "" => "another process".to_owned(),
         number => format!("process {number}"),
     };
-    Failure::new(format_args!("{who} is writing to {}", dir.display())).help(
-        "wait for it to end, or name another directory with -o, or another file with --report",
-    )
+    let help = match of.is_dir() {
+        true => {
+            "wait for it to end, or name another directory with -o, or another file with --report"
+        }
+        false => "wait for it to end, or name another file",
+    };
+    Failure::new(format_args!("{who} is writing to {}", of.display())).help(help)
 }
 
 /// An error where something other than a file has a name that a run gives its files: a pipe would take a picture only
@@ -135,6 +160,38 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         fs::write(dir.path().join(".relume.lock"), "12").unwrap();
         assert!(Lock::take(dir.path()).is_ok());
+    }
+
+    #[test]
+    fn the_second_run_at_a_file_is_told_the_number_of_the_first() {
+        let dir = tempfile::tempdir().unwrap();
+        let table = dir.path().join("e.csv");
+        let first = Lock::of_file(&table).unwrap();
+        let message = Lock::of_file(&table).err().unwrap().to_string();
+        assert!(message.contains(&format!("process {}", std::process::id())), "{message}");
+        assert!(message.contains("e.csv"), "{message}");
+        let _other = Lock::of_file(&dir.path().join("f.csv")).unwrap();
+        drop(first);
+        drop(Lock::of_file(&table).unwrap());
+        assert!(!dir.path().join(".e.csv.lock").exists());
+    }
+
+    #[test]
+    fn a_dead_run_leaves_no_lock_of_a_file_and_no_half_file_behind() {
+        let dir = tempfile::tempdir().unwrap();
+        let half = dir.path().join(".e.csv.12-3.tmp");
+        fs::write(&half, "half").unwrap();
+        fs::write(dir.path().join(".e.csv.lock"), "12").unwrap();
+        let _lock = Lock::of_file(&dir.path().join("e.csv")).unwrap();
+        assert!(!half.exists());
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn devices_are_anybodys() {
+        let null = Path::new("/dev/null");
+        let first = Lock::of_file(null).unwrap();
+        assert!(first.is_none() && Lock::of_file(null).unwrap().is_none());
     }
 
     #[test]

@@ -7,6 +7,7 @@ use relume::export::WholeFile;
 
 use crate::failure::Failure;
 use crate::interrupt;
+use crate::lock::Lock;
 use crate::text::lines;
 
 pub(crate) use crate::text::{complain, count, counted, name};
@@ -32,8 +33,8 @@ pub(crate) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
 /// Where a table goes: a file, which appears when it is finished, or stdout, likewise at the end, so
 /// that a run that fails has printed nothing.
 pub(crate) enum Sink {
-    /// A file and its path.
-    File(WholeFile, PathBuf),
+    /// A file, its path and its lock.
+    File(WholeFile, PathBuf, Option<Lock>),
     /// What will be printed.
     Stdout(Vec<u8>),
 }
@@ -46,14 +47,15 @@ impl Sink {
             return Err(Failure::new(format_args!("{} is a directory", path.display()))
                 .help("name a file with -o"));
         }
+        let lock = Lock::of_file(path)?;
         let file = WholeFile::create(path).map_err(|error| Failure::write(path, &error))?;
-        Ok(Sink::File(file, path.to_owned()))
+        Ok(Sink::File(file, path.to_owned(), lock))
     }
 
     /// The message of a write that failed.
     pub(crate) fn failure(&self, error: &io::Error) -> Failure {
         match self {
-            Sink::File(_, path) => Failure::write(path, error),
+            Sink::File(_, path, _) => Failure::write(path, error),
             Sink::Stdout(_) => Failure::new(format_args!("cannot write to stdout: {error}")),
         }
     }
@@ -61,7 +63,7 @@ impl Sink {
     /// The rows so far are of use by themselves: a file holds them also if the run is ended.
     pub(crate) fn keep_so_far(&mut self) -> Result<(), Failure> {
         let kept = match self {
-            Sink::File(file, _) => file.keep_so_far(),
+            Sink::File(file, ..) => file.keep_so_far(),
             Sink::Stdout(_) => Ok(()),
         };
         kept.map_err(|error| self.failure(&error))
@@ -71,7 +73,9 @@ impl Sink {
     pub(crate) fn finish(self) -> Result<(), Failure> {
         let _guard = interrupt::writing();
         match self {
-            Sink::File(file, path) => file.finish().map_err(|error| Failure::write(&path, &error)),
+            Sink::File(file, path, _lock) => {
+                file.finish().map_err(|error| Failure::write(&path, &error))
+            }
             Sink::Stdout(bytes) => print_bytes(&bytes),
         }
     }
@@ -80,7 +84,7 @@ impl Sink {
 impl Write for Sink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
-            Sink::File(file, _) => file.write(bytes),
+            Sink::File(file, ..) => file.write(bytes),
             Sink::Stdout(out) => out.write(bytes),
         }
     }

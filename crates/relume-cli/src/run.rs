@@ -274,8 +274,8 @@ impl Job {
         Ok(Some((picture, path)))
     }
 
-    /// The locks of the folders that are this run's alone while it goes: that of the pictures, and one in which a report by the name
-    /// that runs give theirs is written.
+    /// The locks of the folders and files that are this run's alone while it goes: the folders of the pictures and of a report by the
+    /// name that runs give theirs, other reports and the events.
     fn locks(&self) -> Result<Vec<Lock>, Failure> {
         let beside = self.solve.report.as_deref().filter(|path| lock::is_of_a_run(path));
         let beside = beside.map(|path| match path.parent() {
@@ -285,7 +285,10 @@ impl Job {
         let of = |dir: Option<&Path>| dir.and_then(|dir| fs::canonicalize(dir).ok());
         // A folder that is not there is said when the report is written.
         let beside = beside.filter(|dir| dir.is_dir() && of(Some(dir)) != of(self.dir.as_deref()));
-        self.dir.as_deref().into_iter().chain(beside).map(Lock::take).collect()
+        let folders = self.dir.as_deref().into_iter().chain(beside).map(Lock::take);
+        let files = self.solve.report.as_deref().into_iter().chain(self.solve.events.as_deref());
+        let files = files.filter_map(|path| Lock::of_file(path).transpose());
+        folders.chain(files).collect()
     }
 
     /// Where the report goes.
@@ -310,7 +313,7 @@ impl Job {
                 self.picture_is_whole(frame, digest)
             })?;
         }
-        for path in paths.iter().chain(&self.solve.events) {
+        for path in &paths {
             probe(path).map_err(|error| Failure::write(path, &error))?;
         }
         Ok(report)

@@ -218,7 +218,10 @@ impl Job {
     ) -> Result<Run<'_>, Failure> {
         let events = self.solve.events.as_ref().map(|_| EventTable::new());
         let options = clip.options(self.solve.update, true)?;
-        let session = clip.session_with(Options { events: events.is_some(), ..options })?;
+        let session = clip.session_with(Options {
+            events: events.is_some() || self.show.needs_events(),
+            ..options
+        })?;
         let size = Size::of(clip, session.options());
         if !self.quiet() {
             let rough = if self.picture.is_some() { ", or rough pictures: --preview" } else { "" };
@@ -353,7 +356,7 @@ impl Job {
             return Err(Failure::usage("--show is for pictures: .exr files hold the numbers")
                 .help("leave out --show, or use --format png"));
         }
-        self.show.check(&clip.scene)
+        self.show.check(&clip.scene, clip.options(self.solve.update, true)?.update)
     }
 
     /// Path of a frame's picture, if this run makes pictures.
@@ -536,6 +539,7 @@ impl Run<'_> {
             self.session.count_motion_from(
                 before.map(|&f| frames::time_of(f, self.job.solve.clip.time.fps)),
             );
+            self.lead_to(frame)?;
             self.frame(frame)?;
             if let Some((mut meanwhile, path)) = meanwhile.take() {
                 meanwhile.end(&path);
@@ -545,6 +549,16 @@ impl Run<'_> {
             self.finished().write_report()?;
         }
         Ok(Outcome::Done)
+    }
+
+    /// Solves what has to be solved before a frame so that it can be shown.
+    fn lead_to(&mut self, frame: u32) -> Result<(), Failure> {
+        let last = self.session.frame().map(|solved| solved.report().frame);
+        for before in self.job.show.frames_before(frame, last) {
+            let time_s = frames::time_of(before, self.job.solve.clip.time.fps);
+            self.session.step(before, time_s).map_err(|error| self.session_failure(error))?;
+        }
+        Ok(())
     }
 
     fn frame(&mut self, frame: u32) -> Result<(), Failure> {

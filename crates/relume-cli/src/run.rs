@@ -131,7 +131,7 @@ impl Job {
         let (clip, views) = self.open_clip()?;
         if let Some((_, flags)) = &self.picture {
             // Not only after the first frame.
-            ask_for_picture(flags, self.format)?;
+            clip::ask_for_picture(flags, self.format)?;
         }
         if let Some(dir) = &self.dir {
             make_directory(dir)?;
@@ -593,7 +593,7 @@ impl Run<'_> {
         let Some((view, options, flags)) = self.view(frame)? else { return Ok(None) };
         let exposure = options.exposure_ev.map_or(Exposure::Automatic, fixed);
         let settings = clip::picture_settings(flags, options.shading, exposure);
-        ask_for_picture(flags, self.job.format)?;
+        clip::ask_for_picture(flags, self.job.format)?;
         let scale = options.exposure_ev.map_or(1.0, f64::exp2);
         let shown = self.job.show.draw(&self.session, &snapshot, (&view, &settings), scale)?;
         let bytes = match self.job.format {
@@ -685,25 +685,6 @@ const LIT_MIN: f64 = 0.01;
 const ALMOST_DARK: &str = "warning: the view sees almost no light: look from elsewhere (--overview, --camera NAME, --eye \
                            X,Y,Z), light what it sees (--emit MATERIAL=RADIANCE), or, if that is black, let it reflect \
                            (--reflect MATERIAL=R)";
-
-/// Bytes a pixel while a picture is drawn: in tiles and whole.
-const PIXEL_BYTES: u64 = 6;
-/// The same of layers: in tiles, whole, as channels and packed.
-const LAYERS_BYTES: u64 = 280;
-
-/// An error if there is no room for a picture, or no way to draw it.
-fn ask_for_picture(flags: &PictureFlags, format: FrameFormat) -> Result<(), Failure> {
-    if flags.mesh && format == FrameFormat::Exr {
-        return Err(Failure::usage("outlines are no light: they cannot be drawn into numbers")
-            .help("leave out --mesh, or use --format png"));
-    }
-    let pixels = u64::from(flags.size.width) * u64::from(flags.size.height);
-    let bytes = match format {
-        FrameFormat::Png => PIXEL_BYTES,
-        FrameFormat::Exr => LAYERS_BYTES,
-    };
-    memory::ask(pixels * bytes, format_args!("a picture of {}", flags.size))
-}
 
 fn make_directory(dir: &Path) -> Result<(), Failure> {
     if dir.exists() && !dir.is_dir() {

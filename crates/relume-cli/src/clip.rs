@@ -11,7 +11,8 @@ use relume::session::{Aim, Frame, Options, Oracle, Session, SessionError, Snapsh
 use relume_picture::picture::{self, Exposure, Settings};
 
 use crate::args::{
-    ClipFlags, DemoScene, OracleFlag, PictureFlags, Shading, SourceFlags, UpdateChoice, UpdateFlag,
+    ClipFlags, DemoScene, FrameFormat, OracleFlag, PictureFlags, Shading, SourceFlags,
+    UpdateChoice, UpdateFlag,
 };
 use crate::demo;
 use crate::failure::Failure;
@@ -291,6 +292,25 @@ pub(crate) fn snapshot(session: &Session, flags: &PictureFlags, shading: Shading
 /// What a session has solved last.
 pub(crate) fn solved(session: &Session) -> Frame<'_> {
     session.frame().expect("a step leaves a solution")
+}
+
+/// Bytes a pixel while a picture is drawn: in tiles and whole.
+const PIXEL_BYTES: u64 = 6;
+/// The same of layers: in tiles, whole, as channels and packed.
+const LAYERS_BYTES: u64 = 280;
+
+/// An error if there is no room for a picture, or no way to draw it.
+pub(crate) fn ask_for_picture(flags: &PictureFlags, format: FrameFormat) -> Result<(), Failure> {
+    if flags.mesh && format == FrameFormat::Exr {
+        return Err(Failure::usage("outlines are no light: they cannot be drawn into numbers")
+            .help("leave out --mesh, or use --format png"));
+    }
+    let pixels = u64::from(flags.size.width) * u64::from(flags.size.height);
+    let bytes = match format {
+        FrameFormat::Png => PIXEL_BYTES,
+        FrameFormat::Exr => LAYERS_BYTES,
+    };
+    memory::ask(pixels * bytes, format_args!("a picture of {}", flags.size))
 }
 
 /// How a picture is drawn.

@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod args;
+mod around;
 mod balance;
 mod bench;
 mod check;

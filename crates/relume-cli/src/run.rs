@@ -131,7 +131,7 @@ impl Job {
         let (clip, views) = self.open_clip()?;
         if let Some((_, flags)) = &self.picture {
             // Not only after the first frame.
-            ask_for_picture(flags, self.format)?;
+            clip::ask_for_picture(flags, self.format)?;
         }
         if let Some(dir) = &self.dir {
             make_directory(dir)?;
@@ -218,7 +218,10 @@ impl Job {
     ) -> Result<Run<'_>, Failure> {
         let events = self.solve.events.as_ref().map(|_| EventTable::new());
         let options = clip.options(self.solve.update, true)?;
-        let session = clip.session_with(Options { events: events.is_some(), ..options })?;
+        let session = clip.session_with(Options {
+            events: events.is_some() || self.show.needs_events(),
+            ..options
+        })?;
         let size = Size::of(clip, session.options());
         if !self.quiet() {
             let rough = if self.picture.is_some() { ", or rough pictures: --preview" } else { "" };
@@ -356,7 +359,7 @@ impl Job {
             return Err(Failure::usage("--show is for pictures: .exr files hold the numbers")
                 .help("leave out --show, or use --format png"));
         }
-        self.show.check(&clip.scene)
+        self.show.check(&clip.scene, clip.options(self.solve.update, true)?.update)
     }
 
     /// Path of a frame's picture, if this run makes pictures.
@@ -539,6 +542,7 @@ impl Run<'_> {
             self.session.count_motion_from(
                 before.map(|&f| frames::time_of(f, self.job.solve.clip.time.fps)),
             );
+            self.lead_to(frame)?;
             self.frame(frame)?;
             if let Some((mut meanwhile, path)) = meanwhile.take() {
                 meanwhile.end(&path);
@@ -548,6 +552,16 @@ impl Run<'_> {
             self.finished().write_report()?;
         }
         Ok(Outcome::Done)
+    }
+
+    /// Solves what has to be solved before a frame so that it can be shown.
+    fn lead_to(&mut self, frame: u32) -> Result<(), Failure> {
+        let last = self.session.frame().map(|solved| solved.report().frame);
+        for before in self.job.show.frames_before(frame, last) {
+            let time_s = frames::time_of(before, self.job.solve.clip.time.fps);
+            self.session.step(before, time_s).map_err(|error| self.session_failure(error))?;
+        }
+        Ok(())
     }
 
     fn frame(&mut self, frame: u32) -> Result<(), Failure> {
@@ -582,7 +596,7 @@ impl Run<'_> {
         let Some((view, options, flags)) = self.view(frame)? else { return Ok(None) };
         let exposure = options.exposure_ev.map_or(Exposure::Automatic, fixed);
         let settings = clip::picture_settings(flags, options.shading, exposure);
-        ask_for_picture(flags, self.job.format)?;
+        clip::ask_for_picture(flags, self.job.format)?;
         let scale = options.exposure_ev.map_or(1.0, f64::exp2);
         let shown = self.job.show.draw(&self.session, &snapshot, (&view, &settings), scale)?;
         let bytes = match self.job.format {
@@ -674,25 +688,6 @@ const LIT_MIN: f64 = 0.01;
 const ALMOST_DARK: &str = "warning: the view sees almost no light: look from elsewhere (--overview, --camera NAME, --eye \
                            X,Y,Z), light what it sees (--emit MATERIAL=RADIANCE), or, if that is black, let it reflect \
                            (--reflect MATERIAL=R)";
-
-/// Bytes a pixel while a picture is drawn: in tiles and whole.
-const PIXEL_BYTES: u64 = 6;
-/// The same of layers: in tiles, whole, as channels and packed.
-const LAYERS_BYTES: u64 = 280;
-
-/// An error if there is no room for a picture, or no way to draw it.
-fn ask_for_picture(flags: &PictureFlags, format: FrameFormat) -> Result<(), Failure> {
-    if flags.mesh && format == FrameFormat::Exr {
-        return Err(Failure::usage("outlines are no light: they cannot be drawn into numbers")
-            .help("leave out --mesh, or use --format png"));
-    }
-    let pixels = u64::from(flags.size.width) * u64::from(flags.size.height);
-    let bytes = match format {
-        FrameFormat::Png => PIXEL_BYTES,
-        FrameFormat::Exr => LAYERS_BYTES,
-    };
-    memory::ask(pixels * bytes, format_args!("a picture of {}", flags.size))
-}
 
 fn make_directory(dir: &Path) -> Result<(), Failure> {
     if dir.exists() && !dir.is_dir() {

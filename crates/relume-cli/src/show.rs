@@ -8,18 +8,15 @@ use std::fmt;
 use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
-use glam::{DVec2, DVec3};
 use relume::PEAK_LUMENS_PER_WATT;
-use relume::element::ElementId;
-use relume::scene::{BodyId, PatchId, Scene};
-use relume::session::{Frame, Leaf, Session, Snapshot};
-use relume_picture::drawing::{Drawing, Pen, with_legend};
-use relume_picture::picture::{
-    self, ColourMap, Image, Layers, Numbers, Outlines, Scale, Settings, View,
-};
+use relume::scene::{BodyId, Scene};
+use relume::session::{Leaf, Session, Snapshot, Update};
+use relume_picture::drawing::with_legend;
+use relume_picture::picture::{self, ColourMap, Image, Numbers, Scale, Settings, View};
 
+use crate::around::Around;
+use crate::clip::solved;
 use crate::failure::Failure;
-use crate::flat::draw::{BLACK, PINK};
 use crate::output;
 
 /// `--show` and what goes with it.
@@ -32,13 +29,13 @@ pub(crate) struct ShowFlags {
     #[arg(long, value_enum, value_name = "MAP", default_value = "viridis", requires = "show")]
     pub(crate) map: MapFlag,
     /// Numbers at the ends of the colours, LOW,HIGH in the unit of what is shown, the same for all frames [default: from 0 to what the
-    /// exposure shows as full white, of a surface that reflects half; levels 0 to 10].
+    /// exposure shows as full white, of a surface that reflects half; levels 0 to 10; certificates 64 frames].
     #[arg(long, value_name = "LOW,HIGH", requires = "show", allow_hyphen_values = true)]
     pub(crate) scale: Option<ScaleFlag>,
     /// Draw lines of equal numbers, which part the colours into N.
     #[arg(long, value_name = "N", requires = "show", default_value = "0", value_parser = clap::value_parser!(u32).range(0..=100), allow_negative_numbers = true)]
     pub(crate) isolines: u32,
-    /// The body that `linked` and `links` are about [default: all that emit].
+    /// The body that `linked`, `links`, `certificates` and `events` are about [default: all that emit; events: all].
     #[arg(long, value_name = "BODY", requires = "show")]
     pub(crate) of: Option<String>,
 }
@@ -64,6 +61,10 @@ pub(crate) enum Shown {
     Linked,
     /// Links with a body, from middle to middle of their elements.
     Links,
+    /// What happened to links since the frame before, in colours.
+    Events,
+    /// Links with a body, in the colours of how long nothing is certified to change what hides them, s.
+    Certificates,
 }
 
 /// `--map`
@@ -106,11 +107,6 @@ impl fmt::Display for ScaleFlag {
 const LEVELS: f64 = 10.0;
 /// Numbers beside the colours, where levels are not counted.
 const STEPS: u32 = 5;
-/// Links drawn at most: more are one pink surface.
-const LINKS_MAX: usize = 20_000;
-/// How much nearer than what is seen a place may be, as a share of the distance, and still be on it.
-const ON_SURFACE: f64 = 0.01;
-
 impl ShowFlags {
     /// As on the command line, for reports.
     pub(crate) fn described(&self) -> Vec<String> {
@@ -128,9 +124,33 @@ impl ShowFlags {
         all.into_iter().flatten().collect()
     }
 
-    /// An error where a body is named that is not there.
-    pub(crate) fn check(&self, scene: &Scene) -> Result<(), Failure> {
-        self.bodies(scene).map(drop)
+    /// An error where a body is named that is not there, or what `update` does not keep is to be shown.
+    pub(crate) fn check(&self, scene: &Scene, update: Update) -> Result<(), Failure> {
+        let needed = match self.show {
+            Some(Shown::Certificates) if update != Update::Certificate => {
+                "there are certificates with --update certificate alone"
+            }
+            Some(Shown::Events) if update == Update::Scratch => {
+                "with --update scratch links have no past"
+            }
+            _ => return self.bodies(scene).map(drop),
+        };
+        Err(Failure::usage(needed).help("leave out --update"))
+    }
+
+    /// Whether what happens to links is to be kept.
+    pub(crate) fn needs_events(&self) -> bool {
+        self.show == Some(Shown::Events)
+    }
+
+    /// Frames to be solved before one, where the last that was solved is another: so that what is shown does not depend on which
+    /// frames are asked for. Certificates are made anew, as time that went back voids them.
+    pub(crate) fn frames_before(&self, frame: u32, last: Option<u32>) -> Vec<u32> {
+        match (self.show, frame.checked_sub(1)) {
+            (Some(Shown::Events), Some(before)) if last != Some(before) => vec![before],
+            (Some(Shown::Certificates), Some(before)) => vec![frame, before],
+            _ => Vec::new(),
+        }
     }
 
     /// What is drawn of a solution; `None` where pictures are wanted. `scale` is that of the exposure: display value over radiance.
@@ -157,6 +177,18 @@ impl ShowFlags {
                 let bodies = self.bodies(session.scene())?;
                 let around = Around::new(session, (view, settings), &layers());
                 if shown == Shown::Links { around.links(&bodies) } else { around.linked(&bodies) }
+            }
+            Shown::Events => {
+                let bodies = self.of.as_ref().map(|_| self.bodies(session.scene())).transpose()?;
+                Around::new(session, (view, settings), &layers()).events(bodies.as_ref())
+            }
+            Shown::Certificates => {
+                let bodies = self.bodies(session.scene())?;
+                let (links, horizon_s) = solved(session).certificates();
+                let scale = self.scale(0.0, if horizon_s > 0.0 { horizon_s } else { 1.0 });
+                let around = Around::new(session, (view, settings), &layers());
+                let image = around.certificates(&links, &bodies, &scale);
+                with_legend(image, &scale, "LEFT S", STEPS - 1)
             }
             Shown::Radiosity => {
                 let of = |seen: &picture::Seen| PI as f32 * luminance(seen.radiance);
@@ -190,23 +222,25 @@ impl ShowFlags {
 
     fn coloured(&self, numbers: &Numbers, high: f64, title: &str) -> Image {
         let is_level = title == "LEVEL";
-        let [low, high] = match self.scale {
-            Some(ScaleFlag(ends)) => ends,
-            None if is_level => [0.0, high],
-            None => [0.0, round_up(high)],
-        };
-        let map = match self.map {
-            MapFlag::Viridis => ColourMap::Viridis,
-            MapFlag::Turbo => ColourMap::Turbo,
-            MapFlag::Grey => ColourMap::Grey,
-        };
-        let scale = Scale { map, low, high, lines: self.isolines };
+        let scale = self.scale(0.0, if is_level { high } else { round_up(high) });
+        let Scale { low, high, .. } = scale;
         let steps = match (is_level, self.isolines) {
             (true, _) => (high - low).ceil().clamp(1.0, 20.0) as u32,
             (false, 0) => STEPS,
             (false, lines) => lines,
         };
         with_legend(scale.picture(numbers, [128; 3]), &scale, title, steps)
+    }
+
+    /// The colours, from numbers at their ends that hold where none were given.
+    fn scale(&self, low: f64, high: f64) -> Scale {
+        let [low, high] = self.scale.map_or([low, high], |ScaleFlag(ends)| ends);
+        let map = match self.map {
+            MapFlag::Viridis => ColourMap::Viridis,
+            MapFlag::Turbo => ColourMap::Turbo,
+            MapFlag::Grey => ColourMap::Grey,
+        };
+        Scale { map, low, high, lines: self.isolines }
     }
 
     /// The bodies that links are about.
@@ -227,11 +261,6 @@ impl ShowFlags {
     }
 }
 
-/// What a session has solved last.
-fn solved(session: &Session) -> Frame<'_> {
-    session.frame().expect("pictures are drawn of solutions")
-}
-
 /// Of linear RGB (Rec. 709).
 fn luminance([r, g, b]: [f32; 3]) -> f32 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
@@ -245,140 +274,6 @@ fn round_up(value: f64) -> f64 {
     let unit = 10_f64.powf(value.log10().floor());
     let first = [1.0, 2.0, 5.0].into_iter().find(|step| step * unit >= value * (1.0 - 1e-9));
     first.unwrap_or(10.0) * unit
-}
-
-/// Elements and links around some bodies, over a pale picture of what hides them.
-struct Around<'a> {
-    session: &'a Session,
-    outlines: Outlines,
-    view: &'a View,
-    size: (u32, u32),
-    /// Distances along the view of what is seen, row by row.
-    depths: Vec<f32>,
-    ground: Image,
-}
-
-impl<'a> Around<'a> {
-    fn new(session: &'a Session, (view, settings): (&'a View, &Settings), layers: &Layers) -> Self {
-        let (width, height) = (settings.width, settings.height);
-        let back = view.world_from_camera.rotation.z_axis;
-        let shade = |seen: &picture::Seen| {
-            let facing = DVec3::from_array(seen.normal.map(f64::from)).dot(back).clamp(0.0, 1.0);
-            let light = if seen.body == 0 { 1.0 } else { 0.8 + 0.15 * facing };
-            [(255.0 * light).round() as u8; 3]
-        };
-        Around {
-            session,
-            outlines: Outlines::new(view, width, height),
-            view,
-            size: (width, height),
-            depths: layers.pixels.iter().map(|seen| seen.depth_m).collect(),
-            ground: Image { width, height, pixels: layers.pixels.iter().map(shade).collect() },
-        }
-    }
-
-    fn sheet(&self) -> Drawing {
-        let mut sheet = Drawing::new(self.size.0, self.size.1);
-        sheet.picture([0, 0], self.ground.clone());
-        sheet
-    }
-
-    /// The body of an element; `None` for clusters of several.
-    fn body(&self, id: ElementId) -> Option<BodyId> {
-        let (_, forest) = solved(self.session).pairs();
-        let patch: PatchId = forest.patch(id)?;
-        Some(self.session.scene().patches[patch.0 as usize].body)
-    }
-
-    /// Corners of an element in the world; `None` for groups, and where its body is absent.
-    fn corners(&self, id: ElementId) -> Option<Vec<DVec3>> {
-        let (_, forest) = solved(self.session).pairs();
-        let scene = self.session.scene();
-        let patch = &scene.patches[forest.patch(id)?.0 as usize];
-        let pose = self.session.world().pose(patch.body)?;
-        let shape = forest.shape(id);
-        Some(shape.corners[..shape.len].iter().map(|&p| pose.point(patch.frame.point(p))).collect())
-    }
-
-    /// The links between some bodies and others: the end on them, and the other.
-    fn ends(&self, bodies: &BTreeSet<BodyId>) -> Vec<[ElementId; 2]> {
-        let (tree, _) = solved(self.session).pairs();
-        let is_of = |id| self.body(id).is_some_and(|body| bodies.contains(&body));
-        let ends = tree.links().filter_map(|link| match (is_of(link.a), is_of(link.b)) {
-            (true, false) => Some([link.a, link.b]),
-            (false, true) => Some([link.b, link.a]),
-            _ => None,
-        });
-        ends.collect()
-    }
-
-    /// Whether nothing stands before a point.
-    fn is_in_sight(&self, point: DVec3) -> bool {
-        let Some(pixel) = self.view.project(point, self.size.0, self.size.1) else { return false };
-        let DVec2 { x, y } = pixel.floor();
-        if x < 0.0 || y < 0.0 || x >= f64::from(self.size.0) || y >= f64::from(self.size.1) {
-            return false;
-        }
-        let depth = -self.view.world_from_camera.inverse_point(point).z;
-        let seen = self.depths[y as usize * self.size.0 as usize + x as usize];
-        depth <= f64::from(seen) * (1.0 + ON_SURFACE)
-    }
-
-    /// Outlines of the elements with links to some bodies, and of these in pink.
-    fn linked(&self, bodies: &BTreeSet<BodyId>) -> Image {
-        let mut sheet = self.sheet();
-        let linked: BTreeSet<ElementId> = self.ends(bodies).into_iter().map(|[_, it]| it).collect();
-        let outline = |sheet: &mut Drawing, polygon: &[DVec3], pen: Pen| {
-            let middle = polygon.iter().sum::<DVec3>() / polygon.len() as f64;
-            if self.outlines.faces(polygon) && self.is_in_sight(middle) {
-                for [from, to] in self.outlines.edges(polygon) {
-                    sheet.stroke(from.to_array(), to.to_array(), pen);
-                }
-            }
-        };
-        for polygon in linked.iter().filter_map(|&id| self.corners(id)) {
-            outline(&mut sheet, &polygon, Pen::new(0.7, BLACK));
-        }
-        let (_, forest) = solved(self.session).pairs();
-        for &facet in forest.facets() {
-            if let (true, Some(polygon)) =
-                (self.body(facet).is_some_and(|b| bodies.contains(&b)), self.corners(facet))
-            {
-                for [from, to] in self.outlines.edges(&polygon) {
-                    sheet.stroke(from.to_array(), to.to_array(), Pen::new(2.0, PINK));
-                }
-            }
-        }
-        sheet.to_image(1)
-    }
-
-    /// Links of some bodies from middle to middle, the strongest last.
-    fn links(&self, bodies: &BTreeSet<BodyId>) -> Image {
-        let mut sheet = self.sheet();
-        let middle = |id: ElementId| {
-            let corners = self.corners(id)?;
-            Some(corners.iter().sum::<DVec3>() / corners.len() as f64)
-        };
-        let ends = self.ends(bodies);
-        let step = ends.len().div_ceil(LINKS_MAX).max(1);
-        let pen = Pen {
-            width: 0.6,
-            colour: PINK,
-            opacity: (600.0 / ends.len().max(1) as f64).clamp(0.08, 0.7),
-        };
-        for [own, other] in ends.into_iter().step_by(step) {
-            let (Some(from), Some(to)) = (middle(own), middle(other)) else { continue };
-            if !self.is_in_sight(to) {
-                continue;
-            }
-            let place = |p: DVec3| self.view.project(p, self.size.0, self.size.1);
-            if let (Some(from), Some(to)) = (place(from), place(to)) {
-                sheet.stroke(from.to_array(), to.to_array(), pen);
-                sheet.disc(to.to_array(), 1.2, PINK);
-            }
-        }
-        sheet.to_image(1)
-    }
 }
 
 #[cfg(test)]

@@ -127,7 +127,34 @@ fn numbers_are_shown_on_one_scale_over_the_clip() {
     let refused = render("none", &["--show", "links", "--of", "door"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("no body `door`"));
+    for (shown, update) in [("events", "scratch"), ("certificates", "reinspect")] {
+        let refused = render("none", &["--show", shown, "--update", update]);
+        assert_eq!(refused.status.code(), Some(2), "{shown}");
+    }
     assert_eq!(render("exr", &["--show=level", "--format=exr"]).status.code(), Some(2));
+}
+
+/// Whichever frames are asked for, each shows what happened since the one before it.
+#[test]
+fn events_and_certificates_are_those_of_a_frame() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    succeeded(&relume(&["demo", "room", "-o", &path("room"), "--frames", "0"]));
+    let scene = path("room/room.glb");
+    let picture = |shown: &str, frames: &str, more: &[&str]| {
+        let out = path(&format!("{shown}-{frames}-{}", more.len()));
+        let mut run = Command::new(env!("CARGO_BIN_EXE_relume"));
+        run.args(["render", &scene, "-o", &out, "--show", shown, "--frames", frames]);
+        run.args(["--size", "240x180", "--tolerance", "0.2"]).args(more);
+        succeeded(&run.output().unwrap());
+        fs::read(format!("{out}/frame-0005.png")).unwrap()
+    };
+    for shown in ["events", "certificates"] {
+        let whole = picture(shown, "0-5", &[]);
+        assert!(whole == picture(shown, "5", &[]), "{shown}: alone");
+        assert!(whole == picture(shown, "2,5", &[]), "{shown}: after a gap");
+        assert!(whole != picture(shown, "5", &["--of", "floor"]), "{shown}: of all");
+    }
 }
 
 #[test]

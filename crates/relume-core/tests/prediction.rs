@@ -1,6 +1,7 @@
 //! The strategies of prediction: certificates miss nothing and spare work; extrapolation loses what it
 //! says, and nothing once all is at rest.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -44,6 +45,46 @@ fn follow<T>(
         }
     }
     out
+}
+
+#[test]
+fn visibility_stays_for_as_long_as_is_certified() {
+    for (name, options) in oracles() {
+        let mut session = session(&Arc::new(lit_room()), &options, Update::Certificate);
+        // Until when, and what was seen then.
+        let mut claims: BTreeMap<(u64, u64), (f64, f32)> = BTreeMap::new();
+        let (mut kept, mut without, mut longest_s) = (0, 0, 0.0_f64);
+        for k in 0..48 {
+            let now_s = f64::from(k) * STEP_S;
+            session.step(k, now_s).unwrap();
+            let frame = session.frame().unwrap();
+            let (_, forest) = frame.pairs();
+            let (links, horizon_s) = frame.certificates();
+            for (link, left_s) in links {
+                let key = |id| {
+                    let key = forest.key(id);
+                    u64::from(key.facet) << 32 | u64::from(key.path)
+                };
+                let (ends, seen) = ((key(link.a), key(link.b)), link.visibility());
+                if let Some((until_s, v)) = claims.remove(&ends)
+                    && now_s <= until_s
+                {
+                    assert_eq!(v, seen, "{name}, frame {k}: {ends:?} until {until_s}");
+                    kept += 1;
+                }
+                match left_s {
+                    Some(left_s) => {
+                        assert!((0.0..=horizon_s * (1.0 + 1e-9)).contains(&left_s), "{left_s}");
+                        longest_s = longest_s.max(left_s);
+                        claims.insert(ends, (now_s + left_s - 1e-9, seen));
+                    }
+                    None => without += 1,
+                }
+            }
+        }
+        println!("{name}: {kept} kept, {without} without a claim, up to {longest_s} s");
+        assert!(kept > 10_000 && without > 1_000 && longest_s > 8.0 * STEP_S);
+    }
 }
 
 const SEVEN: Update = Update::Extrapolate { frames: 7, error: None };

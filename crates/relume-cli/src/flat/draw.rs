@@ -15,7 +15,7 @@ pub(crate) const GREY: Colour = [170, 170, 178];
 pub(super) const BLUE: Colour = [38, 92, 160];
 
 /// The colour of an event.
-pub(super) fn colour_of(kind: EventKind) -> Colour {
+pub(crate) fn colour_of(kind: EventKind) -> Colour {
     match kind {
         EventKind::Demoted => [205, 30, 30],
         EventKind::Promoted => [30, 90, 220],

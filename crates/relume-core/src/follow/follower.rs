@@ -20,7 +20,7 @@ pub struct Follower<S> {
     pub(crate) events: Vec<LinkEvent>,
     pub(crate) report: FrameReport,
     /// Clock of the certificates.
-    pub(super) ticks: Ticks,
+    pub(crate) ticks: Ticks,
     /// Mean radiosity of the last solution without extrapolated links, W/m2.
     pub(super) last_exact_mean_w_m2: f64,
     /// Whether a body moved otherwise than predicted.

@@ -411,6 +411,19 @@ impl PairTree {
         (0..self.nodes.len() as u32).map(|id| self.link(PairId(id)))
     }
 
+    /// All links, each with the expiry of the certificate that lasts longest of its own and those of the pairs above it, which hold for
+    /// all below; 0 without any. From the root down.
+    pub fn certified_links(&self) -> Vec<(Link, Tick)> {
+        let mut found = Vec::new();
+        let mut open = vec![(PairTree::ROOT, 0)];
+        while let Some((id, above)) = open.pop() {
+            let until = self.expiry(id).max(above);
+            found.extend(self.link(id).map(|link| (link, until)));
+            open.extend(self.children(id).rev().map(|child| (PairId(child), until)));
+        }
+        found
+    }
+
     /// [`PairTree::slots`] in parallel.
     pub fn par_slots(&self) -> impl IndexedParallelIterator<Item = Option<Link>> + '_ {
         (0..self.nodes.len() as u32).into_par_iter().map(|id| self.link(PairId(id)))

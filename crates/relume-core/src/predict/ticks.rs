@@ -1,6 +1,6 @@
 //! A clock of even ticks by which certificates expire.
 
-use super::tuning::STEP_RATIO_MAX;
+use super::tuning::{AHEAD, STEP_RATIO_MAX};
 
 /// Number of a tick; 0 is before all of them.
 pub type Tick = u16;
@@ -71,6 +71,11 @@ impl Ticks {
     /// From tick to tick, seconds.
     pub fn length_s(&self) -> f64 {
         self.length_s
+    }
+
+    /// From now to the last tick that anything is certified for, seconds.
+    pub fn horizon_s(&self) -> f64 {
+        self.length_s * f64::from(AHEAD[AHEAD.len() - 1])
     }
 
     /// Whether time goes on at all.

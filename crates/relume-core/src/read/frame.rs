@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::element::{ElementId, Forest};
 use crate::follow::{Accuracy, FrameReport};
 use crate::geometry::Pose;
-use crate::pair::PairTree;
+use crate::pair::{Link, LinkEvent, PairTree};
 use crate::scene::PatchId;
 use crate::solver::{Links, Radiosity};
 use crate::space::{Sensor, Solved, row_sums_of};
@@ -195,6 +195,26 @@ impl<'a> Frame<'a> {
             }
         }
         mesh
+    }
+
+    /// The link events of this frame, by the keys of their ends.
+    #[doc(hidden)]
+    pub fn link_events(&self) -> &'a [LinkEvent] {
+        &self.solved.events
+    }
+
+    /// For how long it is certified that motion changes a link's visibility in nothing, seconds from now, link by link; `None` where
+    /// nothing is certified, so that the link is looked at in the next step. A lower bound of the time until its next event by
+    /// occlusion; of links with a moving end the exchange area may bring one earlier. With it the longest that anything is certified for.
+    #[doc(hidden)]
+    pub fn certificates(&self) -> (Vec<(Link, Option<f64>)>, f64) {
+        let Solved { tree, ticks, time_s, .. } = self.solved;
+        let left = |until| {
+            let left_s = ticks.time_s(until) - time_s;
+            (until > 0 && left_s >= 0.0).then_some(left_s)
+        };
+        let links = tree.certified_links().into_iter().map(|(link, until)| (link, left(until)));
+        (links.collect(), ticks.horizon_s())
     }
 
     /// The pair tree, with the forest its elements are in.

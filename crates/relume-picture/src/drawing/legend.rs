@@ -46,6 +46,23 @@ pub fn with_legend(mut image: Image, scale: &Scale, title: &str, steps: u32) -> 
     out.to_image(1)
 }
 
+/// A picture with a title and rows of a colour and a text each in its upper left corner, over the picture itself.
+pub fn with_key(mut image: Image, title: &str, rows: &[(Colour, String)]) -> Image {
+    let line = 1.75 * LETTERS;
+    let widest = rows.iter().map(|(_, text)| Drawing::letters_width(LETTERS, text) + 21.0);
+    let widest = widest.fold(Drawing::letters_width(LETTERS, title), f64::max);
+    lighten(&mut image, [0.0, 0.0], [widest + 18.0, (rows.len() + 1) as f64 * line + LETTERS]);
+    let mut out = Drawing::new(image.width, image.height);
+    out.picture([0, 0], image);
+    out.letters([8.0, line], LETTERS, title, BLACK);
+    for (k, (colour, text)) in rows.iter().enumerate() {
+        let y = (k + 2) as f64 * line;
+        out.stroke([9.5, y - 4.0], [22.5, y - 4.0], Pen::new(4.0, *colour));
+        out.letters([29.0, y], LETTERS, text, BLACK);
+    }
+    out.to_image(1)
+}
+
 /// Makes a part of a picture light, so that letters can be read on it.
 fn lighten(image: &mut Image, low: [f64; 2], high: [f64; 2]) {
     let end = |at: f64, most: u32| at.round().clamp(0.0, f64::from(most)) as u32;
@@ -79,6 +96,19 @@ mod tests {
     fn numbers_have_three_digits() {
         let all = [0.0, 0.25, 1.0, 12.5, 133.3333, 2500.0, 1.23e-5, 0.001];
         assert_eq!(all.map(number), ["0", "0.25", "1", "12.5", "133", "2500", "1.2e-5", "0.001"]);
+    }
+
+    #[test]
+    fn a_key_has_its_colours_in_order_within_its_corner() {
+        let grey = Image { width: 200, height: 100, pixels: vec![[90; 3]; 20_000] };
+        let colours: [Colour; 2] = [[200, 30, 30], [20, 150, 80]];
+        let rows = colours.map(|colour| (colour, "WOKEN 12".to_owned()));
+        let out = with_key(grey, "EVENTS", &rows);
+        let row = |of: Colour| out.pixels.iter().position(|p| *p == of).map(|k| k / 200);
+        let [one, other] = colours.map(|colour| row(colour).unwrap());
+        assert!(one + 10 < other && other < 60, "{one}, {other}");
+        assert!((0..100).all(|y| (110..200).all(|x| out.pixel(x, y) == [90; 3])));
+        assert!((60..100).all(|y| out.pixel(20, y) == [90; 3]));
     }
 
     #[test]

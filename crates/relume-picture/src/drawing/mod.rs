@@ -13,7 +13,7 @@ mod palette;
 mod pixels;
 mod svg;
 
-pub use legend::with_legend;
+pub use legend::{with_key, with_legend};
 pub use pixels::animation;
 
 /// A colour: sRGB.

@@ -244,7 +244,7 @@ fn light_gets_no_deeper_under_a_crate_than_some_widths_of_the_gap() {
         let mut session = Session::new(Arc::clone(&scene), at_tolerance(0.1)).unwrap();
         for (frame, time_s) in [(0, 0.0), (1, 1.0)] {
             session.step(frame, time_s).unwrap();
-            let fluxes = session.frame().unwrap().fluxes(&grouping);
+            let fluxes = session.frame().unwrap().fluxes(&grouping).expect("it fits");
             let found = fluxes[grouping.of_patch[bottom].unwrap() as usize].arriving_w[0];
             let truth = path::arriving(&World::new(judged::polygons(&scene, time_s)), 2_000, 3);
             let mean_w_m2 = truth.iter().map(|e| e.irradiance[0]).sum::<f64>()

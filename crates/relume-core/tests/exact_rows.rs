@@ -66,7 +66,8 @@ fn rows_of(name: &str, tolerance: f64, frames: &[u32]) -> f64 {
     let mut worst = 0.0_f64;
     for &frame in frames {
         session.step(frame, f64::from(frame) / 24.0).unwrap();
-        let factors = session.frame().unwrap().factors(&Grouping::by_patch(&scene));
+        let factors =
+            session.frame().unwrap().factors(&Grouping::by_patch(&scene)).expect("it fits");
         let rows = (0..factors.len() as u32).map(|patch| (factors.row_sum(patch) - 1.0).abs());
         // The ceiling of the animated room sees the black back of its lamp.
         worst = rows.filter(|off| *off < 0.05).fold(worst, f64::max);
@@ -113,7 +114,8 @@ fn squares_a_hair_apart_take_few_links_however_they_are_turned() {
         let scene = Arc::new(close_squares(gap_m, turn, tilt_gaps * gap_m, aside_m));
         let mut session = Session::new(Arc::clone(&scene), Options::default()).unwrap();
         let links = session.step(0, 0.0).unwrap().links;
-        let factors = session.frame().unwrap().factors(&Grouping::by_surface(&scene));
+        let factors =
+            session.frame().unwrap().factors(&Grouping::by_surface(&scene)).expect("it fits");
         let found = factors.row(1).find(|&(to, _)| to == 0).map_or(0.0, |(_, factor)| factor);
         // What is over the lower one sees it; light gets out along the edge of the overlap, some gaps wide.
         let over = if aside_m == 0.0 { 1.0 } else { overlap(turn, aside_m) };

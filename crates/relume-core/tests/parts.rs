@@ -122,7 +122,8 @@ fn cells_in_one_group_are_as_the_whole_wall() {
     session.step(0, 0.4).unwrap();
     let by_body = PartFactors::new(&scene, &joined, Grouping::by_body(&scene))
         .factors(session.frame().unwrap());
-    let whole = session.frame().unwrap().factors(&Grouping::by_body(&joined.scene));
+    let whole =
+        session.frame().unwrap().factors(&Grouping::by_body(&joined.scene)).expect("it fits");
     for row in 0..2 {
         for ((to, one), (_, other)) in by_body.row(row).zip(whole.row(row)) {
             assert!((one - other).abs() < 1e-9, "{row} to {to}: {one} {other}");

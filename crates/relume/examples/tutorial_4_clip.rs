@@ -31,7 +31,7 @@ pub(crate) fn text() -> Result<String, Box<dyn Error>> {
         "from scratch: {}",
         if frame.hash() == hash { "the same links" } else { "others" }
     )?;
-    let factors = frame.factors(&bodies);
+    let factors = frame.factors(&bodies)?;
     for k in 0..bodies.names.len() as u32 {
         writeln!(
             out,

@@ -104,8 +104,8 @@ pub use relume_core::scene::{
 };
 pub use relume_core::session::{
     Accuracy, Aim, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors,
-    Flux, Frame, FrameReport, Gathered, Grouping, Hash, LampLight, Leaf, Memory, Mesh,
-    MountedSensor, Open, Options, Oracle, PairCounts, PointError, Removed, RowSumError, Seconds,
-    Sensor, Session, SessionError, Snapshot, Update, Watch, Work,
+    Flux, Frame, FrameReport, Gathered, Grouping, GroupingError, Hash, LampLight, Leaf, Memory,
+    Mesh, MountedSensor, Open, Options, Oracle, PairCounts, PointError, Removed, RowSumError,
+    Seconds, Sensor, Session, SessionError, Snapshot, Update, Watch, Work,
 };
 pub use relume_io::{ImportOptions, Log, LogError, PEAK_LUMENS_PER_WATT, import, read_environment};

@@ -1,6 +1,6 @@
 //! A program against the face alone: a lamp is moved by hand and back.
 
-use relume::{Command, Options, Pose, SceneBuilder, Session};
+use relume::{Command, Grouping, NewBody, Options, Pose, SceneBuilder, Session};
 
 /// Corners, metres, and triangles.
 type Shape = (Vec<[f64; 3]>, Vec<[u32; 3]>);
@@ -69,5 +69,35 @@ fn a_body_is_moved_and_put_back() -> Result<(), Box<dyn std::error::Error>> {
     assert_eq!(session.solve()?.hash(), first);
     let mesh = session.solve()?.snapshot();
     assert_eq!(mesh.radiosity.len(), mesh.patch.len());
+    Ok(())
+}
+
+#[test]
+fn a_grouping_of_another_scene_is_an_error_until_the_next_solve()
+-> Result<(), Box<dyn std::error::Error>> {
+    let mut b = SceneBuilder::new("one");
+    let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+    let glow = b.material("glow", [0.0; 3], [1.0; 3]);
+    let (room, lamp) = (b.body("room"), b.body("lamp"));
+    let (walls, small) = (cube(1.0, true), cube(0.1, false));
+    b.mesh(room, "walls", grey, &walls.0, &walls.1);
+    b.mesh(lamp, "lamp", glow, &small.0, &small.1);
+    let mut session = Session::new(b.build()?, Options::default())?;
+    let block =
+        |name| Command::Insert(NewBody::new(name).with_mesh(name, grey, &small.0, &small.1));
+    let take_away = session.apply(block("one"))?;
+    session.solve()?;
+    let before = Grouping::by_body(session.scene());
+    session.apply(take_away)?;
+    session.apply(block("other"))?;
+    // As many patches as before, of other bodies.
+    let after = Grouping::by_body(session.scene());
+    let frame = session.frame().expect("the last solution is kept");
+    assert_eq!(frame.factors(&before)?.len(), 3);
+    assert!(frame.factors(&after).is_err() && frame.fluxes(&after).is_err());
+    let frame = session.solve()?;
+    assert_eq!(frame.factors(&after)?.len(), 3);
+    let error = frame.fluxes(&before).unwrap_err().to_string();
+    assert!(error.contains("make it of the scene that the frame has"), "{error}");
     Ok(())
 }

@@ -28,7 +28,7 @@ pub struct FrameReport {
     /// Exact counts of what was evaluated and edited; in JSON its fields stand among the others.
     #[serde(flatten)]
     pub work: Work,
-    /// Elements reaped.
+    /// Number of elements that were taken away, since no link ends on them any more.
     pub elements_reaped: u64,
     /// Gather sweeps of the solver.
     pub sweeps: u32,

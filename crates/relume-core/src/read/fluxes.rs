@@ -41,13 +41,9 @@ impl Flux {
     }
 }
 
-/// Fluxes of groups of patches that are present.
-///
-/// # Panics
-/// If the grouping is of another scene.
+/// Fluxes of the groups of a grouping that fits: of patches that are present.
 pub(super) fn fluxes(solved: &Solved, grouping: &Grouping) -> Vec<Flux> {
     let scene = &solved.space.scene;
-    assert_eq!(grouping.of_patch.len(), scene.patches.len(), "the grouping is of another scene");
     let of_patch = |k: usize| match grouping.of_patch[k] {
         Some(_) => of_patch(solved, PatchId(k as u32)),
         None => Flux::default(),

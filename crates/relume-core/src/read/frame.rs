@@ -1,18 +1,20 @@
 //! A solved state as its readers see it.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use crate::element::{ElementId, Forest};
 use crate::follow::{Accuracy, FrameReport};
 use crate::geometry::Pose;
 use crate::pair::{Link, LinkEvent, PairTree};
-use crate::scene::PatchId;
+use crate::scene::{PatchId, Scene};
 use crate::solver::{Links, Radiosity};
 use crate::space::{Sensor, Solved, row_sums_of};
 
 use super::estimate::{self, PointError};
 use super::events::{self, Event};
-use super::factors::{Factors, Grouping};
+use super::factors::{Factors, Grouping, GroupingError};
 use super::fluxes::{self, Flux};
 use super::sensors;
 use super::snapshot::{self, Snapshot};
@@ -56,6 +58,11 @@ impl<'a> Frame<'a> {
         Frame { solved, revision }
     }
 
+    /// The scene that was solved; bodies inserted or removed since are not in it.
+    pub fn scene(&self) -> &'a Arc<Scene> {
+        &self.solved.space.scene
+    }
+
     /// Counters, energies and seconds.
     pub fn report(&self) -> &'a FrameReport {
         &self.solved.report
@@ -93,8 +100,8 @@ impl<'a> Frame<'a> {
         estimate::estimate(self.solved)
     }
 
-    /// The same point by point, at so many points, with the part of the light of lamps in each error. Points that are dark are
-    /// left out. Cost: some 0.2 to 2 ms a point, and a sweep over all links.
+    /// Errors of the mesh's irradiance point by point, as [`Frame::estimate`] finds them, at so many points, with the part of the light of
+    /// lamps in each error. Points that are dark are left out. Cost: some 0.2 to 2 ms a point, and a sweep over all links.
     pub fn errors(&self, points: usize) -> Vec<PointError> {
         estimate::errors(self.solved, points, true)
     }
@@ -118,19 +125,21 @@ impl<'a> Frame<'a> {
     /// Error of an entry: that of its links, which the tolerance bounds relative to the row where
     /// nothing emits (see [`Scene::without_light`](crate::scene::Scene::without_light)). Cost: one pass over all links.
     ///
-    /// # Panics
-    /// If the grouping is of another scene.
-    pub fn factors(&self, grouping: &Grouping) -> Factors {
-        Factors::of(self.solved, grouping)
+    /// # Errors
+    /// If the grouping is for another scene than [`Frame::scene`], or has a group without a name.
+    pub fn factors(&self, grouping: &Grouping) -> Result<Factors, GroupingError> {
+        grouping.fits(self.scene())?;
+        Ok(Factors::of(self.solved, grouping))
     }
 
     /// Fluxes emitted by, arriving at and absorbed by groups of patches, W, in their order. Errors: the tolerance's, in the mean over a
     /// group. Cost: one pass over all elements.
     ///
-    /// # Panics
-    /// If the grouping is of another scene.
-    pub fn fluxes(&self, grouping: &Grouping) -> Vec<Flux> {
-        fluxes::fluxes(self.solved, grouping)
+    /// # Errors
+    /// As [`Frame::factors`].
+    pub fn fluxes(&self, grouping: &Grouping) -> Result<Vec<Flux>, GroupingError> {
+        grouping.fits(self.scene())?;
+        Ok(fluxes::fluxes(self.solved, grouping))
     }
 
     /// Sums of the form factors from every leaf element, in no particular order: 1 in a closed scene, up to the links'

@@ -28,7 +28,7 @@ pub use coarse_values::{CoarseQuantity, CoarseValue};
 pub use compare::{Difference, RadiosityGap, Which, compare, radiosity_gap};
 pub use estimate::PointError;
 pub use events::{Event, EventKind};
-pub use factors::{Closure, Factors, Grouping, Open, PartFactors};
+pub use factors::{Closure, Factors, Grouping, GroupingError, Open, PartFactors};
 pub use fluxes::Flux;
 pub use frame::{Frame, Hash, Mesh};
 pub use lossy::{Missed, RadiosityError, missed, radiosity_error};

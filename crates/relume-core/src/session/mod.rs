@@ -26,8 +26,8 @@ pub use crate::follow::{
 pub use crate::pair::Work;
 pub use crate::read::{
     Closure, CoarseQuantity, CoarseValue, Difference, ElementName, Elements, Event, EventKind,
-    Factors, Flux, Frame, Gathered, Grouping, Hash, LampLight, Leaf, Mesh, Missed, Open,
-    PartFactors, PointError, RadiosityError, RadiosityGap, Snapshot, Which, compare, missed,
+    Factors, Flux, Frame, Gathered, Grouping, GroupingError, Hash, LampLight, Leaf, Mesh, Missed,
+    Open, PartFactors, PointError, RadiosityError, RadiosityGap, Snapshot, Which, compare, missed,
     radiosity_error, radiosity_gap,
 };
 

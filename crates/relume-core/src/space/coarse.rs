@@ -146,14 +146,14 @@ impl Coarse {
         let known = if arriving > LOST * coarse.iter().map(open).sum::<f64>() {
             let mut known: Vec<Brightness> = coarse.iter().zip(&irradiance).map(light_of).collect();
             let radiosity = &self.radiosity;
-            let views = match aim {
-                Aim::Sensors(sensors) => {
-                    CoarseScene { now, view, forest: seed, coarse, surfaces, radiosity, floor }
-                        .views(sensors)
-                }
-                _ => Vec::new(),
+            let seen = CoarseScene { now, view, forest: seed, coarse, surfaces, radiosity, floor };
+            let sensors = match aim {
+                Aim::Mesh => None,
+                Aim::Points => Some(&[][..]),
+                Aim::Sensors(sensors) => Some(&**sensors),
             };
-            if *aim != Aim::Mesh {
+            if let Some(sensors) = sensors {
+                let views = seen.views(sensors);
                 weigh_by_points((&self.links, seed, coarse), surfaces, &views, &mut known);
             }
             known

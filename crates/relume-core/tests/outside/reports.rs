@@ -34,7 +34,7 @@ fn table(case: &Case, tolerance: f64) -> Table {
 
 fn table_of(session: &Session) -> Table {
     let grouping = Grouping::by_surface(session.scene());
-    Table::new(&grouping.names, &session.frame().unwrap().factors(&grouping))
+    Table::new(&grouping.names, &session.frame().unwrap().factors(&grouping).expect("it fits"))
 }
 
 /// The factors and rows that are off by more than is allowed.
@@ -430,7 +430,8 @@ fn f4_crate_on_floor_closure() {
     let mut session = session(&crate_on_floor(), 0.02, false);
     session.step(0, 0.0).unwrap();
     let grouping = Grouping::by_surface(session.scene());
-    let closed = session.frame().unwrap().factors(&grouping).close(Closure::Reciprocal);
+    let closed =
+        session.frame().unwrap().factors(&grouping).expect("it fits").close(Closure::Reciprocal);
     assert!(closed.is_ok(), "{closed:?}");
 }
 

@@ -194,7 +194,8 @@ impl Table {
 fn factors(case: &Case, session: &Session, time_s: f64, verdict: &mut Verdict) {
     let scene = session.scene();
     let grouping = Grouping::by_surface(scene);
-    let table = Table::new(&grouping.names, &session.frame().unwrap().factors(&grouping));
+    let table =
+        Table::new(&grouping.names, &session.frame().unwrap().factors(&grouping).expect("it fits"));
     let allowed = case.tolerance / 4.0;
     let touching = case.contact.as_ref().filter(|c| time_s >= c.since_s);
     for k in &case.known {
@@ -335,7 +336,7 @@ fn fluxes(case: &Case, session: &Session, time_s: f64, verdict: &mut Verdict) {
         return;
     }
     let grouping = Grouping::by_surface(session.scene());
-    let found = session.frame().unwrap().fluxes(&grouping);
+    let found = session.frame().unwrap().fluxes(&grouping).expect("it fits");
     let (world, names) = case.world(time_s);
     let particles = path::arriving(&world, PARTICLES, 78);
     let (mut exact, mut noise) = (BTreeMap::new(), BTreeMap::new());

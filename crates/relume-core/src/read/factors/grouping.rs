@@ -6,13 +6,51 @@ use crate::scene::{Patch, Scene};
 
 /// The things between which form factors are summed: for each patch its group, if it is in any.
 ///
-/// Light that reaches a patch of no group counts as escaped.
+/// Light that reaches a patch of no group counts as escaped. A grouping is for one scene, [`Frame::scene`](crate::session::Frame::scene)
+/// of the frame that is read: inserting or removing a body makes another scene from the next solve on.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Grouping {
     /// A name for each group; unique.
     pub names: Vec<String>,
     /// Group of each patch, an index of `names`; indexed by `PatchId`.
     pub of_patch: Vec<Option<u32>>,
+    /// Digest of the bodies and surfaces of the scene.
+    scene: u64,
+}
+
+/// Error of a grouping that does not fit a frame.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GroupingError {
+    /// It is for a scene with other bodies.
+    #[error(
+        "the grouping is for a scene with other bodies than the frame's: make it of the scene that the frame has, and anew \
+         after the solve that follows an insertion or a removal"
+    )]
+    OtherScene,
+    /// A patch has a group without a name.
+    #[error(
+        "patch {patch} is in group {group}, and {count} groups have names: add names, or change the group of the patch"
+    )]
+    NoName {
+        /// Index of the patch.
+        patch: usize,
+        /// Index of the group.
+        group: u32,
+        /// Number of names.
+        count: usize,
+    },
+}
+
+/// Digest (FNV-1a) of the bodies and surfaces of a scene's patches, and of their names.
+fn digest(scene: &Scene) -> u64 {
+    let add = |digest: u64, part: u64| (digest ^ part).wrapping_mul(0x0100_0000_01b3);
+    let ids = scene.patches.iter().flat_map(|patch| [patch.body.0, patch.surface.0]);
+    let of_ids = ids.map(u64::from).fold(0xcbf2_9ce4_8422_2325, add);
+    let bodies = scene.bodies.iter().map(|body| &body.name);
+    let names = bodies.chain(scene.surfaces.iter().map(|surface| &surface.name));
+    names.flat_map(|name| name.bytes().chain([0xff])).map(u64::from).fold(of_ids, add)
 }
 
 impl Grouping {
@@ -80,6 +118,22 @@ impl Grouping {
         Grouping {
             names: kept.map(|(name, _)| name).collect(),
             of_patch: groups.into_iter().map(|g| number[g? as usize]).collect(),
+            scene: digest(scene),
+        }
+    }
+
+    /// An error where it is for another scene, or has a group without a name.
+    pub(crate) fn fits(&self, scene: &Scene) -> Result<(), GroupingError> {
+        if self.of_patch.len() != scene.patches.len() || self.scene != digest(scene) {
+            return Err(GroupingError::OtherScene);
+        }
+        let count = self.names.len();
+        let nameless = |(patch, group): (usize, &Option<u32>)| {
+            group.filter(|&group| group as usize >= count).map(|group| (patch, group))
+        };
+        match self.of_patch.iter().enumerate().find_map(nameless) {
+            Some((patch, group)) => Err(GroupingError::NoName { patch, group, count }),
+            None => Ok(()),
         }
     }
 }

@@ -11,7 +11,7 @@ mod grouping;
 mod parts;
 mod sum;
 
-pub use grouping::Grouping;
+pub use grouping::{Grouping, GroupingError};
 pub use parts::PartFactors;
 
 use crate::read::tuning::CLOSED_WITHIN;
@@ -66,7 +66,7 @@ pub struct Factors {
 }
 
 impl Factors {
-    /// Groups.
+    /// Number of groups.
     pub fn len(&self) -> usize {
         self.area_m2.len()
     }
@@ -210,13 +210,9 @@ impl Factors {
 }
 
 impl Factors {
-    /// Form factors between groups of patches.
-    ///
-    /// # Panics
-    /// If the grouping is of another scene.
+    /// Form factors between the groups of a grouping that fits.
     pub(super) fn of(solved: &Solved, grouping: &Grouping) -> Factors {
         let SpaceState { scene, forest, .. } = &solved.space;
-        assert_eq!(grouping.of_patch.len(), scene.patches.len());
         let fragments = Fragments::whole(forest, grouping);
         let fixed = Fixed::of(scene.area_m2());
         let links: Vec<Link> = solved.tree.links().collect();

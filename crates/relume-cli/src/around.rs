@@ -8,11 +8,10 @@ use glam::{DVec2, DVec3};
 use relume::element::{ElementId, ElementKey};
 use relume::pair::{EventKind, Link};
 use relume::scene::{BodyId, LightId, LightKind, PatchId};
-use relume::session::Session;
+use relume::session::{Frame, Session};
 use relume_picture::drawing::{Colour, Drawing, Pen, with_key};
 use relume_picture::picture::{self, Image, Layers, Outlines, Scale, Settings, View};
 
-use crate::clip::solved;
 use crate::flat::draw::{BLACK, PINK, colour_of};
 
 /// Links drawn at most: more are one pink surface.
@@ -264,6 +263,11 @@ impl<'a> Around<'a> {
         }
         with_key(sheet.to_image(1), "LINKS", &[(PINK, format!("NOT CERTIFIED {without}"))])
     }
+}
+
+/// What a session has solved last.
+pub(crate) fn solved(session: &Session) -> Frame<'_> {
+    session.frame().expect("pictures are drawn of solutions")
 }
 
 /// Kinds of events, as legends name them.

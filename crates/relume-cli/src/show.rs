@@ -14,8 +14,7 @@ use relume::session::{Leaf, Session, Snapshot, Update};
 use relume_picture::drawing::with_legend;
 use relume_picture::picture::{self, ColourMap, Image, Numbers, Scale, Settings, View};
 
-use crate::around::Around;
-use crate::clip::solved;
+use crate::around::{Around, solved};
 use crate::failure::Failure;
 use crate::output;
 
@@ -154,6 +153,7 @@ impl ShowFlags {
     }
 
     /// What is drawn of a solution; `None` where pictures are wanted. `scale` is that of the exposure: display value over radiance.
+    // Over 60 lines: a case for each thing that is shown.
     pub(crate) fn draw(
         &self,
         session: &Session,

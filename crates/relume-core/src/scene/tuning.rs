@@ -397,6 +397,62 @@ pub(super) const BEFORE_MAX: f64 = 0.25;
 /// - Smaller: walls that are not tried in large scenes
 pub(super) const WALL_TRIALS: usize = 100_000_000;
 
+/// Rays from each place in the air of a room.
+///
+/// - Unit: 1
+/// - Tried: 192, 512 (with other changes at once: 242 and 287 of 300 rooms right)
+/// - Larger: time
+/// - Smaller: small objects are not met
+pub(super) const AIR_RAYS: u32 = 512;
+
+/// Share of the rays from a place that meet something, at least, for it to be in a room.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: rooms with large openings are overlooked
+/// - Smaller: what stands in the open is judged
+pub(super) const AIR_MET_MIN: f64 = 0.8;
+
+/// Share of what is met from a place that is fronts, at least, for it to be in air and not in a body.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: rooms of which several walls face outwards are overlooked
+/// - Smaller: where most walls face outwards the others are named
+pub(super) const AIR_FRONTS_MIN: f64 = 0.5;
+
+/// Rays from the air that meet backs of an object, at least, for it to be named.
+///
+/// - Unit: rays
+/// - Tried: not varied
+/// - Larger: small objects are overlooked
+/// - Smaller: objects are named of which little is seen
+pub(super) const BACKS_SEEN_MIN: u32 = 6;
+
+/// Share of the rays that meet an object from the air that meet its backs, at least, for it to be named.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: bodies with something through them are overlooked
+/// - Smaller: open bodies are named, whose insides are seen
+pub(super) const BACKS_OF_ALL: f64 = 0.98;
+
+/// Share of the rays from an object's fronts that meet fronts of others, at most, for it to be named.
+///
+/// - Unit: 1
+/// - Tried: not varied
+/// - Larger: what stands free and is seen from behind is named
+/// - Smaller: walls before a landscape are overlooked
+pub(super) const FRONTS_BEFORE_MAX: f64 = 0.04;
+
+/// Polygons that rays between air and objects are tried against in all.
+///
+/// - Unit: polygons
+/// - Tried: not varied
+/// - Larger: seconds
+/// - Smaller: nothing is said of large scenes
+pub(super) const AIR_TRIALS: usize = 100_000_000;
+
 /// Reflectance from which on a material is reported: real paints stay below.
 ///
 /// - Unit: 1

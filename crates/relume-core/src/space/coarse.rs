@@ -147,12 +147,7 @@ impl Coarse {
             let mut known: Vec<Brightness> = coarse.iter().zip(&irradiance).map(light_of).collect();
             let radiosity = &self.radiosity;
             let seen = CoarseScene { now, view, forest: seed, coarse, surfaces, radiosity, floor };
-            let sensors = match aim {
-                Aim::Mesh => None,
-                Aim::Points => Some(&[][..]),
-                Aim::Sensors(sensors) => Some(&**sensors),
-            };
-            if let Some(sensors) = sensors {
+            if let Some(sensors) = aim.sensors() {
                 let views = seen.views(sensors);
                 weigh_by_points((&self.links, seed, coarse), surfaces, &views, &mut known);
             }

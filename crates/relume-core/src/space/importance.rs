@@ -33,6 +33,17 @@ pub enum Aim {
     Sensors(Arc<[MountedSensor]>),
 }
 
+impl Aim {
+    /// The sensors that are known, none where they may be anywhere; `None` if no point is read.
+    pub(super) fn sensors(&self) -> Option<&[MountedSensor]> {
+        match self {
+            Aim::Mesh => None,
+            Aim::Points => Some(&[]),
+            Aim::Sensors(sensors) => Some(sensors),
+        }
+    }
+}
+
 /// Weighs coarse elements (by number, `known` with unrounded brightness) by what errors on them do to points, `views` of which are
 /// known ahead: their irradiance is replaced by one over the larger of two weights.
 ///

@@ -10,6 +10,7 @@ use super::{Material, MaterialId, Note, Patch, Scene, Severity};
 use crate::scene::tuning::{DIAGONAL_M, EXITANCE_HIGH, REFLECTANCE_HIGH, SUN_HIGH};
 
 mod blind;
+mod enclosing;
 mod outward;
 mod shape;
 mod world;
@@ -21,7 +22,7 @@ mod world;
 /// | `nothing-emits` | error | no emitting surface and no light |
 /// | `open-enclosure` | warning, info | gaps in what encloses the scene; nothing encloses it |
 /// | `open-object` | info | an object within it that is not closed |
-/// | `flipped-normals` | warning | neighbours that face opposite ways; an object that faces against all around it, a wall that faces out of its room; closed objects inside out |
+/// | `flipped-normals` | warning | neighbours that face opposite ways; an object that faces against all around it, a wall that faces out of its room; closed objects inside out; what shows only backs to the room it is in |
 /// | `duplicate` | warning | polygons that coincide |
 /// | `overlap` | warning | polygons that face the same way and overlap in one plane |
 /// | `touching` | info | double-sided polygons back to back |
@@ -42,6 +43,7 @@ pub fn check(scene: &Scene) -> Vec<Note> {
     units(scene, &mut notes);
     shape::shape(scene, &mut notes);
     outward::outward(scene, &mut notes);
+    enclosing::enclosing(scene, &mut notes);
     blind::blind(scene, &mut notes);
     notes.sort_by_key(|n| std::cmp::Reverse(n.severity));
     notes

@@ -11,6 +11,7 @@ use relume::export::settle_unfinished;
 
 use crate::clock;
 use crate::failure::Failure;
+use crate::lock;
 use crate::text;
 
 /// How long a run may take to notice by itself.
@@ -52,6 +53,7 @@ pub(crate) fn end(why: &Failure) -> ! {
     let is_kept = keep_within(FILE_GRACE);
     let _guard = is_kept.then(|| try_locked_for(&WRITING, FILE_GRACE));
     settle_unfinished();
+    lock::leave();
     text::complain(&format!("\n{why}"));
     std::process::exit(i32::from(why.exit_code()));
 }

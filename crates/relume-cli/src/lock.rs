@@ -3,6 +3,7 @@
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use relume::export::{probe, remove_remains};
@@ -15,7 +16,10 @@ const LOOKS: u32 = 100;
 /// Time between two of these looks.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(10);
 
-/// Held while a run writes into a folder. The system lets go of it when the process ends, however it
+/// Files of the locks that are held.
+static HELD: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Held while a run writes into a folder or a file. The system lets go of it when the process ends, however it
 /// does; the file that is left behind then locks nothing.
 pub(crate) struct Lock {
     _file: File,
@@ -66,6 +70,7 @@ impl Lock {
             let number = std::process::id().to_string();
             let written = file.set_len(0).and_then(|()| file.write_all(number.as_bytes()));
             written.map_err(|error| Failure::write(&path, &error))?;
+            held().push(path.clone());
             return Ok(Lock { _file: file, path });
         }
     }
@@ -75,7 +80,17 @@ impl Drop for Lock {
     fn drop(&mut self) {
         // While it is locked still, so that nobody can have locked it in the meantime.
         let _ = fs::remove_file(&self.path);
+        held().retain(|path| *path != self.path);
     }
+}
+
+fn held() -> MutexGuard<'static, Vec<PathBuf>> {
+    HELD.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Takes the files of all locks away, in a process that is about to end.
+pub(crate) fn leave() {
+    held().drain(..).for_each(|path| drop(fs::remove_file(path)));
 }
 
 fn taken(of: &Path, file: &mut File) -> Failure {

@@ -78,6 +78,13 @@ pub use relume_core::{element, pair, session, space};
 
 pub use relume_io::export;
 
+/// What stands in a [`FrameReport`]: counts, energies, seconds and bytes of a solve.
+pub mod report {
+    pub use relume_core::session::{
+        Energy, LinkKinds, Memory, PairCounts, RowSumError, Seconds, Work,
+    };
+}
+
 /// The plane: scenes that do not change along one direction, with that direction integrated out.
 pub mod flat {
     pub use relume_core::flat::{
@@ -103,9 +110,9 @@ pub use relume_core::scene::{
     SceneError, Severity, Surface, SurfaceId, Track, World, outside,
 };
 pub use relume_core::session::{
-    Accuracy, Aim, Closure, Command, CommandError, Energy, Estimate, Event, EventKind, Factors,
-    Flux, Frame, FrameReport, Gathered, Grouping, GroupingError, Hash, LampLight, Leaf, Memory,
-    Mesh, MountedSensor, Open, Options, Oracle, PairCounts, PointError, Removed, RowSumError,
-    Seconds, Sensor, Session, SessionError, Snapshot, Update, Watch, Work,
+    Accuracy, Aim, Closure, Command, CommandError, Estimate, Event, EventKind, Factors, Flux,
+    Frame, FrameReport, Gathered, Grouping, GroupingError, Hash, LampLight, Leaf, Mesh,
+    MountedSensor, Open, Options, Oracle, PointError, Removed, Sensor, Session, SessionError,
+    Snapshot, Update, Watch,
 };
 pub use relume_io::{ImportOptions, Log, LogError, PEAK_LUMENS_PER_WATT, import, read_environment};

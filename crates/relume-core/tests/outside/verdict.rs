@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use relume_core::scene::{Scene, check};
 use relume_core::session::{
-    Aim, Factors, FrameReport, Grouping, Options, Sensor, Session, compare,
+    Aim, Factors, FrameReport, Grouping, MountedSensor, Options, Sensor, Session, compare,
 };
 use relume_judge::path::{self, Estimate, Site};
 use relume_judge::rows;
@@ -93,6 +93,10 @@ pub(crate) fn judge(case: &Case) -> Verdict {
         // What fluxes and energies say is about the mesh; sensors keep their limits with both.
         aim: match std::env::var("RELUME_AIM").as_deref() {
             Ok("points") => Aim::Points,
+            Ok("sensors") => {
+                let mounted = |sensor: &Sensor| MountedSensor { body: None, sensor: *sensor };
+                Aim::Sensors(case.world_sensors().iter().map(mounted).collect())
+            }
             _ => Aim::Mesh,
         },
         max_memory_bytes: Some(MEMORY_BYTES),

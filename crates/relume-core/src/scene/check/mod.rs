@@ -10,6 +10,8 @@ use super::{Material, MaterialId, Note, Patch, Scene, Severity};
 use crate::scene::tuning::{DIAGONAL_M, EXITANCE_HIGH, REFLECTANCE_HIGH, SUN_HIGH};
 
 mod blind;
+#[cfg(test)]
+mod draw;
 mod enclosing;
 mod outward;
 mod shape;

@@ -3,31 +3,8 @@
 use glam::{DQuat, DVec3};
 
 use crate::scene::builder::cuboid_sides;
+use crate::scene::check::draw::Draw;
 use crate::scene::{MaterialId, Note, SceneBuilder, check};
-
-/// Numbers from a seed (SplitMix64).
-struct Draw(u64);
-
-impl Draw {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.next() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() % n as u64) as usize
-    }
-
-    fn coin(&mut self) -> bool {
-        self.next().is_multiple_of(2)
-    }
-}
 
 /// A scene under construction, turned about the vertical and moved.
 struct Stage {
@@ -111,7 +88,7 @@ fn room(seed: u64, flip: bool) -> (Vec<String>, String) {
     let mut stage = Stage::new(&mut draw);
     let size = DVec3::new(draw.within(1.5, 12.0), draw.within(2.0, 4.0), draw.within(1.5, 12.0));
     let gap = [0.0, 0.005, 0.001][draw.below(3)];
-    let (open, double) = (draw.coin(), draw.coin());
+    let (open, double) = (draw.one_in(2), draw.one_in(2));
     let sides = sides(DVec3::ZERO, size, gap, open);
     let which = draw.below(sides.len());
     for (k, (name, corners)) in sides.iter().enumerate() {
@@ -190,8 +167,8 @@ fn sound(seed: u64) -> Vec<String> {
     let mut stage = Stage::new(&mut draw);
     let extent = draw.within(8.0, 30.0);
     let (low, high) = (DVec3::new(-extent, 0.0, -extent), DVec3::new(extent, 4.0, extent));
-    if draw.coin() {
-        for (name, corners) in sides(low, high, 0.0, draw.coin()) {
+    if draw.one_in(2) {
+        for (name, corners) in sides(low, high, 0.0, draw.one_in(2)) {
             let one_sided = stage.one_sided;
             stage.panel(name, one_sided, &corners);
         }
@@ -203,7 +180,7 @@ fn sound(seed: u64) -> Vec<String> {
     for k in 0..1 + draw.below(6) {
         let at = DVec3::new(draw.within(-0.8, 0.6) * extent, 0.0, draw.within(-0.8, 0.6) * extent);
         let (w, h, d) = (draw.within(0.5, 3.0), draw.within(0.5, 2.5), draw.within(0.4, 3.0));
-        let boarded = draw.coin();
+        let boarded = draw.one_in(2);
         let name = |part: &str| format!("{part} {k}");
         let whole = sides(at, at + DVec3::new(w, h, d), 0.0, false);
         let (one_sided, two_sided) = (stage.one_sided, stage.two_sided);

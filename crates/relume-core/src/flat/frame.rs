@@ -10,6 +10,7 @@ use crate::read::{ElementName, Elements, Event, with_names};
 use super::forest::FlatForest;
 use super::plane::Segment;
 use super::state::{FlatSolved, PlaneState};
+use super::surfaces::LitPlane;
 use super::view::PlaneView;
 
 /// A link of the plane; it carries light both ways.
@@ -159,8 +160,9 @@ impl Elements for PlaneState {
         true
     }
 
-    fn reflectance_max(&self) -> f64 {
-        self.scene.walls().iter().flat_map(|w| w.material.reflectance).fold(0.0, f64::max)
+    fn error_growth(solved: &FlatSolved) -> f64 {
+        let lit = LitPlane::new(&solved.space.scene, &solved.space.forest);
+        solved.radiosity.growth(&lit, &solved.links)
     }
 
     fn is_of_the_scene_of(&self, other: &PlaneState) -> bool {

@@ -117,8 +117,8 @@ pub struct RadiosityGap {
 /// weigh by), groups and their links, bit for bit; and the radiosities of all leaves.
 ///
 /// Two solutions B1, B2 of the same links with residuals r1, r2 (relative to the mean radiosity)
-/// may differ by (r1 + r2) / (1 - rho_max) of the mean radiosity, and by rounding to single
-/// precision. The first difference in the order of the elements' names is returned, links before
+/// may differ by g (r1 + r2) of the mean radiosity, and by rounding to single precision, with g the largest error over the largest
+/// residual: 1 / (1 - rho_max) unless sums of form factors exceed 1. The first difference in the order of the elements' names is returned, links before
 /// counts before the coarse solution before radiosities; `None` where there is none.
 ///
 /// Links are compared by their hash first, computed anew from the links of both; only where it
@@ -262,8 +262,8 @@ struct Bound {
 }
 
 impl Bound {
-    fn new(both: &Both<'_, impl Elements>) -> Bound {
-        let grows = 1.0 / (1.0 - both.one.space.reflectance_max());
+    fn new<S: Elements>(both: &Both<'_, S>) -> Bound {
+        let grows = S::error_growth(both.one);
         let mean_w_m2 = mean_radiosity(both.one).max(mean_radiosity(both.two));
         let residuals = both.one.report.residual + both.two.report.residual;
         Bound {

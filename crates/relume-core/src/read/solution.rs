@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::element::{ElementId, ElementKey, Kind};
 use crate::follow::Follower;
-use crate::space::SpaceState;
+use crate::space::{Solved, SpaceState};
 
 use super::coarse_values::{CoarseValue, coarse_values};
 use super::names::{ElementName, name_of};
@@ -27,8 +27,10 @@ pub trait Elements {
     fn area_m2(&self, id: ElementId) -> f64;
     /// Whether the body of an element is there at present.
     fn is_present(&self, id: ElementId) -> bool;
-    /// The largest reflectance of all materials and channels in use.
-    fn reflectance_max(&self) -> f64;
+    /// Largest error of a radiosity over the largest residual of any: 1.
+    fn error_growth(solved: &Follower<Self>) -> f64
+    where
+        Self: Sized;
     /// Values of the coarse solution and of groups, in the order of their quantities and names; none in the plane.
     fn coarse_values(&self) -> Vec<CoarseValue> {
         Vec::new()
@@ -81,10 +83,8 @@ impl Elements for SpaceState {
         forest.patch(id).is_some_and(|p| view.is_present(view.patch(p).body))
     }
 
-    fn reflectance_max(&self) -> f64 {
-        let SpaceState { scene, world, .. } = self;
-        let all = scene.patches.iter().flat_map(|patch| world.reflectance(scene, patch));
-        all.fold(0.0, f64::max)
+    fn error_growth(solved: &Solved) -> f64 {
+        solved.radiosity.growth(&solved.space.surfaces().with_places(), &solved.links)
     }
 
     fn coarse_values(&self) -> Vec<CoarseValue> {

@@ -11,6 +11,7 @@ use super::surfaces::{Surfaces, for_each_below};
 use super::trend::Trend;
 
 mod bounded;
+mod growth;
 mod levels;
 mod scaling;
 mod solve;

@@ -208,3 +208,11 @@ pub(super) const SWEEPS_MAX: u32 = 2_000;
 /// - Larger: time of scenes of white surfaces
 /// - Smaller: light of white scenes stays unaccounted for
 pub(super) const FURTHER_MAX: u32 = 32;
+
+/// Sweeps in which weights are looked for that bound the error of a solution by its residuals, at most.
+///
+/// - Unit: sweeps
+/// - Tried: not varied
+/// - Larger: time of a comparison of solutions in which light hardly loses anything
+/// - Smaller: sound solutions of such scenes may be called different
+pub(super) const GROWTH_SWEEPS: u32 = 256;

@@ -66,7 +66,7 @@ impl<'a> LitForest<'a> {
     }
 
     /// With all places and areas computed ahead: for several sweeps over all of the forest.
-    pub(super) fn with_places(mut self) -> LitForest<'a> {
+    pub(crate) fn with_places(mut self) -> LitForest<'a> {
         let forest = self.forest;
         let ids = (0..forest.len() as u32).into_par_iter().map(ElementId);
         self.places = ids.map(|id| (place_of(forest, id), forest.exposed_m2(id) as f32)).collect();

@@ -115,13 +115,13 @@ pub(super) fn estimate(
         spot: SPOT * blockers.spots[end],
         jump: JUMP * blockers.near[end],
     };
-    // The points that V is found from tell no more than those of the kernel.
-    let least = match x.is_steep && v.segments > 0 {
-        true => STEEP * (v.value / SEEN).min(1.0),
+    // The points that V is found from tell no more than those of the kernel: over an end where that is even they tell all.
+    let least = |over: &Variation| match x.is_steep && v.segments > 0 {
+        true => STEEP.min(over.slope + over.bend) * (v.value / SEEN).min(1.0),
         false => 0.0,
     };
-    let over_a = over(&x.over_a, v.spread_a.max(least), 0);
-    let over_b = over(&x.over_b, v.spread_b.max(least), 1);
+    let over_a = over(&x.over_a, v.spread_a.max(least(&x.over_a)), 0);
+    let over_b = over(&x.over_b, v.spread_b.max(least(&x.over_b)), 1);
     let link = LinkSize {
         exchange: x.area_m2,
         noise,

@@ -147,3 +147,11 @@ pub(crate) fn print_table() {
 fn on_many_kinds() {
     print_table();
 }
+
+/// What is steep over one end alone is to be divided there: slats were divided all over, and the pane behind them was not.
+#[test]
+fn slats_before_a_window_are_not_divided_in_place_of_the_window() {
+    let session = solved(&Arc::new(Maker::scene("blinds")), 0.1, Aim::Mesh);
+    let links = session.frame().expect("a frame").report().links;
+    assert!(links < 90_000, "{links} links");
+}

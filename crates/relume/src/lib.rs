@@ -48,29 +48,30 @@
 //! let mut session = Session::new(b.build()?, Options { tolerance: 0.1, ..Options::default() })?;
 //! let first = session.solve()?.hash(); // of all links
 //!
-//! let undo = session.apply(Command::set_pose(ball, Pose::translation([0.1, 0.0, 0.0])))?; // by 10 cm
+//! let undo = session.apply(Command::set_pose(ball, Pose::translation([0.1, 0.0, 0.0])))?; // to x = 0.1 m
 //! let frame = session.solve()?; // evaluates only what the move changed
 //! println!("{} links, {:?} W/m2", frame.report().links, frame.irradiance_at([0.0, -1.0, 0.0], [0.0, 1.0, 0.0]));
 //!
 //! session.apply(undo)?;
 //! assert_eq!(session.solve()?.hash(), first);
-//! let mesh = session.solve()?.snapshot(); // corners, radiosity and patch of each undivided element; revision
+//! let mesh = session.solve()?.snapshot(); // four corners, radiosity and patch of each leaf element (a triangle repeats its last corner); revision
 //! # assert_eq!(mesh.corners.len(), mesh.radiosity.len());
 //! # Ok(())
 //! # }
 //! ```
 //!
 //! Triangles are counter-clockwise seen from their front, the side that is lit and shines: the walls of a room are seen from inside,
-//! a lamp from outside. The back is black and hides what is behind it; [`SceneBuilder::double_sided_material`] makes both sides fronts.
+//! a lamp from outside. The back is black and hides what is behind it; [`SceneBuilder::double_sided_material`] makes both sides fronts. [`check`] tells
+//! of walls that show their backs, and of all else in a scene that may be a mistake.
 //!
 //! [`Options`] has the tolerance: the relative error of irradiance that is aimed at, 0.02 unless given. Refusals are [`SceneError`],
 //! [`CommandError`] and [`SessionError`]; they name the thing and the remedy.
 //!
 //! Lengths are metres, times seconds, light is radiometric (W, W/m2, W/sr) in three linear channels. Work is done on
-//! rayon's global pool; inside `ThreadPool::install` on that pool. Results are the same on any. [`Session::watch`] shows a
+//! rayon's global thread pool; to use one of your own, call from within its `ThreadPool::install`. Results are the same on any number of threads. [`Session::watch`] shows a
 //! solve under way to other threads, and calls it off.
 //!
-//! The engine is the crate `relume-core`. Its rooms are re-exported here for the command and the tests of this repository,
+//! The engine is the crate `relume-core`. Its modules are re-exported here for the command and the tests of this repository,
 //! hidden: not part of the interface, and free to change.
 
 #[doc(hidden)]
@@ -107,7 +108,7 @@ pub use relume_core::glam;
 pub use relume_core::scene::{
     Body, BodyId, Camera, Edits, Held, Interpolation, Light, LightId, LightKind, Material,
     MaterialId, NewBody, Note, Patch, PatchId, Projection, RotationTrack, Scene, SceneBuilder,
-    SceneError, Severity, Surface, SurfaceId, Track, World, outside,
+    SceneError, Severity, Surface, SurfaceId, Track, World, check, outside,
 };
 pub use relume_core::session::{
     Accuracy, Aim, Closure, Command, CommandError, Estimate, Event, EventKind, Factors, Flux,

@@ -3,6 +3,7 @@
 use glam::DVec2;
 
 use super::between::Between;
+use super::cells::Cells;
 use super::kernel::Simd;
 use super::prepared_view::{NOTHING, PreparedView};
 use super::share::Visibility;
@@ -23,6 +24,17 @@ pub struct Clipping<'a> {
     prepare_view: PreparedView,
 }
 
+/// Visibility at a first look.
+#[derive(Clone, Copy, Debug)]
+pub struct FirstLook {
+    /// The visibility.
+    pub v: Visibility,
+    /// How far it may be off, about its root mean square, 1.
+    pub doubt: f64,
+    /// Cells along a side of the observer that it was found from.
+    pub cells: u32,
+}
+
 impl<'a> Clipping<'a> {
     /// Clipping of two elements past convex occluders, all in one frame.
     pub(super) fn new(
@@ -40,6 +52,16 @@ impl<'a> Clipping<'a> {
     /// Visibility, exact from 2 x 2 Gauss points in each of `cells` x `cells` parts of the observer. Each point
     /// counts as a segment.
     pub fn visibility(&mut self, cells: u32) -> Visibility {
+        self.look(Cells::even(cells))
+    }
+
+    /// Visibility of a pair of this name, from `cells` x `cells` parts of the observer that borders of links with other names do not
+    /// share ([`Cells`]): errors of links along one shadow do not add up.
+    pub fn visibility_of(&mut self, key: u64, cells: u32) -> Visibility {
+        self.look(Cells::shifted(cells, key))
+    }
+
+    fn look(&mut self, cells: Cells) -> Visibility {
         let Clipping { observer, other, a_looks, ref mut prepare_view } = *self;
         let sums = prepare_view.look(observer, cells);
         let value = sums.visibility();
@@ -51,14 +73,7 @@ impl<'a> Clipping<'a> {
             if a_looks { (over_observer, over_other) } else { (over_other, over_observer) };
         let (spread_a, spread_b) =
             if a_looks { (of_observer, of_other) } else { (of_other, of_observer) };
-        Visibility {
-            value,
-            gradient_a,
-            gradient_b,
-            spread_a,
-            spread_b,
-            segments: 4 * cells * cells,
-        }
+        Visibility { value, gradient_a, gradient_b, spread_a, spread_b, segments: cells.len() }
     }
 
     /// Whether no point sees more of the other end than slivers that rounding leaves between shadows.
@@ -71,7 +86,7 @@ impl<'a> Clipping<'a> {
             .all(|&(all, clear)| clear <= SEEN_SLIVER * all)
     }
 
-    /// Visibility from four points, and how far it may be off: about its root mean square.
+    /// Visibility from four points, and how far it may be off.
     ///
     /// V is smooth over an end while part of the other is seen, and has kinks where that begins and ends. So
     /// four points that all see a part are nearly exact; four that see all of it, or nothing, may have
@@ -80,7 +95,7 @@ impl<'a> Clipping<'a> {
     ///
     /// Where all points see nothing though it is not proven that occluders hide all of the other end, there are more of
     /// them too, while what they may overlook is above `error_max`, in V.
-    pub fn first_look(&mut self, error_max: f64) -> (Visibility, f64) {
+    pub fn first_look(&mut self, error_max: f64) -> FirstLook {
         let mut v = self.visibility(1);
         let mut cells = 1;
         let mut is_hidden = None;
@@ -109,7 +124,7 @@ impl<'a> Clipping<'a> {
         } else {
             ERROR_SMOOTH * spread + UNSEEN_SMOOTH
         };
-        (v, doubt)
+        FirstLook { v, doubt, cells }
     }
 }
 
@@ -228,7 +243,7 @@ mod tests {
         let look = |strips: [[DVec3; 4]; 2]| {
             let mut polygons = Between::default();
             strips.iter().for_each(|c| polygons.push(c.iter().copied(), DVec3::Z, None));
-            Clipping::new(Simd::detect(), (&a, &b), &polygons).first_look(0.0).0
+            Clipping::new(Simd::detect(), (&a, &b), &polygons).first_look(0.0).v
         };
         let hidden = look([strip(-9.0, 0.1), strip(-0.1, 9.0)]);
         assert_eq!((hidden.value, hidden.segments), (0.0, 4));

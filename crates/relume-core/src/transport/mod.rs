@@ -9,6 +9,7 @@ mod between;
 mod blocker_sizes;
 mod blockers;
 mod candidates;
+mod cells;
 mod clip;
 mod clipping;
 mod contact;
@@ -38,7 +39,7 @@ pub use blocker_sizes::BlockerSizes;
 pub use blockers::{clipping, prepare_view};
 pub use candidates::{Candidates, InShaft};
 pub use clip::keep_in_front;
-pub use clipping::Clipping;
+pub use clipping::{Clipping, FirstLook};
 pub use contact::{in_plane, lies_in, overlap_m2};
 pub use crowd::{Crowd, light_past_crowd};
 pub use exchange::{

@@ -8,8 +8,9 @@ use std::cell::Cell;
 use glam::{DVec2, DVec3};
 
 use super::between::Between;
+use super::cells::Cells;
 use super::clip::{Cutter, Occluders};
-use super::kernel::{G, Simd};
+use super::kernel::Simd;
 use super::point::{EdgeBundles, middle_of_sent};
 use super::target_frame::TargetFrame;
 use super::tuning::HALVINGS;
@@ -81,14 +82,14 @@ impl PreparedView {
     ///
     /// Error: exact from each point; over the part it falls with the square of `cells`, as V has kinks.
     pub fn visibility(&mut self, part: &WorldElement, cells: u32) -> f64 {
-        self.look(part, cells).visibility()
+        self.look(part, Cells::even(cells)).visibility()
     }
 
     /// Visibility of the other from the middle of each of some parts of the observer, in [0, 1]; 0 where a
     /// middle does not face the other.
     pub fn from_middles<'a>(&mut self, parts: impl Iterator<Item = &'a WorldElement>) -> Vec<f64> {
         self.scratch.views.start();
-        parts.for_each(|part| self.look_from(part, part.point(0.5, 0.5)));
+        parts.for_each(|part| self.look_from(part, part.point(0.5, 0.5), 1.0));
         self.scratch.views.evaluate(self.simd, self.normal);
         let share = |&(all, clear): &(f64, f64)| if all > 0.0 { clear / all } else { 0.0 };
         self.scratch.views.points.iter().map(|point| share(point).clamp(0.0, 1.0)).collect()
@@ -108,17 +109,18 @@ impl PreparedView {
         self.scratch.cutter.hides_from_all(&points, &self.target, &self.between, HALVINGS)
     }
 
-    pub(super) fn look(&mut self, part: &WorldElement, cells: u32) -> &Sums {
+    pub(super) fn look(&mut self, part: &WorldElement, cells: Cells) -> &Sums {
         self.scratch.views.start();
-        let at = |k: u32| (f64::from(k / 2) + G[k as usize & 1]) / f64::from(cells);
-        for k in 0..4 * cells * cells {
-            self.look_from(part, part.point(at(k % (2 * cells)), at(k / (2 * cells))));
+        for ([s, t], weight) in cells.points() {
+            self.look_from(part, part.point(s, t), weight);
         }
         self.scratch.views.evaluate(self.simd, self.normal);
         &self.scratch.views.sums
     }
 
-    fn look_from(&mut self, part: &WorldElement, point: DVec3) {
+    /// Looks from a point that counts `weight` times in sums.
+    fn look_from(&mut self, part: &WorldElement, point: DVec3, weight: f64) {
+        self.scratch.views.weights.push(weight);
         if self.other.distance(point) > 0.0 && self.target.len() >= 3 {
             let from = self.frame.place(point);
             self.scratch.cutter.cut(from, &self.target, &self.between);
@@ -140,6 +142,8 @@ pub(super) struct PointViews {
     sums: Sums,
     /// Form factors from each point, of the target and of what is clear of it.
     pub(super) points: Vec<(f64, f64)>,
+    /// How much each point counts in the sums, 1.
+    weights: Vec<f64>,
     /// If first moments are wanted, the observer's normal.
     pub(super) moments: Option<DVec3>,
     edges: EdgeBundles,
@@ -171,6 +175,7 @@ impl PointViews {
     fn start(&mut self) {
         self.sums = Sums::default();
         self.points.clear();
+        self.weights.clear();
         self.edges.clear();
         self.seen.clear();
     }
@@ -209,32 +214,36 @@ impl PointViews {
         for seen in &self.seen {
             let f = shares.form_factor(start..seen.edges_end);
             start = seen.edges_end;
-            let sums = &mut self.sums;
-            if let What::Target { .. } = seen.what {
+            let is_target = matches!(seen.what, What::Target { .. });
+            if is_target {
                 self.points.push((f, 0.0));
-                sums.all += f;
+            }
+            let counts = self.weights[self.points.len() - 1] * f;
+            let sums = &mut self.sums;
+            if is_target {
+                sums.all += counts;
                 if self.moments.is_some() {
-                    sums.at_observer += seen.at * f;
-                    sums.at_other += seen.middle * f;
+                    sums.at_observer += seen.at * counts;
+                    sums.at_other += seen.middle * counts;
                 }
             }
-            let clear = match seen.what {
-                What::Target { clear: true } | What::Clear => f,
+            let sign = match seen.what {
+                What::Target { clear: true } | What::Clear => 1.0,
                 What::Target { clear: false } => continue,
-                What::Dark => -f,
+                What::Dark => -1.0,
             };
-            self.points.last_mut().expect("a target comes first").1 += clear;
+            self.points.last_mut().expect("a target comes first").1 += sign * f;
             if self.moments.is_some() {
-                sums.at_observer_clear += seen.at * clear;
-                sums.at_other_clear += seen.middle * clear;
+                sums.at_observer_clear += seen.at * (sign * counts);
+                sums.at_other_clear += seen.middle * (sign * counts);
             }
         }
-        for (all, clear) in &mut self.points[first..] {
+        for ((all, clear), weight) in self.points[first..].iter_mut().zip(&self.weights[first..]) {
             // What is hidden by several is taken off in several parts.
             if *clear <= NOTHING * *all {
                 *clear = 0.0;
             }
-            self.sums.finish_point(*all, *clear);
+            self.sums.finish_point(weight * *all, weight * *clear);
         }
         self.seen.clear();
         self.edges.clear();

@@ -2,7 +2,7 @@
 
 use crate::scene::PatchId;
 use crate::transport::{
-    CELLS_MAX, CLIPPED_MAX, Clipping, Crowd, Exchange, Visibility, clipping, visibility,
+    CELLS_MAX, CLIPPED_MAX, Clipping, Crowd, Exchange, FirstLook, Visibility, clipping, visibility,
 };
 
 use super::places::Elements;
@@ -18,6 +18,8 @@ pub(super) struct Seen<'p> {
     pub(super) v: Visibility,
     /// How far off it may be.
     pub(super) doubt: f64,
+    /// Cells along a side of the end that it was clipped from.
+    pub(super) cells: u32,
     /// How far the light is from V being found in another way.
     pub(super) way: u16,
     pub(super) clipped: Option<Clipping<'p>>,
@@ -60,11 +62,14 @@ impl SpaceJudge<'_> {
             }
             sampled = Some(v);
         }
-        let (v, doubt) = match (&mut clipped, sampled) {
+        let FirstLook { v, doubt, cells } = match (&mut clipped, sampled) {
             (Some(clipped), _) => clipped.first_look(overlooked_max),
-            (None, sampled) => (sampled.expect("what is not clipped is sampled"), 0.0),
+            (None, sampled) => {
+                let v = sampled.expect("what is not clipped is sampled");
+                FirstLook { v, doubt: 0.0, cells: 0 }
+            }
         };
-        Seen { v, doubt, way, clipped, crowd, crossed }
+        Seen { v, doubt, cells, way, clipped, crowd, crossed }
     }
 
     /// How many polygons in the way of a pair are clipped at most, and how far its light is from another number for those that
@@ -93,9 +98,16 @@ impl SpaceJudge<'_> {
         seen: Seen<'_>,
         stake: f64,
     ) -> Visibility {
-        let Seen { v, doubt, clipped, crowd, .. } = seen;
+        let Seen { v, doubt, cells, clipped, crowd, .. } = seen;
         match (clipped, crowd) {
-            (Some(mut clipped), _) => look_closer(v, &mut clipped, stake * doubt),
+            (Some(mut clipped), _) => {
+                let cells = cells_for(cells, stake * doubt);
+                if cells <= 1 {
+                    return v;
+                }
+                let again = clipped.visibility_of(pair.key, cells);
+                Visibility { segments: v.segments + again.segments, ..again }
+            }
             (None, _) if v.segments == 0 => v,
             (None, crowd) => {
                 let again = match &crowd {
@@ -108,14 +120,13 @@ impl SpaceJudge<'_> {
     }
 }
 
-/// A link that is partly hidden is looked at from more points, the more so the larger its `error`: how far V
-/// may be off times the form factor, over what a link may err by.
-fn look_closer(v: Visibility, clipped: &mut Clipping<'_>, error: f64) -> Visibility {
+/// Cells along a side of an end that a link which is partly hidden is looked at from; 1 if its first look, from `first` cells a side, is
+/// enough. The more, the larger its `error`: how far V may be off times the form factor, over what a link may err by.
+fn cells_for(first: u32, error: f64) -> u32 {
     if error <= CLOSER {
-        return v;
+        return 1;
     }
     // The error of n x n points on a function with kinks falls as 1 / n^2.
-    let cells = (error / CLOSER).sqrt().ceil().min(f64::from(CELLS_MAX));
-    let again = clipped.visibility(cells as u32);
-    Visibility { segments: v.segments + again.segments, ..again }
+    let cells = (f64::from(first) * (error / CLOSER).sqrt()).ceil();
+    cells.min(f64::from(CELLS_MAX)) as u32
 }

@@ -63,9 +63,10 @@ fn check(what: &str, scene: Scene, options: Options, frames: usize) {
     worst.check(&format!("{what}, {frames} frames"));
 }
 
+/// At a tolerance with some 40,000 links: bytes for each receiver count the more a pair, the fewer pairs there are.
 #[test]
 fn furnished_room_by_the_error_oracle() {
-    check("furnished, error", furnished_room(), at_tolerance(0.1), 12);
+    check("furnished, error", furnished_room(), at_tolerance(0.08), 12);
 }
 
 #[test]

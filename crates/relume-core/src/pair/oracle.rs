@@ -249,3 +249,28 @@ fn one_way(
     };
     OneWay { error, by_receiver, by_source }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An element of 3 cm close by a wall of a square metre that is partly hidden, steep over the wall alone.
+    #[test]
+    fn what_is_steep_over_one_end_alone_is_divided_there() {
+        let even = Variation::default();
+        let steep = Variation { slope: 1.5, bend: 3.0, ..even };
+        let light = Brightness { irradiance: 1.0, radiosity: 1.0, reflected: 1.0 };
+        let end =
+            |area: f64| End { area, reference_area: 0.5, light, own_area: area, surface_area: 1.0 };
+        let (wall, small) = (end(1.0), end(1e-3));
+        let v = Visibility { value: 0.02, spread_a: 0.14, segments: 4, ..Visibility::CLEAR };
+        let norm = Norm { reference_area_m2: 0.5, threshold: 0.005 };
+        let error_on_small = |over_a, over_b| {
+            let x = Exchange { area_m2: 5e-4, over_a, over_b, is_steep: true };
+            let e = estimate(&x, &v, [&wall, &small], &BlockerSizes::NOTHING, &norm);
+            e.on[1]
+        };
+        assert!(error_on_small(steep, even) < norm.threshold);
+        assert!(error_on_small(steep, steep) > norm.threshold);
+    }
+}

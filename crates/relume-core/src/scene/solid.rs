@@ -10,7 +10,7 @@ use glam::DVec3;
 use super::shell::{self, Effort};
 use super::topology::Polygon;
 use super::weld::Weld;
-use super::{BodyId, Scene};
+use super::{BodyId, Patch, PatchId, Scene};
 use crate::scene::tuning::SOLID_FACES_MAX;
 
 /// A closed convex solid, in its body's frame.
@@ -62,6 +62,10 @@ pub struct Solids {
     pub enclosures: Vec<Enclosure>,
     /// For each patch the solid whose face it is, if it is one's.
     pub of_patch: Vec<Option<u32>>,
+    /// For each patch the closed convex body, of one side or of two, whose face it is, if it is one's: numbers of their own.
+    pub bodies: Vec<Option<u32>>,
+    /// How many of these bodies there are.
+    body_count: u32,
     /// The solids.
     pub list: Vec<Solid>,
 }
@@ -76,9 +80,16 @@ impl Scene {
         let mut out = Solids {
             enclosures: vec![Enclosure::Open; self.patches.len()],
             of_patch: vec![None; self.patches.len()],
+            bodies: vec![None; self.patches.len()],
+            body_count: 0,
             list: Vec::new(),
         };
-        (0..self.bodies.len() as u32).for_each(|body| self.add_solids(BodyId(body), &mut out));
+        for body in (0..self.bodies.len() as u32).map(BodyId) {
+            self.add_solids(body, &mut out);
+            // Of two-sided polygons either side may be that which looks outwards.
+            self.add_two_sided(body, |id, twin| id < twin, &mut out);
+            self.add_two_sided(body, |id, twin| id > twin, &mut out);
+        }
         self.open_let_in_lamps(&mut out.enclosures);
         out
     }
@@ -113,20 +124,9 @@ impl Scene {
     }
 
     fn add_solids(&self, body: BodyId, out: &mut Solids) {
-        let one_sided = || self.patches_of(body).filter(|(_, patch)| patch.twin.is_none());
-        let mut weld = Weld::of_corners(one_sided().flat_map(|(_, p)| p.corners_in_body()));
-        let face = |(id, patch): (super::PatchId, &super::Patch)| {
-            let mut corners: Vec<u32> = patch.corners_in_body().map(|c| weld.vertex(c)).collect();
-            corners.dedup();
-            if corners.len() > 1 && corners.first() == corners.last() {
-                corners.pop();
-            }
-            Face { patch: id.0, corners, normal: patch.frame.normal, origin: patch.frame.origin }
-        };
-        // What is thinner than the tolerance has no sides to meet others along.
-        let faces: Vec<Face> = one_sided().map(face).filter(|f| f.corners.len() > 2).collect();
+        let (weld, faces) = self.faces(body, |_, patch| patch.twin.is_none());
         let polygon = |f: &Face| Polygon {
-            patch: super::PatchId(f.patch),
+            patch: PatchId(f.patch),
             two_sided: false,
             corners: f.corners.clone(),
         };
@@ -151,8 +151,53 @@ impl Scene {
                 let number = out.list.len() as u32;
                 group.iter().for_each(|f| out.of_patch[f.patch as usize] = Some(number));
                 out.list.push(solid);
+                out.add_body(group.iter().map(|f| f.patch));
             }
         }
+    }
+
+    /// Adds closed convex bodies of those sides of two-sided polygons that `is_wanted` (of their patch and its twin).
+    fn add_two_sided(
+        &self,
+        body: BodyId,
+        is_wanted: impl Fn(PatchId, PatchId) -> bool,
+        out: &mut Solids,
+    ) {
+        let (weld, faces) =
+            self.faces(body, |id, patch| patch.twin.is_some_and(|twin| is_wanted(id, twin)));
+        for group in closed(&faces) {
+            let group: Vec<&Face> = group.into_iter().map(|f| &faces[f]).collect();
+            if group.len() <= SOLID_FACES_MAX && is_convex(&group, &weld) {
+                let twin = |f: &&Face| self.patches[f.patch as usize].twin.map(|twin| twin.0);
+                let both = group.iter().flat_map(|f| [Some(f.patch), twin(f)]);
+                out.add_body(both.flatten());
+            }
+        }
+    }
+
+    /// Some patches of a body as faces, with their corners welded.
+    fn faces(&self, body: BodyId, is_one: impl Fn(PatchId, &Patch) -> bool) -> (Weld, Vec<Face>) {
+        let patches = || self.patches_of(body).filter(|&(id, patch)| is_one(id, patch));
+        let mut weld = Weld::of_corners(patches().flat_map(|(_, p)| p.corners_in_body()));
+        let face = |(id, patch): (PatchId, &Patch)| {
+            let mut corners: Vec<u32> = patch.corners_in_body().map(|c| weld.vertex(c)).collect();
+            corners.dedup();
+            if corners.len() > 1 && corners.first() == corners.last() {
+                corners.pop();
+            }
+            Face { patch: id.0, corners, normal: patch.frame.normal, origin: patch.frame.origin }
+        };
+        // What is thinner than the tolerance has no sides to meet others along.
+        let faces = patches().map(face).filter(|f| f.corners.len() > 2).collect();
+        (weld, faces)
+    }
+}
+
+impl Solids {
+    /// Adds a closed convex body of these faces.
+    fn add_body(&mut self, faces: impl Iterator<Item = u32>) {
+        faces.for_each(|patch| self.bodies[patch as usize] = Some(self.body_count));
+        self.body_count += 1;
     }
 }
 
@@ -349,6 +394,58 @@ mod tests {
             b.polygon(node, "needle", grey, &[DVec3::ZERO, DVec3::Y * 5e-5, DVec3::X]);
         };
         assert_eq!(found(needle), (0, 0));
+    }
+
+    #[test]
+    fn boxes_of_one_side_or_two_are_convex_bodies_wound_either_way_and_open_ones_are_not() {
+        let half = DVec3::new(0.5, 0.25, 1.0);
+        let bodies = |build: &dyn Fn(&mut SceneBuilder, super::super::NodeId)| {
+            let mut b = SceneBuilder::new("bodies");
+            let node = b.node("body", None, DVec3::ZERO, DQuat::IDENTITY);
+            build(&mut b, node);
+            let scene = b.build().unwrap();
+            let solids = scene.solids();
+            let mut numbers: Vec<u32> = solids.bodies.iter().flatten().copied().collect();
+            let faces = numbers.len();
+            numbers.dedup();
+            (faces, numbers, scene.patches.len())
+        };
+        let both = |b: &mut SceneBuilder| b.double_sided_material("both", [0.5; 3], [0.0; 3]);
+        let one = bodies(&|b, node| {
+            let grey = b.material("grey", [0.5; 3], [0.0; 3]);
+            b.cuboid(node, "box", grey, -half, half);
+        });
+        assert_eq!(one, (6, vec![0], 6));
+        // With a lamp in it a two-sided box keeps its inner sides.
+        for inward in [false, true] {
+            let two = bodies(&|b, node| {
+                let material = both(b);
+                match inward {
+                    true => b.cuboid_inward(node, "box", material, -half, half),
+                    false => b.cuboid(node, "box", material, -half, half),
+                };
+                let lamp = b.material("lamp", [0.0; 3], [1.0; 3]);
+                b.cuboid(node, "lamp", lamp, -0.1 * half, 0.1 * half);
+            });
+            assert_eq!((two.0, two.2), (18, 18), "{two:?}");
+        }
+        let open = bodies(&|b, node| {
+            let material = both(b);
+            let p = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+            b.polygon(
+                node,
+                "floor",
+                material,
+                &[p(0., 0., 0.), p(1., 0., 0.), p(1., 1., 0.), p(0., 1., 0.)],
+            );
+            b.polygon(
+                node,
+                "wall",
+                material,
+                &[p(0., 0., 0.), p(0., 1., 0.), p(0., 1., 1.), p(0., 0., 1.)],
+            );
+        });
+        assert_eq!((open.0, open.2), (0, 4));
     }
 
     #[test]

@@ -148,10 +148,11 @@ fn on_many_kinds() {
     print_table();
 }
 
-/// What is steep over one end alone is to be divided there: slats were divided all over, and the pane behind them was not.
+/// Pairs that are steep over one end alone are divided there: slats were divided all over, and the pane behind them was not. The shadow
+/// of a slat is as large as the slat: it counted as one of its edges of 4 mm.
 #[test]
-fn slats_before_a_window_are_not_divided_in_place_of_the_window() {
+fn slats_before_a_window_are_not_divided_all_over() {
     let session = solved(&Arc::new(Maker::scene("blinds")), 0.1, Aim::Mesh);
     let links = session.frame().expect("a frame").report().links;
-    assert!(links < 90_000, "{links} links");
+    assert!(links < 35_000, "{links} links");
 }

@@ -55,8 +55,8 @@ impl<'a> Clipping<'a> {
         self.look(Cells::even(cells))
     }
 
-    /// Visibility of a pair of this name, from `cells` x `cells` parts of the observer that borders of links with other names do not
-    /// share ([`Cells`]): errors of links along one shadow do not add up.
+    /// Visibility, exact from 2 x 2 Gauss points in each of `cells` x `cells` parts of the observer whose borders are shifted by
+    /// `key`, which must depend on nothing but the pair's names: links along the edge of one shadow do not err in one sense.
     pub fn visibility_of(&mut self, key: u64, cells: u32) -> Visibility {
         self.look(Cells::shifted(cells, key))
     }

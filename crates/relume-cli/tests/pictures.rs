@@ -48,6 +48,7 @@ fn a_demonstration_writes_scene_pictures_and_report() {
     let text = succeeded(&relume(&["demo", "room", "-o", out, "--frames", "0-2"]));
     assert!(text.starts_with("3 frames, "), "{text}");
     assert!(text.contains(&format!(" s, pictures in {out}\nframe 2: ")), "{text}");
+    assert!(text.contains(" % unbalanced\nframe "), "{text}");
     assert!(text.contains(": irradiance is off by about "), "{text}");
     assert_eq!(
         names_in(dir.path()),

@@ -522,9 +522,9 @@ impl Forest {
         self.fixed.solids.of_patch[patch.0 as usize]
     }
 
-    /// The closed convex body, of one side or of two, whose face a patch is, if it is one's.
-    pub fn convex_body(&self, patch: PatchId) -> Option<u32> {
-        self.fixed.solids.bodies[patch.0 as usize]
+    /// The closed convex part of a body, of one side or of two, whose face a patch is, if it is one's.
+    pub fn convex_part(&self, patch: PatchId) -> Option<u32> {
+        self.fixed.solids.convex_parts[patch.0 as usize]
     }
 
     /// What the closed surface that a patch belongs to encloses.

@@ -62,10 +62,10 @@ pub struct Solids {
     pub enclosures: Vec<Enclosure>,
     /// For each patch the solid whose face it is, if it is one's.
     pub of_patch: Vec<Option<u32>>,
-    /// For each patch the closed convex body, of one side or of two, whose face it is, if it is one's: numbers of their own.
-    pub bodies: Vec<Option<u32>>,
-    /// How many of these bodies there are.
-    body_count: u32,
+    /// For each patch the closed convex part of its body, of one side or of two, whose face it is, if it is one's: numbers of their own.
+    pub convex_parts: Vec<Option<u32>>,
+    /// How many of these parts there are.
+    convex_part_count: u32,
     /// The solids.
     pub list: Vec<Solid>,
 }
@@ -80,8 +80,8 @@ impl Scene {
         let mut out = Solids {
             enclosures: vec![Enclosure::Open; self.patches.len()],
             of_patch: vec![None; self.patches.len()],
-            bodies: vec![None; self.patches.len()],
-            body_count: 0,
+            convex_parts: vec![None; self.patches.len()],
+            convex_part_count: 0,
             list: Vec::new(),
         };
         for body in (0..self.bodies.len() as u32).map(BodyId) {
@@ -151,12 +151,12 @@ impl Scene {
                 let number = out.list.len() as u32;
                 group.iter().for_each(|f| out.of_patch[f.patch as usize] = Some(number));
                 out.list.push(solid);
-                out.add_body(group.iter().map(|f| f.patch));
+                out.add_convex_part(group.iter().map(|f| f.patch));
             }
         }
     }
 
-    /// Adds closed convex bodies of those sides of two-sided polygons that `is_wanted` (of their patch and its twin).
+    /// Adds closed convex parts of those sides of two-sided polygons that `is_wanted` (of their patch and its twin).
     fn add_two_sided(
         &self,
         body: BodyId,
@@ -170,7 +170,7 @@ impl Scene {
             if group.len() <= SOLID_FACES_MAX && is_convex(&group, &weld) {
                 let twin = |f: &&Face| self.patches[f.patch as usize].twin.map(|twin| twin.0);
                 let both = group.iter().flat_map(|f| [Some(f.patch), twin(f)]);
-                out.add_body(both.flatten());
+                out.add_convex_part(both.flatten());
             }
         }
     }
@@ -194,10 +194,10 @@ impl Scene {
 }
 
 impl Solids {
-    /// Adds a closed convex body of these faces.
-    fn add_body(&mut self, faces: impl Iterator<Item = u32>) {
-        faces.for_each(|patch| self.bodies[patch as usize] = Some(self.body_count));
-        self.body_count += 1;
+    /// Adds a closed convex part of these faces.
+    fn add_convex_part(&mut self, faces: impl Iterator<Item = u32>) {
+        faces.for_each(|patch| self.convex_parts[patch as usize] = Some(self.convex_part_count));
+        self.convex_part_count += 1;
     }
 }
 
@@ -397,7 +397,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_of_one_side_or_two_are_convex_bodies_wound_either_way_and_open_ones_are_not() {
+    fn boxes_of_one_side_or_two_are_convex_parts_wound_either_way_and_open_ones_are_not() {
         let half = DVec3::new(0.5, 0.25, 1.0);
         let bodies = |build: &dyn Fn(&mut SceneBuilder, super::super::NodeId)| {
             let mut b = SceneBuilder::new("bodies");
@@ -405,7 +405,7 @@ mod tests {
             build(&mut b, node);
             let scene = b.build().unwrap();
             let solids = scene.solids();
-            let mut numbers: Vec<u32> = solids.bodies.iter().flatten().copied().collect();
+            let mut numbers: Vec<u32> = solids.convex_parts.iter().flatten().copied().collect();
             let faces = numbers.len();
             numbers.dedup();
             (faces, numbers, scene.patches.len())

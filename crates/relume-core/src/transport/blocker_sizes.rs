@@ -13,7 +13,7 @@ use super::tuning::BODY_SHARE;
 pub struct BlockerSizes {
     /// For each end how unevenly lamps in the shaft light it (`spot`): 1.
     pub spots: [f64; 2],
-    /// Area of the smallest shadow on each end, of those that blockers (of convex bodies the largest face) would throw in the light of
+    /// Area of the smallest shadow on each end, of those that blockers (of convex parts of bodies the largest face) would throw in the light of
     /// the other end's middle, m2.
     pub least_shadow_m2: [f64; 2],
     /// Area of all blockers, m2.
@@ -87,20 +87,20 @@ impl<'a> Shaft<'a> {
         };
         let shown = self.shown(blockers, &area);
         for patch in blockers {
-            let of_body = self.forest.convex_body(*patch);
-            let of_body = shown.iter().find(|shown| Some(shown.0) == of_body);
-            let area_m2 = of_body.map_or(0.0, |shown| shown.1).max(area(patch));
+            let part = self.forest.convex_part(*patch);
+            let whole = shown.iter().find(|shown| Some(shown.0) == part);
+            let area_m2 = whole.map_or(0.0, |shown| shown.1).max(area(patch));
             self.place(*patch, area_m2, &mut sizes);
         }
         sizes
     }
 
-    /// For each convex body of which two or more faces are among the blockers, the largest area that one of them shows towards the
+    /// For each convex part of a body of which two or more faces are among the blockers, the largest area that one of them shows towards the
     /// ends, m2. The shadow of a board is as large as the board, not as its edges.
     fn shown(&self, blockers: &[PatchId], area: &impl Fn(&PatchId) -> f64) -> Vec<(u32, f64)> {
         let mut out: Vec<(u32, f64, u32)> = Vec::new();
         for patch in blockers {
-            let Some(body) = self.forest.convex_body(*patch) else { continue };
+            let Some(part) = self.forest.convex_part(*patch) else { continue };
             let frame = self.frame_of(*patch);
             let (a, b) = (frame.a, frame.b);
             let way = b.centre - a.centre;
@@ -108,13 +108,13 @@ impl<'a> Shaft<'a> {
             // Of what is seen edge-on from the middles, other points see more.
             let share = (towards.abs() + a.radius + b.radius) / apart.max(f64::MIN_POSITIVE);
             let shown_m2 = area(patch) * share.min(1.0);
-            match out.iter_mut().find(|found| found.0 == body) {
-                Some(found) => *found = (body, found.1.max(shown_m2), found.2 + 1),
-                None => out.push((body, shown_m2, 1)),
+            match out.iter_mut().find(|found| found.0 == part) {
+                Some(found) => *found = (part, found.1.max(shown_m2), found.2 + 1),
+                None => out.push((part, shown_m2, 1)),
             }
         }
         out.retain(|found| found.2 > 1);
-        out.into_iter().map(|(body, shown_m2, _)| (body, shown_m2)).collect()
+        out.into_iter().map(|(part, shown_m2, _)| (part, shown_m2)).collect()
     }
 
     /// Adds where a blocker of this area is: how far from each end.

@@ -1,11 +1,8 @@
 //! How much larger than its residuals the error of a solution may be.
 
 use super::Radiosity;
-use super::levels::gathered_from;
-use super::scaling::{most, pull};
-use crate::solver::field::{Field, Linear};
+use super::scaling::{RowScaling, for_each_leaf, most};
 use crate::solver::links::Links;
-use crate::solver::push::push;
 use crate::solver::surfaces::Surfaces;
 use crate::solver::tuning::GROWTH_SWEEPS;
 
@@ -47,22 +44,16 @@ impl Radiosity {
         links: &Links,
         weights: &[f32],
     ) -> Vec<(u32, f32)> {
-        let mut sent = Field::default();
-        sent.extend(surfaces.len());
-        let leaf = |id: u32, _: &Linear| Linear {
-            mean: [weights[id as usize] * self.factor_of_sent(id); 3],
-            ..Linear::default()
-        };
-        for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
-            pull(surfaces, facet.0, &leaf, &mut sent);
-        }
-        let gathered = gathered_from(&sent, surfaces, links, false);
-        let own = |id: u32| gathered[id as usize];
+        let sent = (0..).zip(weights).map(|(id, weight)| weight * self.factor_of_sent(id));
+        // Sums of rows, each times what its own leaf sends.
+        let scaled = RowScaling::of(surfaces, links, false, sent.collect());
         let mut out = Vec::new();
         for facet in surfaces.facets().iter().filter(|facet| surfaces.is_surface(facet.0)) {
-            let (at, rho) = (surfaces.place(facet.0), most(surfaces, facet.0));
-            push(surfaces, facet.0, &at, &Linear::default(), &own, &mut |leaf, h| {
-                out.push((leaf, 1.0 + rho * self.factor_of_received(leaf) * h.mean[0]));
+            let rho = most(surfaces, facet.0);
+            for_each_leaf(surfaces, facet.0, &mut |leaf| {
+                let k = leaf as usize;
+                let row = scaled.rows[k].mean / scaled.factors[k];
+                out.push((leaf, 1.0 + rho * self.factor_of_received(leaf) * row));
             });
         }
         out

@@ -45,7 +45,12 @@ impl RowScaling {
     }
 
     /// Given factors, with the sums of rows.
-    fn of(surfaces: &impl Surfaces, links: &Links, linear: bool, factors: Vec<f32>) -> RowScaling {
+    pub(super) fn of(
+        surfaces: &impl Surfaces,
+        links: &Links,
+        linear: bool,
+        factors: Vec<f32>,
+    ) -> RowScaling {
         let rows = vec![RowSum::default(); factors.len()];
         let mut scaling = RowScaling { factors, rows, wanted: Vec::new(), linear };
         scaling.sum_rows(surfaces, links);
@@ -260,7 +265,7 @@ pub(super) fn most(surfaces: &impl Surfaces, facet: u32) -> f32 {
     surfaces.material(facet).reflectance.into_iter().fold(0.0, f32::max)
 }
 
-fn for_each_leaf(surfaces: &impl Surfaces, facet: u32, visit: &mut dyn FnMut(u32)) {
+pub(super) fn for_each_leaf(surfaces: &impl Surfaces, facet: u32, visit: &mut dyn FnMut(u32)) {
     for_each_below(surfaces, facet, &mut |id| {
         if surfaces.children(id).is_empty() {
             visit(id);
